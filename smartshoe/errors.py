@@ -1,0 +1,69 @@
+"""The errors a person meets: one hierarchy, each with the exit status the command line gives it.
+
+A message is one sentence: what, where (file, line, column or key), how to mend it.
+"""
+
+from __future__ import annotations
+
+
+class SmartShoeError(Exception):
+    """Root of every error that smartshoe raises on purpose; ``exit_status`` is the contract's."""
+
+    exit_status = 2
+
+
+class UsageError(SmartShoeError, ValueError):
+    """A command line, an argument or an output place is wrong."""
+
+
+class ScenarioError(UsageError):
+    """A scenario file is wrong; the message names the file, the line and the key."""
+
+
+class LimitError(UsageError):
+    """A protocol or setting goes beyond what a device may be asked for."""
+
+
+class InputError(SmartShoeError, ValueError):
+    """An input file cannot be read or holds no usable data."""
+
+    exit_status = 3
+
+
+class FormatError(InputError):
+    """A file is not in the format that its name or its beginning promises."""
+
+
+class MissingChannelError(InputError, KeyError):
+    """A recording lacks a channel that is needed."""
+
+    def __str__(self) -> str:  # KeyError would print the repr
+        return str(self.args[0]) if self.args else ""
+
+
+class UnitError(InputError):
+    """A unit is unknown, or of another quantity than is needed."""
+
+
+class DeviceError(SmartShoeError, OSError):
+    """A device failed."""
+
+    exit_status = 4
+
+
+class DeviceTimeoutError(DeviceError, TimeoutError):
+    """A device did not answer in time."""
+
+
+class RefusedError(SmartShoeError):
+    """The data does not support the result that was asked for."""
+
+    exit_status = 5
+
+
+class NotIdentifiableError(RefusedError):
+    """The data cannot identify the model; the message says what is missing."""
+
+
+class NotConvergedError(RefusedError):
+    """An iteration ended without settling."""

@@ -1,0 +1,313 @@
+"""`Recording`: named, united, immutable channels on a time base; the one thing that rooms hand each other.
+
+Numbers stay exactly as the instrument logged them, each channel with its unit, so that reading and writing lose
+nothing; a computation asks for SI by name (``recording.force_n``, ``channel.si``) or for a unit explicitly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Role = Literal["load", "sensor", "command", "auxiliary"]
+
+REGIONS = ("toe", "meta1", "meta4", "heel")
+UNITS_OF_A_SHOE = REGIONS + tuple(f"{side}_{region}" for side in ("left", "right") for region in REGIONS)
+LOAD_NAME, COMMAND_NAME, SENSOR_NAME = "force", "command", "pressure"
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One signal of a recording.
+
+    ``values`` (n,) are finite and read-only, in ``unit``; where ``missing`` (n,) is True the sample was not there
+    and its value repeats the last one that was. ``range_`` and ``resolution`` are the instrument's, in ``unit``.
+    """
+
+    name: str
+    values: Array
+    unit: Unit
+    role: Role = "auxiliary"
+    missing: Mask | None = None
+    range_: tuple[float, float] | None = None
+    resolution: float | None = None
+
+    @classmethod
+    def from_values(cls, name: str, values: ArrayLike, unit: Unit, role: Role = "auxiliary") -> Self:
+        """A channel from numbers as they come: non-finite ones become missing samples."""
+        array = np.array(values, dtype=float, copy=True)
+        if array.ndim != 1:
+            raise InputError(f"channel {name} has shape {array.shape}: give one number per sample")
+        finite = np.isfinite(array)
+        missing: Mask | None = None
+        if not finite.all():
+            missing = ~finite
+            if missing.all():
+                array[:] = 0.0
+            else:
+                index = np.where(finite, np.arange(array.size), 0)
+                np.maximum.accumulate(index, out=index)
+                index[: int(np.argmax(finite))] = int(np.argmax(finite))
+                array = array[index]
+            missing.flags.writeable = False
+        array.flags.writeable = False
+        return cls(name, array, unit, role, missing)
+
+    @property
+    def si(self) -> Array:
+        """(n,) values in the quantity's SI unit."""
+        return self.unit.to_si(self.values)
+
+    def in_unit(self, unit: Unit) -> Array:
+        """(n,) values in ``unit``."""
+        return self.unit.convert(self.values, unit)
+
+    @property
+    def present(self) -> Mask:
+        """(n,) True where a sample was logged."""
+        return np.ones(self.values.size, dtype=bool) if self.missing is None else ~self.missing
+
+    def with_nan(self) -> Array:
+        """(n,) values with NaN at missing samples: for the edges (files, plots) only."""
+        if self.missing is None:
+            return self.values
+        return np.where(self.missing, np.nan, self.values)
+
+    def taken(self, index: slice | NDArray[np.intp] | Mask) -> Channel:
+        """The channel at the samples ``index``."""
+        values = self.values[index]
+        values.flags.writeable = False
+        return replace(self, values=values, missing=None if self.missing is None else self.missing[index])
+
+
+def _role_of(name: str, unit_: Unit) -> Role:
+    if name == LOAD_NAME and unit_.quantity == "force":
+        return "load"
+    if name == COMMAND_NAME:
+        return "command"
+    if name == SENSOR_NAME or name in UNITS_OF_A_SHOE:
+        return "sensor"
+    return "auxiliary"
+
+
+def split_column(column: str) -> tuple[str, Unit | None]:
+    """A plain table's column ``name_unit`` as its name and unit (None where the ending is no unit)."""
+    for cut in range(len(column)):  # the longest ending that is a unit: force_n_per_s before force_n_per + s
+        if column[cut] == "_" and 0 < cut < len(column) - 1:
+            found = unit_of_suffix(column[cut + 1 :])
+            if found is not None:
+                return column[:cut], found
+    return column, None
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One experiment: channels on one time base.
+
+    ``time_s`` (n,) increases strictly; its step may vary. ``unit`` names the sensing unit (``left_toe``).
+    ``metadata`` holds what the file said of itself, ``source`` where it came from, ``notes`` what the reader did
+    to it (rows dropped, signs turned) in one sentence each.
+    """
+
+    time_s: Array
+    channels: Mapping[str, Channel]
+    name: str = "recording"
+    unit: str | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        time_s = np.array(self.time_s, dtype=float, copy=True)
+        if time_s.ndim != 1 or time_s.size == 0:
+            raise InputError(f"{self.label} holds no samples")
+        if not np.isfinite(time_s).all():
+            at = int(np.argmin(np.isfinite(time_s)))
+            raise InputError(f"{self.label}: time of sample {at + 1} is missing: give every row a time")
+        step = np.diff(time_s)
+        if step.size and not (step > 0).all():
+            at = int(np.argmax(step <= 0))
+            fault = "repeats" if step[at] == 0 else "goes back"
+            raise InputError(
+                f"{self.label}: time {fault} at sample {at + 2} ({time_s[at]:.9g} s, then {time_s[at + 1]:.9g} s):"
+                " remove or re-time that row"
+            )
+        time_s.flags.writeable = False
+        object.__setattr__(self, "time_s", time_s)
+        for channel in self.channels.values():
+            if channel.values.shape != time_s.shape:
+                raise InputError(
+                    f"{self.label}: channel {channel.name} has {channel.values.size} samples, time has {time_s.size}"
+                )
+        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
+        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        *,
+        time_s: ArrayLike,
+        name: str = "recording",
+        unit: str | None = None,
+        metadata: Mapping[str, str] | None = None,
+        **columns: ArrayLike,
+    ) -> Self:
+        """A recording from arrays named as a plain table's columns: ``force_n=``, ``pressure_mbar=``, ...
+
+        NaN marks a missing sample. Raises `UnitError` for a name without a unit, `InputError` for shapes that
+        differ or time that does not increase.
+        """
+        channels: dict[str, Channel] = {}
+        for column, values in columns.items():
+            channel_name, unit_ = split_column(column)
+            if unit_ is None:
+                raise UnitError(f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar")
+            channels[channel_name] = Channel.from_values(channel_name, values, unit_, _role_of(channel_name, unit_))
+        return cls(np.asarray(time_s, dtype=float), channels, name, unit, dict(metadata or {}))
+
+    # -- what it is ------------------------------------------------------------------------------------------
+    @property
+    def label(self) -> str:
+        """The file, or else the name: what an error message calls this recording."""
+        return self.source or self.name
+
+    def __len__(self) -> int:
+        return int(self.time_s.size)
+
+    def __getitem__(self, name: str) -> Channel:
+        try:
+            return self.channels[name]
+        except KeyError:
+            raise MissingChannelError(
+                f"{self.label} has no channel {name!r}; it has {', '.join(self.channels) or 'none'}"
+            ) from None
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first sample to the last."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+    @property
+    def sample_time_s(self) -> float:
+        """The median step."""
+        if len(self) < 2:
+            raise InputError(f"{self.label} holds one sample: a signal needs two at least")
+        return float(np.median(np.diff(self.time_s)))
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """One over the median step."""
+        return 1.0 / self.sample_time_s
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether every step is within 1 % of the median step."""
+        step = np.diff(self.time_s)
+        return bool(step.size == 0 or np.all(np.abs(step - np.median(step)) <= 0.01 * np.median(step)))
+
+    # -- what it holds ---------------------------------------------------------------------------------------
+    def of_role(self, role: Role) -> tuple[Channel, ...]:
+        """The channels of one role, in the recording's order."""
+        return tuple(channel for channel in self.channels.values() if channel.role == role)
+
+    @property
+    def load(self) -> Channel:
+        """The reference load (compression positive); raises `MissingChannelError` where there is none."""
+        found = self.of_role("load")
+        if not found:
+            raise MissingChannelError(
+                f"{self.label} has no reference load; name its column with --force, for example --force 'Load[N]'"
+                f" (columns: {', '.join(self.channels)})"
+            )
+        return found[0]
+
+    @property
+    def sensors(self) -> tuple[Channel, ...]:
+        """The readings of the sensing units."""
+        return self.of_role("sensor")
+
+    @property
+    def sensor(self) -> Channel:
+        """The one reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
+        found = self.sensors
+        if len(found) != 1:
+            what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
+            raise MissingChannelError(
+                f"{self.label} has {what}; name one column with --sensor, for example --sensor 'pressure[mbar]'"
+                f" (columns: {', '.join(self.channels)})"
+            )
+        return found[0]
+
+    @property
+    def force_n(self) -> Array:
+        """(n,) reference load in newton."""
+        return self.load.si
+
+    @property
+    def pressure_pa(self) -> Array:
+        """(n,) the unit's gauge pressure in pascal; raises `UnitError` where the sensor is no pressure."""
+        sensor = self.sensor
+        if sensor.unit.quantity != "pressure":
+            raise UnitError(f"{self.label}: {sensor.name} is in {sensor.unit.symbol}, not a pressure")
+        return sensor.si
+
+    @property
+    def command_n(self) -> Array | None:
+        """(n,) the commanded load in newton, or None where it was not logged."""
+        found = self.of_role("command")
+        return found[0].si if found else None
+
+    # -- what it becomes -------------------------------------------------------------------------------------
+    def with_channel(self, channel: Channel) -> Recording:
+        """This recording with ``channel`` added, or put in the place of its namesake."""
+        return replace(self, channels={**self.channels, channel.name: channel})
+
+    def without(self, *names: str) -> Recording:
+        """This recording without the named channels."""
+        return replace(self, channels={n: c for n, c in self.channels.items() if n not in names})
+
+    def taken(self, index: slice | NDArray[np.intp] | Mask) -> Recording:
+        """This recording at the samples ``index`` (a slice, a mask or increasing indices)."""
+        return replace(
+            self,
+            time_s=self.time_s[index],
+            channels={name: channel.taken(index) for name, channel in self.channels.items()},
+        )
+
+    def between(self, start_s: float, end_s: float) -> Recording:
+        """The samples with start_s <= time < end_s."""
+        first, last = np.searchsorted(self.time_s, [start_s, end_s])
+        return self.taken(slice(int(first), int(last)))
+
+    def noted(self, *sentences: str) -> Recording:
+        """This recording with remarks added to ``notes``."""
+        return replace(self, notes=(*self.notes, *sentences))
+
+    def to_frame(self):  # type: ignore[no-untyped-def]  # pandas stays a lazy import
+        """A pandas DataFrame with the plain table's column names; NaN where a sample is missing."""
+        import pandas as pd
+
+        return pd.DataFrame({column: values for column, values in self.columns()})
+
+    def columns(self) -> list[tuple[str, Array]]:
+        """The plain table's columns: (``name_unit``, values with NaN where missing), time first."""
+        return [("time_s", self.time_s)] + [(column_name(c), c.with_nan()) for c in self.channels.values()]
+
+
+def column_name(channel: Channel) -> str:
+    """The plain table's column for a channel: its name with the unit's ending."""
+    return f"{channel.name}_{channel.unit.suffix}"
+
+
+__all__ = ["REGIONS", "SECOND", "UNITS_OF_A_SHOE", "Channel", "Recording", "Role", "column_name", "declared",
+           "split_column"]
