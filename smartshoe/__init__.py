@@ -40,8 +40,21 @@ if TYPE_CHECKING:
     from smartshoe.validate import validate
 
 __all__ = [
-    "Calibration", "Channel", "Compensator", "Identification", "Protocol", "Recording", "SmartShoeError",
-    "dynamic_protocol", "identify", "open_machine", "open_shoe", "read", "stack", "static_protocol", "validate",
+    "Calibration",
+    "Channel",
+    "Compensator",
+    "Identification",
+    "Protocol",
+    "Recording",
+    "SmartShoeError",
+    "dynamic_protocol",
+    "identify",
+    "open_machine",
+    "open_shoe",
+    "read",
+    "stack",
+    "static_protocol",
+    "validate",
     "write",
 ]
 

@@ -171,8 +171,12 @@ class Recording:
         for column, values in columns.items():
             channel_name, unit_ = split_column(column)
             if unit_ is None:
-                raise UnitError(f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar")
-            channels[channel_name] = Channel.from_values(channel_name, values, unit_, _role_of(channel_name, unit_))
+                raise UnitError(
+                    f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar"
+                )
+            channels[channel_name] = Channel.from_values(
+                channel_name, values, unit_, _role_of(channel_name, unit_)
+            )
         return cls(np.asarray(time_s, dtype=float), channels, name, unit, dict(metadata or {}))
 
     # -- what it is ------------------------------------------------------------------------------------------
@@ -241,7 +245,11 @@ class Recording:
         """The one reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
         found = self.sensors
         if len(found) != 1:
-            what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
+            what = (
+                "no sensor reading"
+                if not found
+                else f"{len(found)} readings ({', '.join(c.name for c in found)})"
+            )
             raise MissingChannelError(
                 f"{self.label} has {what}; name one column with --sensor, for example --sensor 'pressure[mbar]'"
                 f" (columns: {', '.join(self.channels)})"
@@ -309,5 +317,14 @@ def column_name(channel: Channel) -> str:
     return f"{channel.name}_{channel.unit.suffix}"
 
 
-__all__ = ["REGIONS", "SECOND", "UNITS_OF_A_SHOE", "Channel", "Recording", "Role", "column_name", "declared",
-           "split_column"]
+__all__ = [
+    "REGIONS",
+    "SECOND",
+    "UNITS_OF_A_SHOE",
+    "Channel",
+    "Recording",
+    "Role",
+    "column_name",
+    "declared",
+    "split_column",
+]

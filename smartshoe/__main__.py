@@ -1,0 +1,5 @@
+"""``python -m smartshoe``."""
+
+from smartshoe.cli import main
+
+main()

@@ -1,0 +1,5 @@
+"""``python -m smartshoe.cli``."""
+
+from smartshoe.cli import main
+
+main()

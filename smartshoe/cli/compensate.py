@@ -1,0 +1,43 @@
+"""``smartshoe compensate``."""
+
+from __future__ import annotations
+
+import click
+
+from smartshoe.cli.inputs import column_options, read_all
+
+
+@click.command(
+    "compensate",
+    epilog="Example: smartshoe compensate walk.csv --calibration left_toe.json --out walk_force.csv",
+)
+@click.argument("file")
+@click.option("--calibration", "calibration_path", required=True, metavar="C.json", help="From identify.")
+@click.option("--out", "out_path", metavar="OUT.csv", help="Write the recording with force_estimate_n added.")
+@column_options
+def command(
+    file: str,
+    calibration_path: str,
+    out_path: str | None,
+    time: str | None,
+    force: str | None,
+    sensors: tuple[str, ...],
+    unit: str | None,
+) -> None:
+    """Force from the pressure in FILE, by a calibration."""
+    from smartshoe.compensate import Calibration, compensate
+    from smartshoe.logs import write
+
+    calibration = Calibration.load(calibration_path)
+    (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
+    result = compensate(recording, calibration)
+    for note in result.notes[len(recording.notes) :]:
+        click.echo(f"note: {note}", err=True)
+    if out_path is not None:
+        write(result, out_path)
+    estimate_n = result["force_estimate"].si
+    click.echo(
+        f"{result.label}: {len(result)} samples, force {estimate_n.min():.1f} to {estimate_n.max():.1f} N,"
+        f" mean {estimate_n.mean():.1f} N"
+        + (f"; written to {out_path}" if out_path else "; --out keeps them")
+    )

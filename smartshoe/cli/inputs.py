@@ -1,0 +1,46 @@
+"""The options by which any command is told which columns of a file are what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import click
+
+from smartshoe.recording import Recording
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def column_options(command: _F) -> _F:
+    """Add --time, --force, --sensor and --unit."""
+    for decorate in (
+        click.option("--unit", metavar="NAME", help="The sensing unit's name, for example left_toe."),
+        click.option(
+            "--sensor",
+            "sensors",
+            multiple=True,
+            metavar="COLUMN",
+            help="A sensor's column (repeatable): '6[bar]'.",
+        ),
+        click.option("--force", metavar="COLUMN", help="The reference load's column: '7[N]', 'Load[kN]'."),
+        click.option(
+            "--time",
+            metavar="COLUMN",
+            help="The time column, by name or 1-based number, with its unit: '1[ms]'.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+def read_all(
+    files: Sequence[str], *, time: str | None, force: str | None, sensors: Sequence[str], unit: str | None
+) -> list[Recording]:
+    """Every file as a recording; what the readers did is said on stderr."""
+    from smartshoe.cli.output import show_notes
+    from smartshoe.logs import read
+
+    recordings = [read(file, time=time, force=force, sensors=list(sensors), unit=unit) for file in files]
+    show_notes(recordings)
+    return recordings

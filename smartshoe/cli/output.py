@@ -1,0 +1,54 @@
+"""What commands share on their way out: JSON, notes, progress."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from smartshoe.atomic import write_text
+from smartshoe.recording import Recording
+
+
+def to_json(result: dict[str, Any]) -> str:
+    """The result as JSON text; NaN and infinity are an error, never written."""
+    return json.dumps(result, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def emit_json(result: dict[str, Any], path: str | None) -> bool:
+    """Write ``result`` to ``path`` (``-``: stdout) where one is given; True where stdout is taken by it."""
+    if path is None:
+        return False
+    if path == "-":
+        click.echo(to_json(result), nl=False)
+        return True
+    write_text(path, to_json(result))
+    return False
+
+
+def show_notes(recordings: list[Recording]) -> None:
+    """What readers did to the files, on stderr."""
+    for recording in recordings:
+        for note in recording.notes:
+            click.echo(f"note: {recording.label}: {note}", err=True)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """A spinner with the step's name on a terminal; nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(),
+        console=Console(stderr=True), transient=True,
+    ) as bar:  # fmt: skip
+        task = bar.add_task("starting", total=None)
+        yield lambda text: bar.update(task, description=text)

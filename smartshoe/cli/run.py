@@ -1,0 +1,37 @@
+"""``smartshoe run``."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command("run", epilog="Example: smartshoe run scenarios/calibration.toml --out out/calibration")
+@click.argument("scenario")
+@click.option("--seed", type=click.IntRange(min=0), help="In the place of the scenario's own seed.")
+@click.option(
+    "--out", "out_folder", metavar="DIR", help="Write report.html, result.json and the calibrations."
+)
+@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
+def command(scenario: str, seed: int | None, out_folder: str | None, json_path: str | None) -> None:
+    """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
+    from smartshoe.atomic import make_folder
+    from smartshoe.cli.output import emit_json, progress, to_json
+    from smartshoe.report.tables import print_summary
+    from smartshoe.scenario import load, run
+    from smartshoe.scenario.publish import publish
+
+    loaded, source = load(scenario)
+    if seed is not None:
+        loaded = loaded.model_copy(update={"seed": seed})
+    folder = make_folder(out_folder) if out_folder is not None else None
+    with progress() as step:
+        result = run(loaded, source, step)
+        whole = result.to_dict()
+        report = None
+        if folder is not None:
+            step("writing the report")
+            report = publish(result, folder, to_json(whole))
+    if not emit_json(whole, json_path):
+        print_summary(whole["units"])
+        if report is not None:
+            click.echo(f"report: {report}")

@@ -1,0 +1,33 @@
+"""``smartshoe simulate``."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command("simulate", epilog="Example: smartshoe simulate scenarios/calibration.toml --out recordings")
+@click.argument("scenario")
+@click.option("--out", "out_folder", required=True, metavar="DIR", help="Where the recordings go.")
+@click.option("--seed", type=click.IntRange(min=0), help="In the place of the scenario's own seed.")
+def command(scenario: str, out_folder: str, seed: int | None) -> None:
+    """Run only the devices of SCENARIO and write one plain table per unit and experiment."""
+    from smartshoe.atomic import make_folder
+    from smartshoe.cli.output import progress
+    from smartshoe.logs import write
+    from smartshoe.scenario import load, simulate
+
+    loaded, source = load(scenario)
+    if seed is not None:
+        loaded = loaded.model_copy(update={"seed": seed})
+    folder = make_folder(out_folder)
+    with progress() as step:
+        made = simulate(loaded, source, step)
+        for unit, recordings in made.items():
+            for name, recording in recordings.items():
+                step(f"{unit}: writing {name}")
+                write(recording, folder / f"{unit}_{name}.csv")
+    for unit, recordings in made.items():
+        for name, recording in recordings.items():
+            click.echo(
+                f"{folder / f'{unit}_{name}.csv'}: {len(recording)} samples, {recording.duration_s:.1f} s"
+            )

@@ -1,0 +1,37 @@
+"""``smartshoe validate``."""
+
+from __future__ import annotations
+
+import click
+
+from smartshoe.cli.inputs import column_options, read_all
+
+
+@click.command(
+    "validate",
+    epilog="Example: smartshoe validate left_toe_check.csv --calibration left_toe.json",
+)
+@click.argument("files", nargs=-1, required=True)
+@click.option("--calibration", "calibration_path", required=True, metavar="C.json", help="From identify.")
+@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
+@column_options
+def command(
+    files: tuple[str, ...],
+    calibration_path: str,
+    json_path: str | None,
+    time: str | None,
+    force: str | None,
+    sensors: tuple[str, ...],
+    unit: str | None,
+) -> None:
+    """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
+    from smartshoe.cli.output import emit_json
+    from smartshoe.compensate import Calibration
+    from smartshoe.report.tables import print_validation
+    from smartshoe.validate import validate
+
+    calibration = Calibration.load(calibration_path)
+    recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
+    result = validate(recordings, calibration).to_dict()
+    if not emit_json(result, json_path):
+        print_validation(result)

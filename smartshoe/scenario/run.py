@@ -1,0 +1,189 @@
+"""Carrying a scenario out: devices, protocols, identification, compensation, validation."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+import smartshoe
+from smartshoe.compensate import Calibration
+from smartshoe.devices import open_machine
+from smartshoe.errors import LimitError, SmartShoeError
+from smartshoe.identify import Identification, identify
+from smartshoe.logs import read
+from smartshoe.protocol import Protocol
+from smartshoe.recording import Recording
+from smartshoe.scenario.schema import Scenario, Source, UnitTable
+from smartshoe.validate import Validation, validate
+
+Progress = Callable[[str], None]
+
+
+def _silent(_: str) -> None:
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class UnitResult:
+    """What came out for one unit: its recordings by experiment, and each step's result."""
+
+    name: str
+    recordings: dict[str, Recording]
+    identification: Identification
+    calibration: Calibration
+    validation: Validation
+    fitted: tuple[str, ...]
+    judged: tuple[str, ...]
+    truth: dict[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The unit's part of ``result.json``."""
+        return {
+            "unit": self.name,
+            "recordings": {
+                name: {
+                    "samples": len(recording),
+                    "duration_s": recording.duration_s,
+                    "source": recording.source,
+                }
+                for name, recording in self.recordings.items()
+            },
+            "fitted": list(self.fitted),
+            "judged": list(self.judged),
+            "device": self.truth,
+            "identification": self.identification.to_dict(),
+            "validation": self.validation.to_dict(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioResult:
+    """All units of a scenario."""
+
+    scenario: Scenario
+    source: Path
+    units: tuple[UnitResult, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The whole result: schema ``smartshoe.run/1``."""
+        return {
+            "schema": "smartshoe.run/1",
+            "scenario": self.source.name,
+            "title": self.scenario.title,
+            "seed": self.scenario.seed,
+            "version": smartshoe.__version__,
+            "units": [unit.to_dict() for unit in self.units],
+        }
+
+
+def _seed_of(scenario: Scenario, unit: UnitTable) -> int:
+    """A unit's own seed: it depends on the unit's name, so that adding a unit leaves the others' noise alone."""
+    return int(np.random.SeedSequence([scenario.seed, zlib.crc32(unit.name.encode())]).generate_state(1)[0])
+
+
+def _protocols(scenario: Scenario, source: Source) -> dict[str, Protocol]:
+    built: dict[str, Protocol] = {}
+    for name, table in scenario.protocol.items():
+        try:
+            built[name] = table.build(name)
+        except LimitError as error:
+            raise source.error(("protocol", name), str(error)) from error
+    return built
+
+
+def _record(
+    scenario: Scenario, source: Source, index: int, protocols: dict[str, Protocol], progress: Progress
+) -> dict[str, Recording]:
+    unit = scenario.unit[index]
+    if unit.recordings:
+        found: dict[str, Recording] = {}
+        for name in unit.recordings:
+            path = Path(name) if Path(name).is_absolute() else source.path.parent / name
+            progress(f"{unit.name}: reading {path.name}")
+            found[path.stem] = read(
+                path,
+                time=unit.time,
+                force=unit.force,
+                sensors=[unit.sensor] if unit.sensor else [],
+                unit=unit.name,
+                name=path.stem,
+            )
+        return found
+    options = {**scenario.machine.options, **unit.options}
+    try:
+        machine = open_machine(
+            scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit), **options
+        )
+    except ValidationError as error:
+        key = error.errors(include_url=False)[0]["loc"][:1]
+        in_machine = bool(key) and key[0] in scenario.machine.options and key[0] not in unit.options
+        raise source.from_validation(error, ("machine",) if in_machine else ("unit", index)) from error
+    recordings: dict[str, Recording] = {}
+    with machine:
+        # Every protocol is checked before the first one moves anything.
+        for name, protocol in protocols.items():
+            try:
+                machine.check(protocol)
+            except LimitError as error:
+                raise source.error(("protocol", name), str(error)) from error
+        for name, protocol in protocols.items():
+            progress(f"{unit.name}: {name}")
+            recordings[name] = machine.run(protocol)
+    return recordings
+
+
+def simulate(
+    scenario: Scenario, source: Source, progress: Progress = _silent
+) -> dict[str, dict[str, Recording]]:
+    """Only the devices: recordings by unit and experiment."""
+    protocols = _protocols(scenario, source)
+    return {
+        unit.name: _record(scenario, source, index, protocols, progress)
+        for index, unit in enumerate(scenario.unit)
+    }
+
+
+def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str, ...]:
+    names = tuple(name for name in use if name in recordings)
+    return names or tuple(recordings)
+
+
+def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> ScenarioResult:
+    """Devices, then identification, calibration and validation of each unit.
+
+    Raises what the steps raise, with the unit's name in front.
+    """
+    settings = scenario.identify
+    results: list[UnitResult] = []
+    for name, recordings in simulate(scenario, source, progress).items():
+        fitted = _chosen(recordings, settings.use)
+        judged = _chosen(recordings, scenario.validate_.use)
+        progress(f"{name}: identifying")
+        try:
+            found = identify(
+                [recordings[key] for key in fitted],
+                direction=settings.direction,
+                method=settings.method,
+                structure=settings.structure,
+                offset=settings.offset,
+                delay=settings.delay,
+                initial_state=settings.initial_state,
+                prefilter_rad_s=settings.prefilter_rad_s,
+            )
+            calibration = found.calibration()
+            progress(f"{name}: validating")
+            validation = validate([recordings[key] for key in judged], calibration)
+        except SmartShoeError as error:
+            error.args = (f"{source.path}, unit {name}: {error}",)
+            raise
+        truth = next(unit.options for unit in scenario.unit if unit.name == name)
+        results.append(
+            UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth))
+        )
+    return ScenarioResult(scenario, source.path, tuple(results))

@@ -1,0 +1,218 @@
+"""What a scenario may say, checked with errors that name the file, the line and the key."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
+
+from smartshoe.errors import ScenarioError
+from smartshoe.protocol import (
+    DYNAMIC_RATES_N_PER_S,
+    STATIC_LOADS_N,
+    Protocol,
+    dynamic_protocol,
+    static_protocol,
+)
+from smartshoe.scenario.lines import line_of
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ProtocolTable(_Table):
+    """``[protocol.NAME]``: the paper's static or dynamic protocol, or a variation of it."""
+
+    kind: Literal["static", "dynamic"]
+    loads_n: tuple[PositiveFloat, ...] = STATIC_LOADS_N
+    rates_n_per_s: tuple[PositiveFloat, ...] = DYNAMIC_RATES_N_PER_S
+    peak_n: PositiveFloat = 800.0
+    repeats: PositiveInt = 1
+    rate_n_per_s: PositiveFloat = 50.0
+    approach_n: float = Field(5.0, ge=0.0)
+    approach_s: PositiveFloat = 5.0
+    hold_s: PositiveFloat = 5.0
+    rest_s: float = Field(5.0, ge=0.0)
+
+    @model_validator(mode="after")
+    def _keys_belong_to_the_kind(self) -> ProtocolTable:
+        foreign = {
+            "static": {"rates_n_per_s", "peak_n", "repeats"},
+            "dynamic": {"loads_n", "rate_n_per_s", "approach_n", "approach_s", "hold_s"},
+        }[self.kind] & self.model_fields_set
+        if foreign:
+            raise ValueError(f"{', '.join(sorted(foreign))} means nothing in a {self.kind} protocol")
+        return self
+
+    def build(self, name: str) -> Protocol:
+        """The protocol, named as the table is."""
+        if self.kind == "static":
+            made = static_protocol(
+                self.loads_n,
+                rate_n_per_s=self.rate_n_per_s,
+                approach_n=self.approach_n,
+                approach_s=self.approach_s,
+                hold_s=self.hold_s,
+                rest_s=self.rest_s,
+            )
+        else:
+            made = dynamic_protocol(
+                self.rates_n_per_s, peak_n=self.peak_n, repeats=self.repeats, rest_s=self.rest_s
+            )
+        return Protocol(name, made.segments)
+
+
+class MachineTable(BaseModel):
+    """``[machine]``: the backend's address; every further key is the backend's own and is checked by it."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    backend: str = "sim:instron"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keys beside ``backend``."""
+        return dict(self.model_extra or {})
+
+
+class UnitTable(BaseModel):
+    """``[[unit]]``: a sensing unit; its recordings are files, or come from the machine (further keys are its)."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    name: str = Field(min_length=1)
+    recordings: tuple[str, ...] = ()
+    time: str | None = None
+    force: str | None = None
+    sensor: str | None = None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keys that describe the device behind the unit."""
+        return dict(self.model_extra or {})
+
+
+class IdentifyTable(_Table):
+    """``[identify]``: which experiments are fitted, and how."""
+
+    use: tuple[str, ...] = ()
+    direction: Literal["inverse", "forward"] = "inverse"
+    method: Literal["srivc", "gn", "lm", "trf"] = "trf"
+    structure: Literal["free", "grey_box"] = "free"
+    offset: Literal["estimate"] | float = "estimate"
+    delay: Literal["estimate"] | float = "estimate"
+    initial_state: Literal["estimate", "steady"] = "estimate"
+    prefilter_rad_s: PositiveFloat = 1.0
+    sample_rate_hz: PositiveFloat = 100.0
+
+
+class ValidateTable(_Table):
+    """``[validate]``: which experiments are judged."""
+
+    use: tuple[str, ...] = ()
+
+
+class Scenario(_Table):
+    """A whole scenario. ``seed`` is the root of every random draw."""
+
+    title: str = "scenario"
+    about: str = ""
+    seed: int = Field(0, ge=0)
+    machine: MachineTable = MachineTable()
+    protocol: dict[str, ProtocolTable] = {}
+    unit: tuple[UnitTable, ...] = Field(min_length=1)
+    identify: IdentifyTable = IdentifyTable()
+    validate_: ValidateTable = Field(ValidateTable(), alias="validate")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _kind_defaults_to_the_name(cls, raw: Any) -> Any:
+        for name, table in (raw.get("protocol") or {}).items() if isinstance(raw, dict) else ():
+            if isinstance(table, dict) and name in ("static", "dynamic"):
+                table.setdefault("kind", name)
+        return raw
+
+
+class Source:
+    """A scenario's text, to turn a path of keys into 'FILE, line N, key K'."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.path, self.text = path, text
+
+    def error(self, keys: tuple[str | int, ...], message: str) -> ScenarioError:
+        """A `ScenarioError` that points at ``keys``."""
+        line = line_of(self.text, keys)
+        where = f"{self.path}, line {line}" if line else str(self.path)
+        named = ".".join(str(key) for key in keys) or "the file"
+        return ScenarioError(f"{where}, key {named}: {message}")
+
+    def from_validation(self, error: ValidationError, prefix: tuple[str | int, ...] = ()) -> ScenarioError:
+        """The first of pydantic's complaints as one sentence."""
+        first = error.errors(include_url=False)[0]
+        keys = (
+            *prefix,
+            *(part for part in first["loc"] if part not in ("function-before", "float", "literal")),
+        )
+        message = first["msg"].removeprefix("Value error, ")
+        if first["type"] == "extra_forbidden":
+            message = "this key is not known; remove it or mend its spelling"
+        elif first["type"] == "missing":
+            message = "this key is needed"
+        else:
+            message = f"{message[:1].lower()}{message[1:]} (it is {first['input']!r})"
+        return self.error(keys, message)
+
+
+def load(path: Path | str) -> tuple[Scenario, Source]:
+    """Read and check a scenario file.
+
+    Raises `ScenarioError`: what is wrong, with line and key.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{file} is not UTF-8 text (byte {error.start}): save it as UTF-8") from error
+    except OSError as error:
+        raise ScenarioError(
+            f"{file} cannot be read ({error.strerror}): give the path of a scenario"
+        ) from error
+    source = Source(file, text)
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{file} is not valid TOML: {error}") from error
+    try:
+        scenario = Scenario.model_validate(raw)
+    except ValidationError as error:
+        raise source.from_validation(error) from error
+    names = [unit.name for unit in scenario.unit]
+    for index, unit in enumerate(scenario.unit):
+        if names.index(unit.name) != index:
+            raise source.error(
+                ("unit", index, "name"), f"unit {unit.name} is there twice; give it another name"
+            )
+        if not unit.recordings and not scenario.protocol:
+            raise source.error(
+                ("unit", index), "there is nothing to run: add recordings, or a [protocol.dynamic]"
+            )
+    for step, table in (("identify", scenario.identify), ("validate", scenario.validate_)):
+        for name in table.use:
+            known = set(scenario.protocol) or {Path(r).stem for u in scenario.unit for r in u.recordings}
+            if name not in known:
+                raise source.error(
+                    (step, "use"), f"{name!r} is no experiment here; there are {', '.join(sorted(known))}"
+                )
+    return scenario, source
+
+
+__all__ = ["Scenario", "Source", "UnitTable", "load"]

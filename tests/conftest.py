@@ -1,0 +1,54 @@
+"""What every room's tests share: where the measured files lie, and how Hypothesis runs."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "ci", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile("dev", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--measured",
+        default=os.environ.get("SMARTSHOE_MEASURED", str(ROOT.parent / "shared" / "data")),
+        help="folder of the measured files (default: $SMARTSHOE_MEASURED, else ../shared/data)",
+    )
+    parser.addoption("--shoe-url", default=None, help="a real shoe for the tests marked hardware")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--shoe-url") is None:
+        skip = pytest.mark.skip(reason="needs --shoe-url")
+        for item in items:
+            if "hardware" in item.keywords:
+                item.add_marker(skip)
+    if "bank" not in (config.getoption("-m") or ""):
+        skip = pytest.mark.skip(reason="a long bank: run it with -m bank")
+        for item in items:
+            if "bank" in item.keywords:
+                item.add_marker(skip)
+
+
+@pytest.fixture(scope="session")
+def measured(request: pytest.FixtureRequest) -> Path:
+    """The folder of real measurements, which is not part of the project."""
+    folder = Path(request.config.getoption("--measured"))
+    if not folder.is_dir():
+        pytest.skip(f"no measured files at {folder}: give --measured")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The checkout."""
+    return ROOT
