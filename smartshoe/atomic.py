@@ -21,9 +21,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
     if target.is_dir():
         raise UsageError(f"{target} is a directory: give the name of a file to write")
     try:
-        handle, name = tempfile.mkstemp(
-            dir=target.parent, prefix=f".{target.stem}.", suffix=f".partial{target.suffix}"
-        )
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=f".partial{target.suffix}")
     except OSError as error:
         raise UsageError(
             f"{target} cannot be written ({error.strerror}): choose a folder that exists and is writable"
@@ -56,9 +54,7 @@ def make_folder(path: Path | str) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UsageError(
-            f"{folder} cannot be made a folder ({error.strerror}): choose another --out"
-        ) from error
+        raise UsageError(f"{folder} cannot be made a folder ({error.strerror}): choose another --out") from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"{folder} is not writable: choose another --out")
     return folder

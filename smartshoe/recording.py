@@ -171,12 +171,8 @@ class Recording:
         for column, values in columns.items():
             channel_name, unit_ = split_column(column)
             if unit_ is None:
-                raise UnitError(
-                    f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar"
-                )
-            channels[channel_name] = Channel.from_values(
-                channel_name, values, unit_, _role_of(channel_name, unit_)
-            )
+                raise UnitError(f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar")
+            channels[channel_name] = Channel.from_values(channel_name, values, unit_, _role_of(channel_name, unit_))
         return cls(np.asarray(time_s, dtype=float), channels, name, unit, dict(metadata or {}))
 
     # -- what it is ------------------------------------------------------------------------------------------
@@ -245,11 +241,7 @@ class Recording:
         """The one reading of a unit's recording; raises `MissingChannelError` unless there is exactly one."""
         found = self.sensors
         if len(found) != 1:
-            what = (
-                "no sensor reading"
-                if not found
-                else f"{len(found)} readings ({', '.join(c.name for c in found)})"
-            )
+            what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
             raise MissingChannelError(
                 f"{self.label} has {what}; name one column with --sensor, for example --sensor 'pressure[mbar]'"
                 f" (columns: {', '.join(self.channels)})"
@@ -305,7 +297,7 @@ class Recording:
         """A pandas DataFrame with the plain table's column names; NaN where a sample is missing."""
         import pandas as pd
 
-        return pd.DataFrame({column: values for column, values in self.columns()})
+        return pd.DataFrame(dict(self.columns()))
 
     def columns(self) -> list[tuple[str, Array]]:
         """The plain table's columns: (``name_unit``, values with NaN where missing), time first."""

@@ -42,9 +42,7 @@ class Unit:
         if to == self:
             return np.asarray(values, dtype=float)
         if to.quantity != self.quantity:
-            raise UnitError(
-                f"{self.symbol} ({self.quantity}) cannot be expressed in {to.symbol} ({to.quantity})"
-            )
+            raise UnitError(f"{self.symbol} ({self.quantity}) cannot be expressed in {to.symbol} ({to.quantity})")
         if self.offset == 0.0 and to.offset == 0.0:
             return np.asarray(values, dtype=float) * (self.scale / to.scale)
         return to.from_si(self.to_si(values))

@@ -38,6 +38,5 @@ def command(
     estimate_n = result["force_estimate"].si
     click.echo(
         f"{result.label}: {len(result)} samples, force {estimate_n.min():.1f} to {estimate_n.max():.1f} N,"
-        f" mean {estimate_n.mean():.1f} N"
-        + (f"; written to {out_path}" if out_path else "; --out keeps them")
+        f" mean {estimate_n.mean():.1f} N" + (f"; written to {out_path}" if out_path else "; --out keeps them")
     )

@@ -34,9 +34,7 @@ from smartshoe.cli.inputs import column_options, read_all
     help="a1, b0 and b1 free, or k1 and k2 with c = 1 as in the paper.",
 )
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
-@click.option(
-    "--calibration", "calibration_path", metavar="OUT.json", help="Write a calibration for compensate."
-)
+@click.option("--calibration", "calibration_path", metavar="OUT.json", help="Write a calibration for compensate.")
 @column_options
 def command(
     files: tuple[str, ...],

@@ -8,9 +8,7 @@ import click
 @click.command("run", epilog="Example: smartshoe run scenarios/calibration.toml --out out/calibration")
 @click.argument("scenario")
 @click.option("--seed", type=click.IntRange(min=0), help="In the place of the scenario's own seed.")
-@click.option(
-    "--out", "out_folder", metavar="DIR", help="Write report.html, result.json and the calibrations."
-)
+@click.option("--out", "out_folder", metavar="DIR", help="Write report.html, result.json and the calibrations.")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 def command(scenario: str, seed: int | None, out_folder: str | None, json_path: str | None) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""

@@ -28,6 +28,4 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
                 write(recording, folder / f"{unit}_{name}.csv")
     for unit, recordings in made.items():
         for name, recording in recordings.items():
-            click.echo(
-                f"{folder / f'{unit}_{name}.csv'}: {len(recording)} samples, {recording.duration_s:.1f} s"
-            )
+            click.echo(f"{folder / f'{unit}_{name}.csv'}: {len(recording)} samples, {recording.duration_s:.1f} s")

@@ -198,7 +198,7 @@ class TestMachine(Device):
         except LimitError as error:
             raise LimitError(f"{self}: {error}") from error
 
-    def _check_internal(self, protocol: Protocol) -> None:  # noqa: B027
+    def _check_internal(self, protocol: Protocol) -> None:
         """A backend's further checks."""
 
     @abstractmethod

@@ -117,9 +117,7 @@ def _record(
         return found
     options = {**scenario.machine.options, **unit.options}
     try:
-        machine = open_machine(
-            scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit), **options
-        )
+        machine = open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit), **options)
     except ValidationError as error:
         key = error.errors(include_url=False)[0]["loc"][:1]
         in_machine = bool(key) and key[0] in scenario.machine.options and key[0] not in unit.options
@@ -138,14 +136,11 @@ def _record(
     return recordings
 
 
-def simulate(
-    scenario: Scenario, source: Source, progress: Progress = _silent
-) -> dict[str, dict[str, Recording]]:
+def simulate(scenario: Scenario, source: Source, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:
     """Only the devices: recordings by unit and experiment."""
     protocols = _protocols(scenario, source)
     return {
-        unit.name: _record(scenario, source, index, protocols, progress)
-        for index, unit in enumerate(scenario.unit)
+        unit.name: _record(scenario, source, index, protocols, progress) for index, unit in enumerate(scenario.unit)
     }
 
 
@@ -183,7 +178,5 @@ def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> Sce
             error.args = (f"{source.path}, unit {name}: {error}",)
             raise
         truth = next(unit.options for unit in scenario.unit if unit.name == name)
-        results.append(
-            UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth))
-        )
+        results.append(UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth)))
     return ScenarioResult(scenario, source.path, tuple(results))

@@ -67,9 +67,7 @@ class ProtocolTable(_Table):
                 rest_s=self.rest_s,
             )
         else:
-            made = dynamic_protocol(
-                self.rates_n_per_s, peak_n=self.peak_n, repeats=self.repeats, rest_s=self.rest_s
-            )
+            made = dynamic_protocol(self.rates_n_per_s, peak_n=self.peak_n, repeats=self.repeats, rest_s=self.rest_s)
         return Protocol(name, made.segments)
 
 
@@ -183,9 +181,7 @@ def load(path: Path | str) -> tuple[Scenario, Source]:
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{file} is not UTF-8 text (byte {error.start}): save it as UTF-8") from error
     except OSError as error:
-        raise ScenarioError(
-            f"{file} cannot be read ({error.strerror}): give the path of a scenario"
-        ) from error
+        raise ScenarioError(f"{file} cannot be read ({error.strerror}): give the path of a scenario") from error
     source = Source(file, text)
     try:
         raw = tomllib.loads(text)
@@ -198,13 +194,9 @@ def load(path: Path | str) -> tuple[Scenario, Source]:
     names = [unit.name for unit in scenario.unit]
     for index, unit in enumerate(scenario.unit):
         if names.index(unit.name) != index:
-            raise source.error(
-                ("unit", index, "name"), f"unit {unit.name} is there twice; give it another name"
-            )
+            raise source.error(("unit", index, "name"), f"unit {unit.name} is there twice; give it another name")
         if not unit.recordings and not scenario.protocol:
-            raise source.error(
-                ("unit", index), "there is nothing to run: add recordings, or a [protocol.dynamic]"
-            )
+            raise source.error(("unit", index), "there is nothing to run: add recordings, or a [protocol.dynamic]")
     for step, table in (("identify", scenario.identify), ("validate", scenario.validate_)):
         for name in table.use:
             known = set(scenario.protocol) or {Path(r).stem for u in scenario.unit for r in u.recordings}

@@ -1,0 +1,160 @@
+"""First-order responses, exact for straight lines between samples (first-order hold), on even and uneven steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from smartshoe.errors import UsageError
+
+Array = NDArray[np.float64]
+Steps = float | Array
+EVEN_TOLERANCE = 1e-3  # of a step: far below the jitter that moves an estimate, above rounded time stamps
+
+
+def steps(time_s: Array) -> Steps:
+    """The step in s where ``time_s`` (n,) is even to 0.1 % of it, else all steps (n - 1,)."""
+    step = np.diff(time_s)
+    if step.size == 0:
+        return 1.0
+    mean = float((time_s[-1] - time_s[0]) / step.size)
+    return mean if np.all(np.abs(step - mean) <= EVEN_TOLERANCE * mean) else step
+
+
+def hold_coefficients(x: Any) -> tuple[Any, Any, Any]:
+    """E, A, B of ``w_k = E w_{k-1} + A u_k + B u_{k-1}`` for w = alpha/(s + alpha) u under first-order hold.
+
+    ``x`` = alpha times the step. With phi = (1 - E)/x: E = exp(-x), A = 1 - phi, B = phi - E.
+    """
+    x = np.asarray(x, dtype=float)
+    decay = np.exp(-x)
+    safe = np.where(x > 1e-3, x, 1.0)
+    # 1 - phi loses digits for small x; its series does not.
+    series = x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x / 720))))
+    now = np.where(x > 1e-3, 1.0 + np.expm1(-safe) / safe, series)
+    return decay, now, -np.expm1(-x) - now
+
+
+def hold_slopes(x: Any) -> tuple[Any, Any, Any]:
+    """Derivatives of `hold_coefficients` with respect to ``x``."""
+    x = np.asarray(x, dtype=float)
+    decay = np.exp(-x)
+    safe = np.where(x > 1e-3, x, 1.0)
+    phi = -np.expm1(-safe) / safe
+    series = -1 / 2 + x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x / 144)))
+    slope = np.where(x > 1e-3, (np.exp(-safe) - phi) / safe, series)
+    return -decay, -slope, slope + decay
+
+
+@cache
+def _compiled() -> Callable[..., None]:
+    from numba import njit
+
+    def recursion(decay, drive, out):  # type: ignore[no-untyped-def]
+        for k in range(1, out.size):
+            out[k] = decay[k - 1] * out[k - 1] + drive[k - 1]
+
+    compiled: Callable[..., None] = njit(recursion)
+    return compiled
+
+
+def _recur(start: float, decay: Array, drive: Array) -> Array:
+    out = np.empty(drive.size + 1)
+    out[0] = start
+    if drive.size < 2000:  # compiling costs more than a short plain loop
+        for k in range(drive.size):
+            out[k + 1] = decay[k] * out[k] + drive[k]
+    else:
+        _compiled()(decay, drive, out)
+    return out
+
+
+def lag(u: Array, alpha: float, step: Steps) -> Array:
+    """w (n,) = alpha/(s + alpha) u, as if u[0] had lasted for ever; ``alpha`` in 1/s, ``step`` from `steps`."""
+    if isinstance(step, float):
+        decay, now, before = (float(value) for value in hold_coefficients(alpha * step))
+        return np.asarray(lfilter([now, before], [1.0, -decay], u, zi=[u[0] - now * u[0]])[0])
+    decay, now, before = hold_coefficients(alpha * step)
+    return _recur(float(u[0]), decay, now * u[1:] + before * u[:-1])
+
+
+def lag_and_slope(u: Array, alpha: float, step: Steps) -> tuple[Array, Array]:
+    """`lag` and its derivative with respect to ``alpha``, both (n,)."""
+    w = lag(u, alpha, step)
+    d_decay, d_now, d_before = hold_slopes(alpha * step)
+    drive = step * (d_decay * w[:-1] + d_now * u[1:] + d_before * u[:-1])
+    if isinstance(step, float):
+        full = np.concatenate([[0.0], drive])
+        return w, np.asarray(lfilter([1.0], [1.0, -float(np.exp(-alpha * step))], full))
+    return w, _recur(0.0, np.exp(-alpha * step), drive)
+
+
+def simulate(
+    a1: float, b0: float, b1: float, u: Array, time_s: Array, start: Literal["steady", "rest"] = "steady"
+) -> Array:
+    """y (n,) of (b0 s + b1)/(s + a1) driven by ``u`` (n,), straight lines between samples; Chinimilli 2016 (13).
+
+    ``start``: "steady" as if u[0] had lasted for ever, "rest" as if u had been 0 before. Exact for any steps.
+    """
+    if not a1 > 0.0:
+        raise UsageError(f"a1 is {a1:g}: the pole must be stable, give a1 above 0")
+    u = np.asarray(u, dtype=float)
+    time = np.asarray(time_s, dtype=float)
+    if u.size == 0:
+        return np.zeros(0)
+    w = lag(u, a1, steps(time))
+    y: Array = b0 * (u - w) + (b1 / a1) * w
+    if start == "rest":
+        y = y + (b0 - b1 / a1) * u[0] * np.exp(-a1 * (time - time[0]))
+    return y
+
+
+def shifted(u: Array, time_s: Array, step: Steps, shift_s: float) -> tuple[Array, Array]:
+    """u(t + shift) (n,) and its derivative with respect to the shift, by cubic Hermite (Catmull-Rom) interpolation.
+
+    It passes through the samples and has no kinks, so that a delay can be found by its gradient. Beyond the ends
+    the end values hold.
+    """
+    n = u.size
+    if isinstance(step, float):
+        whole = int(np.floor(shift_s / step))
+        f = shift_s / step - whole
+        taps = _catmull_rom(f)
+        slopes = _catmull_rom_slope(f)
+        index = np.arange(n) + whole
+        points = [u[np.clip(index + j, 0, n - 1)] for j in (-1, 0, 1, 2)]
+        value = sum((tap * point for tap, point in zip(taps, points, strict=True)), np.zeros(n))
+        slope = sum((tap * point for tap, point in zip(slopes, points, strict=True)), np.zeros(n))
+        return value, slope / step
+    gradient = np.gradient(u, time_s)
+    at = np.clip(time_s + shift_s, time_s[0], time_s[-1])
+    k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, n - 2)
+    h = step[k]
+    f_ = (at - time_s[k]) / h
+    rise = u[k + 1] - u[k]
+    first, last = h * gradient[k], h * gradient[k + 1]
+    third, second = first + last - 2 * rise, 3 * rise - 2 * first - last
+    return u[k] + f_ * (first + f_ * (second + f_ * third)), (first + f_ * (2 * second + 3 * f_ * third)) / h
+
+
+def _catmull_rom(f: float) -> tuple[float, float, float, float]:
+    return (
+        0.5 * f * (-1 + f * (2 - f)),
+        1 + 0.5 * f * f * (-5 + 3 * f),
+        0.5 * f * (1 + f * (4 - 3 * f)),
+        0.5 * f * f * (f - 1),
+    )
+
+
+def _catmull_rom_slope(f: float) -> tuple[float, float, float, float]:
+    return (
+        -0.5 + f * (2 - 1.5 * f),
+        f * (-5 + 4.5 * f),
+        0.5 + f * (4 - 4.5 * f),
+        f * (1.5 * f - 1),
+    )

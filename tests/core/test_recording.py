@@ -1,0 +1,88 @@
+"""Recordings: immutable, united, honest about what is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.recording import Channel, Recording, split_column
+from smartshoe.units import MILLIBAR, unit
+
+
+def _recording(**more: object) -> Recording:
+    return Recording.from_arrays(time_s=[0.0, 0.1, 0.2], force_n=[0.0, 1.0, 2.0], pressure_mbar=[0.0, 0.5, 1.0], **more)
+
+
+def test_contract_names_give_roles_and_si() -> None:
+    recording = _recording(command_n=[0, 1, 2], displacement_mm=[0, 0.1, 0.2], temperature_c=[20, 20, 21])
+    assert recording.load.name == "force"
+    assert recording.sensor.unit is MILLIBAR
+    np.testing.assert_allclose(recording.pressure_pa, [0, 50, 100])
+    np.testing.assert_allclose(recording.command_n, [0, 1, 2])
+    assert recording["temperature"].si[0] == pytest.approx(293.15)
+    assert recording["displacement"].role == "auxiliary"
+
+
+def test_a_shoes_units_are_sensors_in_order() -> None:
+    shoe = Recording.from_arrays(time_s=[0, 1], left_toe_mbar=[1, 2], left_heel_mbar=[3, 4])
+    assert [channel.name for channel in shoe.sensors] == ["left_toe", "left_heel"]
+    with pytest.raises(MissingChannelError, match="2 readings"):
+        _ = shoe.sensor
+    with pytest.raises(MissingChannelError, match="--force"):
+        _ = shoe.load
+
+
+@pytest.mark.parametrize(
+    ("time_s", "says"),
+    [([0, 0.1, 0.1], "repeats at sample 3"), ([0, 0.2, 0.1], "goes back at sample 3"), ([0, np.nan, 1], "sample 2")],
+)
+def test_time_that_does_not_increase_is_refused(time_s: list[float], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        Recording.from_arrays(time_s=time_s, force_n=[0, 1, 2])
+
+
+def test_a_column_without_a_unit_is_refused() -> None:
+    with pytest.raises(UnitError, match="pressure"):
+        Recording.from_arrays(time_s=[0, 1], pressure=[0, 1])
+
+
+def test_arrays_are_copies_and_read_only() -> None:
+    values = np.array([0.0, 1.0, 2.0])
+    recording = Recording.from_arrays(time_s=[0, 1, 2], force_n=values)
+    values[0] = 9.0
+    assert recording.force_n[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        recording.load.values[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        recording.time_s[0] = 1.0
+
+
+@given(st.lists(st.one_of(st.floats(-1e9, 1e9), st.just(float("nan"))), min_size=1, max_size=30))
+def test_missing_samples_repeat_the_last_one_and_come_back_as_nan(values: list[float]) -> None:
+    channel = Channel.from_values("pressure", values, MILLIBAR)
+    assert np.isfinite(channel.values).all()
+    np.testing.assert_array_equal(channel.with_nan(), values)
+    last = None
+    for given_, held in zip(values, channel.values, strict=True):
+        if not np.isnan(given_):
+            last = given_
+        if last is not None:
+            assert held == last
+
+
+@pytest.mark.parametrize(
+    ("column", "name", "symbol"),
+    [("force_n", "force", "N"), ("left_meta1_mbar", "left_meta1", "mbar"), ("rate_n_per_s", "rate", "N/s")],
+)
+def test_columns_split_into_name_and_unit(column: str, name: str, symbol: str) -> None:
+    assert split_column(column) == (name, unit(symbol))
+
+
+@given(st.integers(2, 50), st.floats(0.001, 10.0))
+def test_sample_rate_is_that_of_the_grid(count: int, step: float) -> None:
+    recording = Recording.from_arrays(time_s=np.arange(count) * step, force_n=np.zeros(count))
+    assert recording.sample_rate_hz == pytest.approx(1.0 / step, rel=1e-9)
+    assert recording.is_uniform
