@@ -19,13 +19,15 @@ class Column:
     """One column as it stands in the file: ``name`` and ``unit`` are the file's texts ('' where it gives none).
 
     ``values`` (n,) hold NaN where a cell is empty. ``role`` is set only by formats that store roles (our own HDF5
-    and MAT files); elsewhere the role is told from name and unit, or by the user.
+    and MAT files); elsewhere the role is told from name and unit, or by the user. ``label`` is the header's whole
+    text where that is more than the name (``force_n``, ``Time[s]``): a user may choose the column by either.
     """
 
     name: str
     unit: str
     values: Array
     role: Role | None = None
+    label: str = ""
 
 
 @dataclass(eq=False)
@@ -33,7 +35,8 @@ class Sheet:
     """A file's columns with what it says of itself.
 
     ``first_line`` is the 1-based line of the first data row (text formats), for messages that name a line.
-    ``has_header`` is False for bare numbers, whose columns are then called '1', '2', ...
+    ``lines`` (n,) gives every row's line instead where rows do not stand on consecutive lines. ``has_header`` is
+    False for bare numbers, whose columns are then called '1', '2', ...
     """
 
     path: Path
@@ -45,6 +48,15 @@ class Sheet:
     has_header: bool = True
     recording_name: str | None = None
     unit_name: str | None = None
+    lines: NDArray[np.intp] | None = None
+
+    def place(self, row: int) -> str:
+        """Where the 0-based ``row`` stands in the file, as an error message names it."""
+        if self.lines is not None:
+            return f"{self.path}, line {int(self.lines[row])}"
+        if self.first_line is not None:
+            return f"{self.path}, line {self.first_line + row}"
+        return f"{self.path}, sample {row + 1}"
 
 
 @dataclass(frozen=True)

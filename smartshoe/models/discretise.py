@@ -14,7 +14,9 @@ Array = NDArray[np.float64]
 Hold = Literal["bilinear", "zoh", "foh"]
 
 
-def discretise(a1: float, b0: float, b1: float, sample_rate_hz: float, method: Hold = "bilinear") -> tuple[Array, Array]:
+def discretise(
+    a1: float, b0: float, b1: float, sample_rate_hz: float, method: Hold = "bilinear"
+) -> tuple[Array, Array]:
     """Numerator (2,) and denominator (2,), monic, in falling powers of z, of (b0 s + b1)/(s + a1).
 
     ``bilinear`` is what the paper runs at 100 Hz (Chinimilli 2016, Section V); ``zoh`` and ``foh`` are exact for

@@ -1,0 +1,191 @@
+"""Cells to numbers: the decimal mark is decided from every cell of a file, or the file is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.errors import FormatError
+
+Array = NDArray[np.float64]
+
+MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "-", "--", "---"})
+_INTEGER = re.compile(r"[+-]?\d+(?:[eE][+-]?\d+)?", re.ASCII)
+_ONE_MARK = re.compile(r"[+-]?(?:\d+[.,]\d*|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.ASCII | re.IGNORECASE)
+_LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
+_THOUSANDS = {
+    ".": re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d*", re.ASCII),
+    ",": re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+,\d*", re.ASCII),
+}
+_GROUPS = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+", re.ASCII)
+_PLAIN_NUMBERS = re.compile(r"[0-9eE+\-., \n]*", re.ASCII)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number in some notation; a missing one is not."""
+    return bool(
+        _INTEGER.fullmatch(cell)
+        or _ONE_MARK.fullmatch(cell)
+        or _GROUPS.fullmatch(cell)
+        or _THOUSANDS["."].fullmatch(cell)
+        or _THOUSANDS[","].fullmatch(cell)
+        or _INFINITE.fullmatch(cell)
+    )
+
+
+def is_missing(cell: str) -> bool:
+    """Whether a cell says that there is no sample."""
+    return cell.casefold() in MISSING
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The columns of a table as numbers (NaN where missing), and what was done to read them."""
+
+    columns: list[Array]
+    decimal: str
+    notes: list[str]
+
+
+def _lines(found: list[int]) -> str:
+    return f"line {found[0]}" if len(found) == 1 else f"lines {', '.join(map(str, found))}"
+
+
+class _Table:
+    def __init__(
+        self, path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]
+    ) -> None:
+        self.path, self.names, self.lines = path, names, lines
+        self.cells: list[Sequence[str]] = list(zip(*rows, strict=True))
+        self.joined = ["\n".join(column) for column in self.cells]
+
+    def first(self, wanted: re.Pattern[str], limit: int = 3) -> list[int]:
+        """Lines (at most ``limit``) of the cells that ``wanted`` matches whole."""
+        found: set[int] = set()
+        for column in self.cells:
+            count = 0
+            for row, cell in enumerate(column):
+                if wanted.fullmatch(cell):
+                    found.add(self.lines[row])
+                    count += 1
+                    if count == limit:
+                        break
+        return sorted(found)[:limit]
+
+    def decimal(self) -> str:
+        """The one decimal mark of the file; raises `FormatError` where cells contradict each other."""
+        if not any("," in text for text in self.joined):
+            return "."
+        if not any("." in text for text in self.joined):
+            self._refuse_ambiguous_commas()
+            return ","
+        dot = self.first(re.compile(r"[+-]?\d*\.\d*(?:[eE][+-]?\d+)?", re.ASCII))
+        comma = self.first(re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?", re.ASCII))
+        if dot and comma:
+            raise FormatError(
+                f"{self.path}: decimals are inconsistent: a point in {_lines(dot)}, a comma in {_lines(comma)}:"
+                " export the file again with one decimal mark"
+            )
+        both = {mark: self.first(pattern) for mark, pattern in _THOUSANDS.items()}
+        if both["."] and not both[","] and not comma:
+            return "."
+        if both[","] and not both["."] and not dot:
+            return ","
+        lines = sorted({*both["."], *both[","], *dot, *comma})[:4]
+        if lines:
+            raise FormatError(
+                f"{self.path}: thousands and decimal marks cannot be told apart in {_lines(lines)}:"
+                " export the file again without thousands marks"
+            )
+        return "."  # only text cells hold both marks; the conversion names them
+
+    def _refuse_ambiguous_commas(self) -> None:
+        alike: set[int] = set()
+        for column in self.cells:
+            for row, cell in enumerate(column):
+                if "," in cell and _ONE_MARK.fullmatch(cell):
+                    if not _LIKE_THOUSANDS.fullmatch(cell):
+                        return  # 0,5 or 1,25 can only be a decimal comma
+                    alike.add(self.lines[row])
+        if alike:
+            raise FormatError(
+                f"{self.path}: commas in {_lines(sorted(alike)[:3])} may mark thousands or decimals and no cell"
+                " decides: export the file again with a decimal point"
+            )
+
+    def convert(self, index: int, decimal: str, notes: list[str]) -> Array:
+        """Column ``index`` as numbers; raises `FormatError` naming the line of a cell that is none."""
+        cells: Sequence[str] = self.cells[index]
+        text = self.joined[index]
+        if _PLAIN_NUMBERS.fullmatch(text):
+            if decimal == "," and "," in text:
+                cells = text.replace(",", ".").split("\n") if "." not in text else cells
+            if "," not in text or decimal == ",":
+                try:
+                    return np.array([cell or "nan" for cell in cells], dtype=float)
+                except ValueError:
+                    cells = self.cells[index]
+        return self._convert_slowly(index, cells, decimal, notes)
+
+    def _convert_slowly(self, index: int, cells: Sequence[str], decimal: str, notes: list[str]) -> Array:
+        name = self.names[index]
+        grouped = decimal == "." and any(cell.count(".") > 1 for cell in cells)
+        values = np.empty(len(cells))
+        thousands = "," if decimal == "." else "."
+        marked = False
+        for row, cell in enumerate(cells):
+            number = cell
+            if grouped and _GROUPS.fullmatch(cell):
+                head, tail = cell.rsplit(".", 1)
+                number = f"{head.replace('.', '')}.{tail}"
+            elif is_missing(cell):
+                number = "nan"
+            elif _THOUSANDS[decimal].fullmatch(cell):
+                number, marked = cell.replace(thousands, "").replace(decimal, "."), True
+            elif _ONE_MARK.fullmatch(cell) and thousands not in cell and not grouped:
+                number = cell.replace(decimal, ".")
+            elif not (_INTEGER.fullmatch(cell) or _INFINITE.fullmatch(cell)):
+                raise FormatError(
+                    f"{self.path}, line {self.lines[row]}: {cell!r} in column {name} is no number:"
+                    " correct the cell, or leave it empty where the sample is missing"
+                )
+            values[row] = float(number)
+        if grouped:
+            self._check_grouped(index, values)
+            notes.append(
+                f"Column {name} is written like 1.002.000 and was read with the last point as decimal mark"
+                " (1002.000)."
+            )
+        if marked:
+            notes.append(f"Column {name} holds thousands marks ({thousands!r}), which were removed.")
+        return values
+
+    def _check_grouped(self, index: int, values: Array) -> None:
+        steps = np.diff(values)
+        if values.size > 1 and not (steps > 0).all():
+            several = [row for row, cell in enumerate(self.cells[index]) if cell.count(".") > 1][:3]
+            raise FormatError(
+                f"{self.path}: cells with several points in {_lines([self.lines[row] for row in several])} of column"
+                f" {self.names[index]} have no certain reading: export the file again without thousands marks"
+            )
+
+
+def numbers_of(
+    path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]
+) -> Numbers:
+    """The cells ``rows`` (n rows of one cell per name), which stand on ``lines`` (n,), as columns of numbers.
+
+    One decimal mark holds for the whole file. Raises `FormatError` naming the lines where cells contradict each
+    other, and the line and column of a cell that is no number.
+    """
+    table = _Table(path, names, rows, lines)
+    decimal = table.decimal()
+    notes: list[str] = []
+    columns = [table.convert(index, decimal, notes) for index in range(len(names))]
+    return Numbers(columns, decimal, notes)
