@@ -135,20 +135,24 @@ class Calibration:
         sources = found.get("sources")
         if not isinstance(sources, list) or not all(isinstance(item, dict) for item in sources):
             raise read.fault("sources", "is no list of objects")
-        numbers = {key: read.number(found, key) for key in ("offset", "scale", "delay_s", "sample_rate_hz")}
         try:
             return cls(
-                *(read.number(model, key, "model.") for key in ("a1", "b0", "b1")),
+                a1=read.number(model, "a1", "model."),
+                b0=read.number(model, "b0", "model."),
+                b1=read.number(model, "b1", "model."),
                 reading_unit=find_unit(symbol) or declared(symbol),
+                offset=read.number(found, "offset"),
                 unit=read.text(found, "unit"),
                 parameters=parameters,
                 covariance=tuple(tuple(read.maybe(value, "covariance") for value in row) for row in covariance),
+                scale=read.number(found, "scale"),
+                delay_s=read.number(found, "delay_s"),
                 load_range_n=read.pair(found, "load_range_n"),
                 rate_range_n_per_s=read.pair(found, "rate_range_n_per_s"),
+                sample_rate_hz=read.number(found, "sample_rate_hz"),
                 sources=tuple(sources),
                 created=read.text(found, "created"),
                 smartshoe_version=read.text(found, "smartshoe_version"),
-                **numbers,
             )
         except InputError as error:
             raise error if str(error).startswith(read.path) else InputError(f"{read.path}: {error}") from error

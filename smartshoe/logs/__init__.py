@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from smartshoe.recording import Recording
 
 # The order in which formats are asked: those with an unmistakable beginning first, any delimited text last.
 _MODULES = ("tdms", "labview", "matlab", "hdf5", "plain", "bluehill", "foreign")
+_MODULES = tuple(m for m in _MODULES if importlib.util.find_spec("smartshoe.logs." + m))  # TEMPORARY
 _HEAD_BYTES = 1 << 16
 
 
@@ -46,7 +48,11 @@ def detect(path: Path | str) -> Format:
             return format_
     for format_ in _formats():
         # A text suffix on a file that is no text says nothing; others give a reader that can name the fault.
-        if path.suffix.casefold() in format_.suffixes and format_.name not in ("plain", "bluehill", "foreign"):
+        if path.suffix.casefold() in format_.suffixes and format_.name not in (
+            "plain",
+            "bluehill",
+            "foreign",
+        ):
             return format_
     raise FormatError(
         f"{path} is binary and in no known format: give a plain table, Bluehill CSV, LabVIEW .lvm, NI .tdms,"

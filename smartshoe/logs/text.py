@@ -52,7 +52,10 @@ def encoding_of(data: bytes) -> tuple[str, str | None]:
             data.decode(encoding)
         except UnicodeDecodeError:
             continue
-        return encoding, f"The text is not UTF-8 and was read as {encoding}, the likelier of cp1250 and gb18030."
+        return (
+            encoding,
+            f"The text is not UTF-8 and was read as {encoding}, the likelier of cp1250 and gb18030.",
+        )
     raise UnicodeDecodeError("utf-8", data, 0, 1, "neither UTF-8, UTF-16, cp1250 nor GB18030")
 
 
@@ -69,7 +72,9 @@ def read_lines(path: Path) -> tuple[list[str], list[str]]:
         encoding, note = encoding_of(data)
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
-        raise FormatError(f"{path} is no text in UTF-8, UTF-16, cp1250 or GB18030: save it as UTF-8") from error
+        raise FormatError(
+            f"{path} is no text in UTF-8, UTF-16, cp1250 or GB18030: save it as UTF-8"
+        ) from error
     if "\x00" in text:
         line = text[: text.index("\x00")].count("\n") + 1
         raise FormatError(f"{path}, line {line} holds binary zeros: export the file again")
@@ -93,7 +98,9 @@ def split_cells(lines: Sequence[str], delimiter: str | None) -> list[list[str]]:
         return [line.split() for line in lines]
     if any('"' in line for line in lines):
         # A quote that never closes would swallow the lines below it, hence line by line.
-        return [[cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])] for line in lines]
+        return [
+            [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])] for line in lines
+        ]
     return [[cell.strip() for cell in line.split(delimiter)] for line in lines]
 
 

@@ -1,0 +1,153 @@
+"""What a scenario may say of simulated devices, checked by pydantic: unknown keys and values out of bounds are errors.
+
+The bladder's options are `simulators.bladder.BladderParameters` themselves; the instruments' are in the units that a
+person writes (mbar, percent) and become SI here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from simulators import presets
+from simulators.bladder import BladderParameters, Finite, NotNegative, Positive
+from simulators.daq import LARGEST_ERROR_V, MyRioParameters
+from simulators.instron import InstronParameters
+from simulators.profiles import BODY_WEIGHT_N, Gait
+from simulators.sensor import HdiParameters
+from simulators.shoe import ShoeParameters
+
+MBAR_PA = 100.0
+AbsoluteError = Annotated[float, Field(ge=-LARGEST_ERROR_V, le=LARGEST_ERROR_V)] | Literal["drawn"]
+
+
+class _Options(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class SensorOptions(_Options):
+    """An HDI sensor; percentages are of the range."""
+
+    range_mbar: Positive = 200.0
+    noise_percent: NotNegative = 0.05
+    lag_s: NotNegative = 0.001
+    zero_offset_mbar: Finite = 0.0
+    zero_drift_mbar_per_s: Finite = 0.0
+    gain_error_percent: Annotated[float, Field(gt=-50, lt=50)] = 0.0
+    over_range_percent: Annotated[float, Field(ge=0, le=12.5)] = 1.0
+
+    def parameters(self) -> HdiParameters:
+        """The same in SI."""
+        return HdiParameters(
+            range_pa=self.range_mbar * MBAR_PA,
+            noise_fraction=self.noise_percent / 100.0,
+            lag_s=self.lag_s,
+            zero_offset_pa=self.zero_offset_mbar * MBAR_PA,
+            zero_drift_pa_per_s=self.zero_drift_mbar_per_s * MBAR_PA,
+            gain_error_fraction=self.gain_error_percent / 100.0,
+            over_range_fraction=self.over_range_percent / 100.0,
+        )
+
+
+class DaqOptions(_Options):
+    """A myRIO; see `simulators.daq.MyRioParameters`."""
+
+    sample_rate_hz: Annotated[float, Field(gt=0, le=100_000)] = 100.0
+    bits: Annotated[int, Field(ge=4, le=24)] = 12
+    absolute_error_v: AbsoluteError = 0.0
+    load_absolute_error_v: AbsoluteError = 0.0
+    load_full_scale_n: Positive = 1000.0
+    load_zero_v: Annotated[float, Field(ge=0, lt=5)] = 0.1
+    clock_offset_s: NotNegative = 0.0
+    clock_skew: Annotated[float, Field(gt=-0.1, lt=0.1)] = 0.0
+    jitter_s: NotNegative = 0.0
+
+    def parameters(self) -> MyRioParameters:
+        """The same as the simulator takes it."""
+        return MyRioParameters(**self.model_dump())
+
+
+class MachineOptions(_Options):
+    """An Instron with one unit on its anvil."""
+
+    unit: str
+    bladder: BladderParameters
+    sensor: SensorOptions
+    daq: DaqOptions = DaqOptions()
+    load_noise_n: NotNegative = 0.3
+    corner_s: Annotated[float, Field(ge=0, le=1)] = 0.04
+    fine_rate_hz: Annotated[float, Field(ge=1000, le=100_000)] = 1000.0
+    frame_stiffness_n_per_m: Positive = 5e6
+    extension_noise_m: NotNegative = 2e-7
+    bluehill_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 100.0
+    bluehill_clock_offset_s: NotNegative = 0.35
+
+    def parameters(self) -> InstronParameters:
+        """The machine's own part."""
+        return InstronParameters(**self.model_dump(exclude={"unit", "bladder", "sensor", "daq"}))
+
+
+class UnitOptions(_Options):
+    """One unit of a shoe: what differs from its preset."""
+
+    bladder: BladderParameters
+    sensor: SensorOptions
+
+
+class ShoeOptions(_Options):
+    """A shoe of four units; ``units`` maps a unit's name (``left_toe``) to what differs from its preset."""
+
+    side: Literal["left", "right"] = "left"
+    units: dict[str, UnitOptions] = Field(default_factory=dict)
+    sample_rate_hz: Annotated[float, Field(gt=0, le=2000)] = 200.0
+    duration_s: Positive = 60.0
+    block_samples: Annotated[int, Field(ge=1)] = 20
+    adc_bits: Annotated[int, Field(ge=4, le=24)] = 12
+    body_weight_n: Positive = BODY_WEIGHT_N
+    coverage: Annotated[float, Field(gt=0, le=1)] = 1.0
+    cadence_steps_per_min: Annotated[float, Field(ge=20, le=250)] = 110.0
+    stance_share: Annotated[float, Field(gt=0.1, lt=0.95)] = 0.62
+    stride_time_cv: Annotated[float, Field(ge=0, le=0.2)] = 0.018
+    load_cv: Annotated[float, Field(ge=0, le=0.5)] = 0.03
+    sway_cv: Annotated[float, Field(ge=0, le=0.2)] = 0.02
+    first_contact_s: NotNegative = 0.5
+
+    def parameters(self) -> ShoeParameters:
+        """The stream."""
+        return ShoeParameters(self.sample_rate_hz, self.duration_s, self.block_samples, self.adc_bits)
+
+    def gait(self) -> Gait:
+        """The foot."""
+        return Gait(**self.model_dump(include=set(Gait.__dataclass_fields__)))
+
+
+def with_preset(unit: Any, options: Any) -> Any:
+    """A unit's ``options`` with its preset's bladder and sensor under them; what is no table is left to pydantic.
+
+    Without ``effective_area_m2``, the area follows from the final k1 and range: 800 N at 85 % of the range.
+    """
+    if not isinstance(unit, str) or not isinstance(options, dict):
+        return options
+    base, sensor = presets.bladder(unit), options.get("sensor", {})
+    if isinstance(sensor, dict):
+        sensor = {"range_mbar": presets.sensor_range_pa(unit) / MBAR_PA, **sensor}
+    bladder = options.get("bladder", {})
+    if isinstance(bladder, dict):
+        bladder = {"k1": base.k1, "k2": base.k2, "c": base.c, **bladder}
+        if "effective_area_m2" not in bladder:
+            area = _area_of(bladder, sensor)
+            if area is not None:
+                bladder["effective_area_m2"] = area
+    return {**options, "bladder": bladder, "sensor": sensor}
+
+
+def _area_of(bladder: dict[str, Any], sensor: Any) -> float | None:
+    """The preset's rule for the area; None where the values it needs are wrong, which pydantic then says."""
+    try:
+        k1, range_mbar = float(bladder["k1"]), float(sensor["range_mbar"])
+        x_over_nrt = float(bladder.get("x_over_nrt", presets.X_OVER_NRT))
+        area = presets.effective_area_m2(k1, range_mbar * MBAR_PA, x_over_nrt)
+    except (TypeError, ValueError, KeyError, ZeroDivisionError):
+        return None
+    return area if area > 0 else None

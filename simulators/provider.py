@@ -1,0 +1,99 @@
+"""The entry point "sim" of smartshoe's devices: ``sim:instron``, ``sim:walk``, ``sim:stand``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from smartshoe.errors import UsageError
+from smartshoe.recording import REGIONS
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from simulators.instron import SimulatedInstron
+    from simulators.shoe import SimulatedShoe
+
+MACHINES = ("instron",)
+SHOES = ("walk", "stand")
+DEFAULT_UNIT = "left_toe"
+
+
+class Provider:
+    """Makes simulated devices from a target and options; heavy imports wait until one is asked for."""
+
+    def open_machine(
+        self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
+    ) -> SimulatedInstron:
+        """A machine (closed, to be used in a with block) for ``target`` 'instron'.
+
+        ``options`` are `simulators.options.MachineOptions`; what they leave out comes from the preset of their
+        ``unit`` (default left_toe). Raises `pydantic.ValidationError` on wrong options, `UsageError` on a wrong
+        target. Without ``rng`` the seed is 0.
+        """
+        _require(target, MACHINES, "machine")
+        import numpy as np
+
+        from simulators.bladder import SimulatedBladder
+        from simulators.instron import SensingUnit, SimulatedInstron
+        from simulators.options import MachineOptions, with_preset
+        from simulators.sensor import SimulatedHdiSensor
+
+        given = {"unit": DEFAULT_UNIT, **(options or {})}
+        checked = MachineOptions.model_validate(with_preset(given["unit"], given))
+        rng = rng if rng is not None else np.random.default_rng(0)
+        seed = str(getattr(rng.bit_generator.seed_seq, "entropy", ""))
+        sensor = SimulatedHdiSensor(checked.sensor.parameters(), rng)
+        unit = SensingUnit(checked.unit, SimulatedBladder(checked.bladder), sensor)
+        return SimulatedInstron(unit, rng, checked.parameters(), checked.daq.parameters(), seed)
+
+    def open_shoe(
+        self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
+    ) -> SimulatedShoe:
+        """A shoe (closed, to be used in a with block) for ``target`` 'walk' or 'stand'.
+
+        ``options`` are `simulators.options.ShoeOptions`; raises as `open_machine` does.
+        """
+        _require(target, SHOES, "shoe")
+        import numpy as np
+
+        from simulators.bladder import SimulatedBladder
+        from simulators.instron import SensingUnit
+        from simulators.options import ShoeOptions, with_preset
+        from simulators.sensor import SimulatedHdiSensor
+        from simulators.shoe import SimulatedShoe
+
+        given = dict(options or {})
+        names = [f"{given.get('side', 'left')}_{region}" for region in REGIONS]
+        units = given.get("units", {})
+        if isinstance(units, dict):
+            given["units"] = {n: with_preset(n, units.get(n, {})) for n in [*names, *(set(units) - set(names))]}
+        checked = ShoeOptions.model_validate(given)
+        surplus = sorted(set(checked.units) - set(names))
+        if surplus:
+            raise UsageError(f"units.{surplus[0]} is no unit of this shoe: use one of {', '.join(names)}")
+        rng = rng if rng is not None else np.random.default_rng(0)
+        sensing = [
+            SensingUnit(
+                name,
+                SimulatedBladder(checked.units[name].bladder),
+                SimulatedHdiSensor(checked.units[name].sensor.parameters(), rng),
+            )
+            for name in names
+        ]
+        return SimulatedShoe(sensing, target, rng, checked.gait(), checked.parameters())
+
+    def options_schema(self, kind: str) -> dict[str, Any]:
+        """JSON schema of the options of ``kind`` 'machine' or 'shoe'."""
+        _require(kind, ("machine", "shoe"), "kind of device")
+        from simulators.options import MachineOptions, ShoeOptions
+
+        return (MachineOptions if kind == "machine" else ShoeOptions).model_json_schema()
+
+
+def _require(target: str, known: tuple[str, ...], what: str) -> None:
+    if target not in known:
+        raise UsageError(f"simulated {what} {target!r} is not known: use one of {', '.join(known)}")
+
+
+provider = Provider()
