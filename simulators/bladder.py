@@ -5,15 +5,15 @@ stress in pascal stands an area, and the coil's own 40 cm^2 would give 2 bar at 
 and above its burst pressure. Most of the load must pass beside the tube; an *effective area* models that,
 f = F / effective_area. Eq. (2) at full scale asks for 226 cm^2 (467 cm^2 for the toe's 100 mbar sensor).
 
-*Equations.* All stresses in units of the ambient pressure p0, e the compressed share of the air's volume, K = k x0^2/(nRT):
+*Equations.* Stresses in units of the ambient pressure p0, e the compressed share of the air's volume, K = k x0^2/(nRT):
 
     f/p0 = p + K1 e (hardening)(softening) + K2 (e - q),    q' = (e - q) k2/c           wall and force balance
     p = e - w + theta + dT/T0                 or  (1 - w)(1 + theta + dT/T0)/(1 - e) - 1 (Boyle)        sealed air
     w' = rate p  or  rate sqrt|p| sgn p,      theta' = -theta/tau + fraction (gamma - 1) e'/(1 - e)
 
 With every effect off this is eq. (2)-(4):  P/f = (s + k2/c) / ([1 + K1 + K2] s + (k2/c)(1 + K1)).
-The scheme is exact for a deformation that is linear within a step (the arm, the heat), two-step Adams-Bashforth for the slow leak, and
-a safeguarded Newton iteration for the balance: second order, stable at any step for the wall.
+The scheme is exact for a deformation that is linear within a step (the arm, the heat), two-step Adams-Bashforth for
+the slow leak, and a safeguarded Newton iteration for the balance: second order, stable at any step for the wall.
 
 *Left out:* inertia and the tube's acoustics (both far above 1 kHz), buckling and contact of the tube's own walls
 (bottoming out), a wall spectrum wider than one relaxation time, temperature of the wall, humidity, shear, neighbours.
@@ -32,6 +32,7 @@ from pydantic import ConfigDict, Field
 from simulators.preisach import MEMORY, loop_shape
 from simulators.stepping import STATE_SIZE, advance
 from smartshoe.devices.base import Bladder
+from smartshoe.errors import UsageError
 
 Array = NDArray[np.float64]
 
@@ -151,7 +152,8 @@ class BladderParameters:
 
     def nominal_pressure_pa(self, load_n: float) -> float:
         """Gauge pressure expected under a held load, without leak, heat and hysteresis."""
-        return self.static_gain_pa_per_n * self.full_scale_n * (load_n / self.full_scale_n) ** self.static_exponent
+        share = float((load_n / self.full_scale_n) ** self.static_exponent)
+        return self.static_gain_pa_per_n * self.full_scale_n * share
 
 
 class SimulatedBladder(Bladder):
@@ -176,9 +178,13 @@ class SimulatedBladder(Bladder):
         """Gauge pressure (n,) in Pa under ``load_n`` (n,) in N, compression positive; memory carries on.
 
         The load is linear between samples, and from the last sample of the call before (or rest) to the first; the
-        inner step is 1 ms or finer. ``deformation`` (n,) then holds the compressed share of the volume.
+        inner step is 1 ms or finer. ``deformation`` (n,) then holds the compressed share of the volume. Raises
+        `UsageError` where a load is not finite.
         """
         load = np.ascontiguousarray(load_n, dtype=float)
+        if not np.isfinite(load).all():
+            at = int(np.argmin(np.isfinite(load)))
+            raise UsageError(f"load sample {at + 1} of {load.size} is not finite: fill gaps before pressing")
         finer = max(1, ceil(LOWEST_STEP_HZ / sample_rate_hz - 1e-9))
         pressure = np.empty(load.size)
         self.deformation = np.empty(load.size)
@@ -189,6 +195,7 @@ class SimulatedBladder(Bladder):
         return pressure * AMBIENT_PA
 
     def _pack(self) -> Array:
+        """The kernel's constants, in the order in which `simulators.stepping.advance` unpacks them."""
         p = self.parameters
         return np.array([
             p.k1 * p.x_over_nrt,

@@ -20,9 +20,9 @@ LARGEST_ERROR_V = 0.05  # absolute error of the 0-5 V inputs, myRIO-1900 specifi
 class MyRioParameters:
     """Converter and clock.
 
-    Both ``..._error_v`` are a channel's absolute error in volt, or "drawn": uniform within +-50 mV at construction. 0, the
-    default, is a channel that was zeroed before the test. Load: ``load_full_scale_n`` over the 5 V, zero load at ``load_zero_v``,
-    so that noise about zero is not clipped. The true time of sample k is
+    Both ``..._error_v`` are a channel's absolute error in volt, or "drawn": uniform within +-50 mV at construction.
+    0, the default, is a channel that was zeroed before the test. Load: ``load_full_scale_n`` over the 5 V, zero load
+    at ``load_zero_v``, so that noise about zero is not clipped. The true time of sample k is
     clock_offset_s + (k/sample_rate_hz)(1 + clock_skew) + jitter; the log says k/sample_rate_hz.
     """
 
@@ -40,7 +40,7 @@ class MyRioParameters:
     @property
     def step_v(self) -> float:
         """One count: 1.221 mV."""
-        return self.full_scale_v / 2**self.bits
+        return float(self.full_scale_v / 2**self.bits)
 
     @property
     def newton_per_volt(self) -> float:
@@ -82,7 +82,6 @@ class SimulatedMyRio:
     def to_load_n(self, voltage_v: Array) -> Array:
         """Load (n,) in N by the nominal scale."""
         return (voltage_v - self.parameters.load_zero_v) * self.parameters.newton_per_volt
-
 
 
 def sampled(time_s: Array, sample_rate_hz: float, signal: Array) -> Array:

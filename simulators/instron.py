@@ -17,7 +17,7 @@ from simulators.sensor import SimulatedHdiSensor
 from smartshoe.devices.base import ChannelDescription, TestMachine
 from smartshoe.errors import LimitError
 from smartshoe.protocol import MachineLimits, Protocol
-from smartshoe.recording import Channel, Recording
+from smartshoe.recording import Channel, Recording, Role
 from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
 
 Array = NDArray[np.float64]
@@ -108,9 +108,7 @@ class SimulatedInstron(TestMachine):
             ChannelDescription(
                 "force", "force", NEWTON, (float(span_n[0]), float(span_n[1])), daq.step_v * daq.newton_per_volt, rate
             ),
-            ChannelDescription(
-                "pressure", "pressure", MILLIBAR, span_mbar, float(MILLIBAR.from_si(step_pa)), rate
-            ),
+            ChannelDescription("pressure", "pressure", MILLIBAR, span_mbar, float(MILLIBAR.from_si(step_pa)), rate),
             ChannelDescription("command", "force", NEWTON, (0.0, LOAD_LIMIT_N), None, rate),
             ChannelDescription("displacement", "length", MILLIMETRE, None, None, rate),
         )
@@ -197,7 +195,7 @@ class SimulatedInstron(TestMachine):
         pressure_pa = self.specimen.sensor.to_pressure_pa(voltages["pressure"].values)
         extension = machine["extension"]
         start_s = self.parameters.bluehill_clock_offset_s
-        values = {
+        values: dict[str, tuple[Array, Role]] = {
             "force": (self.daq.to_load_n(voltages["load"].values), "load"),
             "pressure": (MILLIBAR.from_si(pressure_pa), "sensor"),
             "command": (protocol.load_at(time_s), "command"),
@@ -212,9 +210,10 @@ class SimulatedInstron(TestMachine):
             for d in self.describe()
         }
         notes = []
-        if protocol.peak_load_n > channels["force"].range_[1]:
+        largest_n = float(self.daq.to_load_n(np.array([self.daq.parameters.full_scale_v]))[0])
+        if protocol.peak_load_n > largest_n:
             notes.append(
-                f"the load reaches {protocol.peak_load_n:g} N, beyond the {channels['force'].range_[1]:g} N that the"
+                f"the load reaches {protocol.peak_load_n:g} N, beyond the {largest_n:g} N that the"
                 " myRIO's load channel logs: it is clipped there"
             )
         return Recording(

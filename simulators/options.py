@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from simulators import presets
-from simulators.bladder import BladderParameters, Finite, NotNegative, Positive
+from simulators.bladder import X_OVER_NRT, BladderParameters, Finite, NotNegative, Positive
 from simulators.daq import LARGEST_ERROR_V, MyRioParameters
 from simulators.instron import InstronParameters
 from simulators.profiles import BODY_WEIGHT_N, Gait
@@ -19,7 +19,22 @@ from simulators.sensor import HdiParameters
 from simulators.shoe import ShoeParameters
 
 MBAR_PA = 100.0
-AbsoluteError = Annotated[float, Field(ge=-LARGEST_ERROR_V, le=LARGEST_ERROR_V)] | Literal["drawn"]
+
+
+def _absolute_error(value: object) -> float | str:
+    """A plain check instead of a union, so that pydantic's error names the key and nothing of its own."""
+    if value == "drawn":
+        return "drawn"
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_ERROR_V:
+        return float(value)
+    raise ValueError(f"give 'drawn' or a number from -{LARGEST_ERROR_V} to {LARGEST_ERROR_V} V")
+
+
+AbsoluteError = Annotated[
+    float | Literal["drawn"],
+    PlainValidator(_absolute_error),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"const": "drawn"}]}),
+]
 
 
 class _Options(BaseModel):
@@ -127,8 +142,9 @@ def with_preset(unit: Any, options: Any) -> Any:
 
     Without ``effective_area_m2``, the area follows from the final k1 and range: 800 N at 85 % of the range.
     """
-    if not isinstance(unit, str) or not isinstance(options, dict):
+    if not isinstance(options, dict):
         return options
+    unit = str(unit)
     base, sensor = presets.bladder(unit), options.get("sensor", {})
     if isinstance(sensor, dict):
         sensor = {"range_mbar": presets.sensor_range_pa(unit) / MBAR_PA, **sensor}
@@ -146,7 +162,7 @@ def _area_of(bladder: dict[str, Any], sensor: Any) -> float | None:
     """The preset's rule for the area; None where the values it needs are wrong, which pydantic then says."""
     try:
         k1, range_mbar = float(bladder["k1"]), float(sensor["range_mbar"])
-        x_over_nrt = float(bladder.get("x_over_nrt", presets.X_OVER_NRT))
+        x_over_nrt = float(bladder.get("x_over_nrt", X_OVER_NRT))
         area = presets.effective_area_m2(k1, range_mbar * MBAR_PA, x_over_nrt)
     except (TypeError, ValueError, KeyError, ZeroDivisionError):
         return None

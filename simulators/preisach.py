@@ -48,7 +48,7 @@ def everett(upper: float, lower: float, shape: Array) -> float:
         return 0.0
     switched = _cumulated(upper - r_low, low, high) - _cumulated(upper - top, low, high)
     passed = _cumulated(lower + top, low, high) - _cumulated(lower + r_low, low, high)
-    return (switched - passed) / (r_high - r_low)
+    return float((switched - passed) / (r_high - r_low))
 
 
 @njit(cache=True)
@@ -57,7 +57,7 @@ def mean_curve(load: float, shape: Array) -> float:
     r_low, r_high, low, high = shape[0], shape[1], shape[2], shape[3]
     up = _cumulated(load - r_low, low, high) - _cumulated(load - r_high, low, high)
     down = _cumulated(load + r_high, low, high) - _cumulated(load + r_low, low, high)
-    return 0.5 * (up + down) / (r_high - r_low)
+    return float(0.5 * (up + down) / (r_high - r_low))
 
 
 @njit(cache=True)

@@ -17,6 +17,7 @@ from smartshoe.recording import REGIONS
 Array = NDArray[np.float64]
 
 BODY_WEIGHT_N = 519.4  # 53 kg, Chinimilli 2016, Section VI
+STEP_ON_S = 0.5
 STANDING_SHARE = {"toe": 0.10, "meta1": 0.17, "meta4": 0.18, "heel": 0.55}
 # Begin, peak and end of each region's load as shares of stance, and its largest load as a share of body weight.
 WALKING = {
@@ -42,11 +43,15 @@ class Gait:
 
 
 def stand(gait: Gait, time_s: Array, rng: np.random.Generator) -> Mapping[str, Array]:
-    """Load (n,) in N of each region of one foot, half of body weight, with slow sway between forefoot and heel."""
+    """Load (n,) in N of each region of one foot, half of body weight, with slow sway between forefoot and heel.
+
+    The foot steps on within half a second from ``first_contact_s``, so that the unloaded reading is seen first.
+    """
     phase = rng.uniform(0.0, 2.0 * np.pi, size=3)
     frequency_hz = np.array([0.11, 0.27, 0.53])
     sway = gait.sway_cv * np.sum(np.sin(2.0 * np.pi * np.outer(time_s, frequency_hz) + phase), axis=1)
-    half_n = 0.5 * gait.body_weight_n * gait.coverage
+    stepped_on = np.clip((time_s - gait.first_contact_s) / STEP_ON_S, 0.0, 1.0)
+    half_n = 0.5 * gait.body_weight_n * gait.coverage * stepped_on
     heel = STANDING_SHARE["heel"] * (1.0 + sway)
     forefoot = (1.0 - heel) / (1.0 - STANDING_SHARE["heel"])
     return {r: half_n * (heel if r == "heel" else STANDING_SHARE[r] * forefoot) for r in REGIONS}

@@ -42,7 +42,8 @@ class Provider:
         given = {"unit": DEFAULT_UNIT, **(options or {})}
         checked = MachineOptions.model_validate(with_preset(given["unit"], given))
         rng = rng if rng is not None else np.random.default_rng(0)
-        seed = str(getattr(rng.bit_generator.seed_seq, "entropy", ""))
+        sequence: Any = rng.bit_generator.seed_seq  # numpy's own has these; its protocol does not say so
+        seed = "/".join(str(key) for key in (sequence.entropy, *sequence.spawn_key))
         sensor = SimulatedHdiSensor(checked.sensor.parameters(), rng)
         unit = SensingUnit(checked.unit, SimulatedBladder(checked.bladder), sensor)
         return SimulatedInstron(unit, rng, checked.parameters(), checked.daq.parameters(), seed)

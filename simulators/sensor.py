@@ -89,7 +89,7 @@ class SimulatedHdiSensor(Sensor):
         if p.noise_fraction > 0:
             share += p.noise_fraction * self._rng.standard_normal(pressure.size)
         np.clip(share, -p.over_range_fraction, 1.0 + p.over_range_fraction, out=share)
-        return LOW_V + SPAN_V * share
+        return np.asarray(LOW_V + SPAN_V * share)
 
     def to_pressure_pa(self, reading_v: Array) -> Array:
         """Pressure (n,) in Pa by the nominal characteristic."""

@@ -114,6 +114,4 @@ class SimulatedShoe(Shoe):
         names = tuple(unit.name for unit in self.units)
         for start in range(0, count, p.block_samples):
             part = slice(start, start + p.block_samples)
-            yield Block(
-                time_s[part], readings[part], np.zeros(readings[part].shape, dtype=bool), names, MILLIBAR
-            )
+            yield Block(time_s[part], readings[part], np.zeros(readings[part].shape, dtype=bool), names, MILLIBAR)

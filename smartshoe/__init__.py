@@ -25,7 +25,7 @@ _HOME = {
     "Calibration": "smartshoe.compensate",
     "Compensator": "smartshoe.compensate",
     "stack": "smartshoe.compensate",
-    "validate": "smartshoe.validate",
+    "validate": "smartshoe.validation",
     "SmartShoeError": "smartshoe.errors",
 }
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from smartshoe.logs import read, write
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
-    from smartshoe.validate import validate
+    from smartshoe.validation import validate
 
 __all__ = [
     "Calibration",

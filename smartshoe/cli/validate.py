@@ -28,7 +28,7 @@ def command(
     from smartshoe.cli.output import emit_json
     from smartshoe.compensate import Calibration
     from smartshoe.report.tables import print_validation
-    from smartshoe.validate import validate
+    from smartshoe.validation import validate
 
     calibration = Calibration.load(calibration_path)
     recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)

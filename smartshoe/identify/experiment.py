@@ -24,7 +24,7 @@ LEAST_RETURN = 0.1  # of the load's range that must be travelled both ways
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """One recording as load in N and reading in the common reading unit, both (n,), missing samples held.
+    """One recording as load in N and reading in the common reading unit, both (n,), gaps bridged by straight lines.
 
     ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``kept`` marks the samples whose error counts.
     """
@@ -76,14 +76,21 @@ def prepare(recordings: Sequence[Recording]) -> tuple[list[Experiment], Unit]:
                 name,
                 time_s,
                 steps(time_s),
-                np.asarray(load.si, dtype=float),
-                sensor.in_unit(reading_unit),
+                _bridged(time_s, np.asarray(load.si, dtype=float), load.present),
+                _bridged(time_s, sensor.in_unit(reading_unit), sensor.present),
                 kept,
                 int(np.count_nonzero(~kept)),
             )
         )
     _require_identifiable(experiments, recordings)
     return experiments, reading_unit
+
+
+def _bridged(time_s: Array, values: Array, present: Mask) -> Array:
+    """``values`` with missing samples on the line between their neighbours: what the model takes for granted anyway."""
+    if present.all() or not present.any():
+        return values
+    return np.interp(time_s, time_s[present], values[present])
 
 
 def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequence[Recording]) -> None:

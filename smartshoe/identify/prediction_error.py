@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.identify.experiment import Array, Direction, Experiment
-from smartshoe.models.first_order import lag_and_slope, shifted
-from smartshoe.models.first_order import lag as lagged
+from smartshoe.models.first_order import lag, lag_and_slope, shifted
 
 Structure = Literal["free", "grey_box"]
 LARGEST_DELAY_S = 0.5
@@ -39,7 +38,8 @@ class PredictionError:
     """Residual (model minus measured, kept samples only) and Jacobian over theta.
 
     theta = (ln alpha, p1, p2) or, in the grey box, (ln a1, static gain), then the delay where it is estimated, then
-    one offset and one initial state a recording where they are. ``residual`` and ``jacobian`` share one pass.
+    one offset at the output and one initial state a recording where they are: all but the pole and the delay enter
+    the free form linearly. ``residual`` and ``jacobian`` share one pass.
     """
 
     def __init__(self, experiments: Sequence[Experiment], settings: Settings) -> None:
@@ -98,9 +98,22 @@ class PredictionError:
         q = float(theta[self.delay_at])
         return LARGEST_DELAY_S * float(np.sin(q / LARGEST_DELAY_S)), float(np.cos(q / LARGEST_DELAY_S))
 
-    def offset(self, theta: Array, index: int) -> float:
-        """The reading at no load of one recording."""
-        return float(self.settings.offset or 0.0) if self.offset_at is None else float(theta[self.offset_at + index])
+    def offset(self, theta: Array, index: int) -> tuple[float, Array]:
+        """The reading at no load of one recording, and its gradient over theta.
+
+        An offset of the output itself in the forward direction; in the inverse one it has passed the static gain.
+        """
+        gradient = np.zeros(self.size)
+        if self.offset_at is None:
+            return float(self.settings.offset or 0.0), gradient
+        at, value = self.offset_at + index, float(theta[self.offset_at + index])
+        if self.settings.direction == "forward":
+            gradient[at] = 1.0
+            return value, gradient
+        gain_at = self.shape_size - 1  # p2, and in the inverse grey box the static gain: the same number
+        gain = float(theta[gain_at])
+        gradient[at], gradient[gain_at] = -1.0 / gain, value / gain**2
+        return -value / gain, gradient
 
     def drop_edges(self, count: int) -> None:
         """Leave ``count`` samples at either end of every recording out of the error."""
@@ -155,16 +168,16 @@ class PredictionError:
         if self.delay_at is not None or delay_s != 0.0:
             u, u_slope = shifted(u, experiment.time_s, experiment.step, sign * delay_s)
         w, w_slope = (
-            lag_and_slope(u, alpha, experiment.step)
-            if with_slopes
-            else (lagged(u, alpha, experiment.step), np.empty(0))
+            lag_and_slope(u, alpha, experiment.step) if with_slopes else (lag(u, alpha, experiment.step), np.empty(0))
         )
-        zero = self.offset(theta, index)
+        zero = float(self.settings.offset or 0.0)
         fade = np.exp(-alpha * experiment.time_s)
         state = 0.0 if self.state_at is None else float(theta[self.state_at + index])
-        # The offset is the reading's: it passes the static gain where the reading is the input.
+        # A fixed offset is the reading's: it passes the static gain where the reading is the input.
         error = p1 * (u - w) + p2 * (w - zero if inverse else w) + state * fade - y
-        if not inverse:
+        if self.offset_at is not None:
+            error += float(theta[self.offset_at + index])
+        elif not inverse:
             error += zero
         if not with_slopes:
             return error, {}
@@ -177,10 +190,10 @@ class PredictionError:
         )
         slopes: dict[int, Array | float] = dict(enumerate(to_shape.T @ shape))
         if self.delay_at is not None and u_slope is not None:
-            slow = lagged(u_slope, alpha, experiment.step)
+            slow = lag(u_slope, alpha, experiment.step)
             slopes[self.delay_at] = (sign * delay_slope) * (p1 * (u_slope - slow) + p2 * slow)
         if self.offset_at is not None:
-            slopes[self.offset_at + index] = -p2 if inverse else 1.0
+            slopes[self.offset_at + index] = 1.0
         if self.state_at is not None:
             slopes[self.state_at + index] = fade
         return error, slopes

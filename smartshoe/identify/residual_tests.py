@@ -63,7 +63,9 @@ def input_independence(
 
     rows, errors = [], []
     for u, residual, mask in zip(inputs, residuals, kept, strict=True):
-        delayed = [np.concatenate([np.full(min(lag, u.size), u[0]), u[: u.size - min(lag, u.size)]]) for lag in INPUT_LAGS]
+        delayed = [
+            np.concatenate([np.full(min(lag, u.size), u[0]), u[: u.size - min(lag, u.size)]]) for lag in INPUT_LAGS
+        ]
         rows.append(np.stack(delayed, axis=1)[mask])
         errors.append(residual[mask])
     lagged, error = np.concatenate(rows), np.concatenate(errors)

@@ -8,31 +8,27 @@ import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identify.experiment import Array
-from smartshoe.identify.prediction_error import PredictionError
+from smartshoe.identify.prediction_error import LARGEST_DELAY_S, PredictionError
 
 Solver = Literal["gn", "lm", "trf"]
 
 
 def linear_start(problem: PredictionError, alpha: float, p1: float, p2: float, delay_s: float) -> Array:
-    """theta at a given pole and gains, with offsets and initial states by linear least squares."""
+    """theta at a given pole and delay, with all that enters linearly by least squares (in the grey box, the gains kept)."""
     settings = problem.settings
     theta = np.zeros(problem.size)
-    if settings.structure == "free":
-        theta[:3] = np.log(alpha), p1, p2
-    elif settings.direction == "inverse":
-        theta[:2] = np.log(alpha), p2
-    else:
-        theta[:2] = np.log(abs(alpha * p2 / p1)), 1 / p2
     if problem.delay_at is not None:
-        theta[problem.delay_at] = delay_s
-    first = problem.size
-    for at in (problem.offset_at, problem.state_at):
-        if at is not None:
-            first = min(first, at)
-    if first < problem.size:
-        slopes = problem.jacobian(theta)[:, first:]
-        change = _solve_normal(slopes, problem.residual(theta))
-        theta[first:] -= change
+        theta[problem.delay_at] = LARGEST_DELAY_S * np.arcsin(delay_s / LARGEST_DELAY_S)
+    linear = [index for index in range(1, problem.size) if index != problem.delay_at]
+    if settings.structure == "free":
+        theta[0] = np.log(alpha)
+    else:
+        linear = linear[1:]
+        pole, gain = (alpha, p2) if settings.direction == "inverse" else (abs(alpha * p2 / p1), 1 / p2)
+        theta[:2] = np.log(pole), gain
+    if linear:
+        change = _solve_normal(problem.jacobian(theta)[:, linear], problem.residual(theta))
+        theta[linear] -= change
     return theta
 
 
@@ -67,7 +63,7 @@ def gauss_newton(
             return theta, iteration, promised <= 1e-9 * cost + 1e-20 * max(cost, 1.0)
         theta, before, cost = trial, cost, trial_cost
         settled = np.max(np.abs(fraction * step) / (np.abs(theta) + 1e-3 * np.max(np.abs(theta[:3])))) < tolerance
-        if settled or before - cost <= 1e-15 * before:
+        if settled or before - cost <= 1e-13 * before:
             return theta, iteration, True
     return theta, max_iterations, False
 
@@ -90,7 +86,7 @@ def solve(
             problem.jacobian,
             method=method,
             x_scale="jac",
-            ftol=1e-14,
+            ftol=1e-13,
             xtol=tolerance,
             gtol=1e-14,
             max_nfev=max_iterations,

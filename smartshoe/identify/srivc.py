@@ -8,8 +8,8 @@ import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identify.experiment import Array, Experiment
-from smartshoe.identify.prediction_error import Settings
-from smartshoe.models.first_order import lag, shifted
+from smartshoe.identify.prediction_error import LARGEST_DELAY_S, Settings
+from smartshoe.models.first_order import lag, shifted, steps
 
 
 def _signals(experiment: Experiment, settings: Settings, delay_s: float) -> tuple[Array, Array]:
@@ -39,8 +39,8 @@ def srivc(
 
     Least squares on y' = -alpha y + beta0 u' + beta1 u behind the state-variable filter 1/(s + lambda), lambda =
     ``prefilter_rad_s``; then the filter and the instrument (the auxiliary model's output) are renewed. A constant
-    and a decaying exponential for each recording stand for its offset and initial state. Missing outputs are filled with the
-    auxiliary model's. An unstable pole is reflected into the left half plane.
+    and a decaying exponential for each recording stand for its offset and initial state. Missing outputs are filled
+    with the auxiliary model's. An unstable pole is reflected into the left half plane.
     """
     pairs = [_signals(experiment, settings, delay_s) for experiment in experiments]
     outputs = [y for _, y in pairs]
@@ -119,3 +119,31 @@ def _nuisance(experiment: Experiment, settings: Settings, alpha: float, rest: Ar
     kept = experiment.kept
     fitted: Array = basis @ np.linalg.lstsq(basis[kept].T @ basis[kept], basis[kept].T @ rest[kept], rcond=None)[0]
     return fitted
+
+
+def coarse_delay(experiments: Sequence[Experiment], settings: Settings, prefilter_rad_s: float) -> float:
+    """The delay in s, on a grid of a tenth of the limit, from which a gradient finds the right one.
+
+    Least squares of the output on the delayed input and its slow part alone: enough to tell tenths of a second.
+    """
+    most = 4000  # samples a recording: the grid is coarse, and so may the signals be
+    costs = []
+    grid = np.linspace(-0.9, 0.9, 19) * LARGEST_DELAY_S
+    for delay_s in grid:
+        cost = 0.0
+        for experiment in experiments:
+            u, y = experiment.signals(settings.direction)
+            stride = max(1, -(-u.size // most))
+            at = (1.0 if settings.direction == "inverse" else -1.0) * delay_s
+            time_s = experiment.time_s[::stride]
+            delayed = np.interp(time_s + at, time_s, u[::stride])
+            slow = lag(delayed, prefilter_rad_s, steps(time_s))
+            basis = np.stack([delayed, slow, np.ones_like(slow)], axis=1)
+            kept = experiment.kept[::stride] & (time_s > LARGEST_DELAY_S) & (time_s < time_s[-1] - LARGEST_DELAY_S)
+            if np.count_nonzero(kept) < 10:
+                continue
+            target, basis = y[::stride][kept], basis[kept]
+            fitted = basis @ np.linalg.lstsq(basis.T @ basis, basis.T @ target, rcond=None)[0]
+            cost += float(np.sum((target - fitted) ** 2))
+        costs.append(cost)
+    return float(grid[int(np.argmin(costs))]) if min(costs) < 0.5 * costs[len(costs) // 2] else 0.0

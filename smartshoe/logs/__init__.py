@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import importlib.util
 from collections.abc import Iterator, Sequence
@@ -13,7 +14,7 @@ from smartshoe.logs.sheet import Format
 from smartshoe.recording import Recording
 
 # The order in which formats are asked: those with an unmistakable beginning first, any delimited text last.
-_MODULES = ("tdms", "labview", "matlab", "hdf5", "plain", "bluehill", "foreign")
+_MODULES: tuple[str, ...] = ("tdms", "labview", "matlab", "hdf5", "plain", "bluehill", "foreign")
 _MODULES = tuple(m for m in _MODULES if importlib.util.find_spec("smartshoe.logs." + m))  # TEMPORARY
 _HEAD_BYTES = 1 << 16
 
@@ -78,7 +79,10 @@ def read(
     from smartshoe.logs.columns import recording_from
 
     path = Path(path)
-    sheet = detect(path).read(path)
+    try:
+        sheet = detect(path).read(path)
+    except csv.Error as error:
+        raise FormatError(f"{path} is no table of numbers ({error}): export it again") from error
     chosen = (sensors,) if isinstance(sensors, str) else tuple(sensors)
     return recording_from(sheet, time=time, force=force, sensors=chosen, unit=unit, name=name)
 
@@ -96,8 +100,11 @@ def write(recording: Recording, path: Path | str) -> None:
             continue
         suffixes += format_.suffixes
         if path.suffix.casefold() in format_.suffixes:
-            with replacing(path) as temporary:
-                format_.write(recording, temporary)
+            try:
+                with replacing(path) as temporary:
+                    format_.write(recording, temporary)
+            except OSError as error:
+                raise UsageError(f"{path} cannot be written ({error.strerror or error})") from error
             return
     raise UsageError(
         f"{path} has no suffix of a writable format: end it in one of {', '.join(dict.fromkeys(suffixes))}"

@@ -66,25 +66,19 @@ def read(path: Path) -> Sheet:
     lines, notes = read_lines(path)
     found = _unit_row(lines)
     if found is None:
-        raise FormatError(
-            f"{path} has no row of units in brackets below a row of names: export it from Bluehill again"
-        )
+        raise FormatError(f"{path} has no row of units in brackets below a row of names: export it from Bluehill again")
     at, delimiter = found
     names, units = split_cells(lines[at - 1 : at + 1], delimiter)
     numbered = [(number, line) for number, line in enumerate(lines[at + 1 :], start=at + 2) if line.strip()]
     if not numbered:
-        raise InputError(
-            f"{path} holds a header and no data rows below line {at + 1}: give a file with samples"
-        )
+        raise InputError(f"{path} holds a header and no data rows below line {at + 1}: give a file with samples")
     numbers = [number for number, _ in numbered]
     rows = split_cells([line for _, line in numbered], delimiter)
     width = max(index for index, (name, unit) in enumerate(_paired(names, units)) if name or unit) + 1
     names, units = ([*row, *[""] * width][:width] for row in (names, units))
     rows = even_rows(path, rows, numbers, width)
     # A column that only numbers the rows, or is blank throughout, has neither name nor unit.
-    used = [
-        index for index in range(width) if names[index] or units[index] or any(row[index] for row in rows)
-    ]
+    used = [index for index in range(width) if names[index] or units[index] or any(row[index] for row in rows)]
     rows = [[row[index] for index in used] for row in rows]
     names = [names[index] or f"column {index + 1}" for index in used]
     table = numbers_of(path, names, rows, numbers)
@@ -106,9 +100,7 @@ def read(path: Path) -> Sheet:
 
 def _paired(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str]]:
     length = max(len(names), len(units))
-    return list(
-        zip([*names, *[""] * (length - len(names))], [*units, *[""] * (length - len(units))], strict=True)
-    )
+    return list(zip([*names, *[""] * (length - len(names))], [*units, *[""] * (length - len(units))], strict=True))
 
 
 def write_bluehill(
@@ -131,9 +123,7 @@ def write_bluehill(
     full precision. An encoding with a byte order mark (``utf-16``, ``utf-8-sig``) writes it.
     """
     order = {"auxiliary": 1, "load": 2, "command": 3, "sensor": 4}
-    channels = sorted(
-        recording.channels.values(), key=lambda c: 0 if c.name == "displacement" else order[c.role]
-    )
+    channels = sorted(recording.channels.values(), key=lambda c: 0 if c.name == "displacement" else order[c.role])
     titles = ["Time"] + [
         "Extension" if c.name == "displacement" else "Load" if c.role == "load" else c.name for c in channels
     ]

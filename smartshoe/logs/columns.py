@@ -20,7 +20,7 @@ from smartshoe.recording import (
     Recording,
     Role,
 )
-from smartshoe.units import SECOND, Unit, declared, find_unit, unit
+from smartshoe.units import SECOND, Unit, declared, find_unit
 
 Array = NDArray[np.float64]
 
@@ -49,33 +49,44 @@ def _titles(sheet: Sheet) -> str:
     return ", ".join(column.label or column.name or "''" for column in sheet.columns)
 
 
+def _named(columns: Sequence[Column], wanted: str) -> list[int]:
+    """The columns of that name or header text: exactly, or else apart from case."""
+    for alike in (str, str.casefold):
+        found = [i for i, c in enumerate(columns) if alike(wanted) in (alike(c.label), alike(c.name)) and wanted]
+        if found:
+            return found
+    return []
+
+
 def _pick(sheet: Sheet, choice: str, option: str) -> _Pick:
     """The column that a user's ``choice`` names; raises `InputError` where none or several fit."""
     columns = sheet.columns
     bracket = _CHOICE.fullmatch(choice)
-    said = unit(bracket["unit"]) if bracket and bracket["unit"].strip() else None
-    base = bracket["base"].strip() if bracket else choice.strip()
-    for wanted, given in ((choice.strip(), None), (base, said)):
-        for alike in (str, str.casefold):
-            found = [
-                i for i, c in enumerate(columns)
-                if alike(wanted) in (alike(c.label), alike(c.name)) and wanted
-            ]  # fmt: skip
-            if len(found) > 1 and given is not None:
-                found = [i for i in found if _unit_in_file(columns[i]) == given] or found
-            if len(found) > 1:
-                raise InputError(
-                    f"{sheet.path}: {option} {choice!r} fits {len(found)} columns: add the unit in brackets, or"
-                    f" rename one of them (columns: {_titles(sheet)})"
-                )
-            if found:
-                return _united(sheet, found[0], given, option)
-    if base.isascii() and base.isdigit() and 1 <= int(base) <= len(columns):
-        return _united(sheet, int(base) - 1, said, option)
-    raise MissingChannelError(
-        f"{sheet.path} has no column {base!r} for {option}: choose one of its columns ({_titles(sheet)}) by name or"
-        f" by number from 1 to {len(columns)}"
-    )
+    base, said = choice.strip(), None
+    found = _named(columns, base)
+    if not found and bracket:
+        base, said = bracket["base"].strip(), find_unit(bracket["unit"])
+        if said is None:
+            raise UnitError(
+                f"{sheet.path}: unit {bracket['unit']!r} in {option} {choice!r} is not known: use one such as s, N,"
+                " kN, mbar, bar, V, counts, ohm or mm"
+            )
+        found = _named(columns, base)
+        if len(found) > 1:
+            found = [i for i in found if _unit_in_file(columns[i]) == said] or found
+    if len(found) > 1:
+        raise InputError(
+            f"{sheet.path}: {option} {choice!r} fits {len(found)} columns: add the unit in brackets, or rename one"
+            f" of them (columns: {_titles(sheet)})"
+        )
+    if not found and base.isascii() and base.isdigit() and 1 <= int(base) <= len(columns):
+        found = [int(base) - 1]
+    if not found:
+        raise MissingChannelError(
+            f"{sheet.path} has no column {base!r} for {option}: choose one of its columns ({_titles(sheet)}) by name"
+            f" or by number from 1 to {len(columns)}"
+        )
+    return _united(sheet, found[0], said, option)
 
 
 def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> _Pick:
@@ -116,9 +127,7 @@ def _time_column(sheet: Sheet, units: Sequence[Unit | None], choice: str | None)
     for index, column in enumerate(sheet.columns):
         if units[index] is None and (column.name == "t" or column.name.casefold() in _TIME_NAMES - {"t"}):
             if sheet.format == "labview" and column.name.casefold() == "x_value":
-                return _Pick(
-                    index, SECOND
-                )  # LabVIEW's X_Dimension is time in seconds unless the file says more
+                return _Pick(index, SECOND)  # LabVIEW's X_Dimension is time in seconds unless the file says more
             return _Pick(index, None)
     example = "NAME[s]" if sheet.has_header else "1[ms]"
     raise InputError(
@@ -163,9 +172,7 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
     for index, (name, unit_) in enumerate(zip(names, units, strict=True)):
         if name == SENSOR_NAME or name in UNITS_OF_A_SHOE:
             roles[index] = "sensor"
-        elif name == COMMAND_NAME or (
-            unit_ is not None and unit_.quantity == "force" and _COMMANDS.search(name)
-        ):
+        elif name == COMMAND_NAME or (unit_ is not None and unit_.quantity == "force" and _COMMANDS.search(name)):
             roles[index] = "command"
         elif unit_ is not None and unit_.quantity == "force" and not _ESTIMATE.search(name):
             forces.append(index)
@@ -179,11 +186,15 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
     return roles
 
 
-def _renamed(names: list[str], roles: Sequence[Role | None], units: Sequence[Unit], has_header: bool) -> None:
-    """Give load, command and a single pressure the plain table's names, where nothing else bears them."""
+def _rename(
+    names: list[str], roles: Sequence[Role], units: Sequence[Unit], told: Sequence[bool], has_header: bool
+) -> None:
+    """Give load, command and a single pressure the plain table's names; those that the file has ``told`` stay."""
     sensors = [i for i, role in enumerate(roles) if role == "sensor"]
     for index, role in enumerate(roles):
-        wanted = {"load": LOAD_NAME, "command": COMMAND_NAME}.get(role or "")
+        if told[index]:
+            continue
+        wanted = {"load": LOAD_NAME, "command": COMMAND_NAME}.get(role)
         if role == "sensor":
             if names[index] in UNITS_OF_A_SHOE:
                 continue
@@ -220,9 +231,7 @@ def _compression_positive(load: Channel) -> Channel:
     return replace(load, values=turned)
 
 
-def _channel(
-    sheet: Sheet, name: str, column: Column, unit_: Unit, role: Role, notes: list[str]
-) -> Channel | None:
+def _channel(sheet: Sheet, name: str, column: Column, unit_: Unit, role: Role, notes: list[str]) -> Channel | None:
     infinite = int(np.count_nonzero(np.isinf(column.values)))
     if infinite:
         notes.append(f"Column {column.name} holds {infinite} infinite samples, which count as missing.")
@@ -281,9 +290,7 @@ def recording_from(
                 f" --sensor '{column.name}[mbar]'"
             )
         if pick.index in chosen or pick.index == at_time:
-            raise InputError(
-                f"{sheet.path}: column {column.name!r} is chosen twice: choose another for --sensor"
-            )
+            raise InputError(f"{sheet.path}: column {column.name!r} is chosen twice: choose another for --sensor")
         units[pick.index], roles[pick.index] = pick.unit, "sensor"
         chosen.add(pick.index)
 
@@ -299,10 +306,11 @@ def recording_from(
     final_roles: list[Role] = [roles[i] or "auxiliary" for i in columns]
     if sheet.format == "bluehill":
         lengths = [i for i, u in enumerate(final_units) if u.quantity == "length"]
-        if len(lengths) == 1 and final_roles[lengths[0]] == "auxiliary":
+        if lengths and final_roles[lengths[0]] == "auxiliary" and "displacement" not in names:
             names[lengths[0]] = "displacement"
-    if chosen or sheet.format != "plain":
-        _renamed(names, final_roles, final_units, sheet.has_header)
+    # A plain table's names are the user's own, and so are those in a file that stores roles.
+    told = [i not in chosen and (sheet.format == "plain" or sheet.columns[i].role is not None) for i in columns]
+    _rename(names, final_roles, final_units, told, sheet.has_header)
     _unique(names)
 
     keep = slice(None)
@@ -321,9 +329,7 @@ def recording_from(
     for position, index in enumerate(columns):
         column = sheet.columns[index]
         column = replace(column, values=column.values[keep])
-        channel = _channel(
-            sheet, names[position], column, final_units[position], final_roles[position], notes
-        )
+        channel = _channel(sheet, names[position], column, final_units[position], final_roles[position], notes)
         if channel is None:
             continue
         if channel.role == "load" and sheet.format in _MACHINE_LOGS:

@@ -114,6 +114,8 @@ def read(path: Path) -> Sheet:
     lines, notes = read_lines(path)
     delimiter, width, start = _split_table(path, lines)
     above = lines[:start]
+    said = _said(above, delimiter)
+    of_table = {key: said.pop(key, None) for key in ("name", "unit") if f"# {key}:" in "\n".join(above)}
     numbered = [(number, line) for number, line in enumerate(lines[start:], start=start + 1) if line.strip()]
     numbers = [number for number, _ in numbered]
     rows = even_rows(path, split_cells([line for _, line in numbered], delimiter), numbers, width)
@@ -127,9 +129,7 @@ def read(path: Path) -> Sheet:
         rows, numbers = rows[1:], numbers[1:]
         if rows and _is_unit_row(rows[0]):
             units = [cell.strip("()[] ") or unit for cell, unit in zip(rows[0], units, strict=True)]
-            names = [
-                label if cell else name for label, name, cell in zip(labels, names, rows[0], strict=True)
-            ]
+            names = [label if cell else name for label, name, cell in zip(labels, names, rows[0], strict=True)]
             rows, numbers = rows[1:], numbers[1:]
     if not rows:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
@@ -152,10 +152,12 @@ def read(path: Path) -> Sheet:
         path,
         "foreign",
         columns,
-        _said(above, delimiter),
+        said,
         notes=[*notes, *table.notes],
         first_line=numbers[0],
         has_header=has_header,
+        recording_name=of_table.get("name"),
+        unit_name=of_table.get("unit"),
         lines=np.array(numbers, dtype=np.intp),
     )
 

@@ -58,9 +58,7 @@ def _lines(found: list[int]) -> str:
 
 
 class _Table:
-    def __init__(
-        self, path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]
-    ) -> None:
+    def __init__(self, path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> None:
         self.path, self.names, self.lines = path, names, lines
         self.cells: list[Sequence[str]] = list(zip(*rows, strict=True))
         self.joined = ["\n".join(column) for column in self.cells]
@@ -159,8 +157,7 @@ class _Table:
         if grouped:
             self._check_grouped(index, values)
             notes.append(
-                f"Column {name} is written like 1.002.000 and was read with the last point as decimal mark"
-                " (1002.000)."
+                f"Column {name} is written like 1.002.000 and was read with the last point as decimal mark (1002.000)."
             )
         if marked:
             notes.append(f"Column {name} holds thousands marks ({thousands!r}), which were removed.")
@@ -176,9 +173,7 @@ class _Table:
             )
 
 
-def numbers_of(
-    path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]
-) -> Numbers:
+def numbers_of(path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> Numbers:
     """The cells ``rows`` (n rows of one cell per name), which stand on ``lines`` (n,), as columns of numbers.
 
     One decimal mark holds for the whole file. Raises `FormatError` naming the lines where cells contradict each

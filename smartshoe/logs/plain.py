@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import warnings
@@ -69,7 +70,7 @@ def _opening(path: Path) -> tuple[list[str], list[str], int]:
                 if text.startswith("#"):
                     marks.append(text)
                 elif text.strip():
-                    return marks, [cell.strip().strip('"') for cell in text.split(",")], number
+                    return marks, [cell.strip() for cell in next(csv.reader([text]))], number
     except UnicodeDecodeError as error:
         raise FormatError(f"{path} is not UTF-8: save the plain table as UTF-8") from error
     except OSError as error:
@@ -126,9 +127,7 @@ def _read_fast(path: Path, header: list[str], header_line: int) -> NDArray[np.fl
 
 def _data_lines(path: Path, header_line: int) -> tuple[list[str], list[int]]:
     lines, _ = read_lines(path)
-    rows = [
-        (number, line) for number, line in enumerate(lines, start=1) if number > header_line and line.strip()
-    ]
+    rows = [(number, line) for number, line in enumerate(lines, start=1) if number > header_line and line.strip()]
     return [line for _, line in rows], [number for number, _ in rows]
 
 
@@ -175,9 +174,7 @@ def read(path: Path) -> Sheet:
     for index, cell in enumerate(header):
         name, unit = split_column(cell)
         role_of_column = _ROLES[roles[cell]] if cell in roles else None
-        columns.append(
-            Column(name, unit.symbol if unit else "", values[:, index], role_of_column, label=cell)
-        )
+        columns.append(Column(name, unit.symbol if unit else "", values[:, index], role_of_column, label=cell))
     return Sheet(
         path,
         "plain",
@@ -193,6 +190,8 @@ def read(path: Path) -> Sheet:
 
 def write(recording: Recording, path: Path) -> None:
     """Write ``recording`` with every number in its shortest exact form and missing samples as empty cells."""
+    import pandas as pd
+
     lines = [("name", recording.name)]
     if recording.unit is not None:
         lines.append(("unit", recording.unit))
@@ -210,7 +209,8 @@ def write(recording: Recording, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for key, value in lines:
             file.write(f"# {_quoted(key, key=True)}: {_quoted(str(value))}\n")
-        recording.to_frame().to_csv(file, index=False, lineterminator="\n")
+        columns = {" ".join(name.splitlines()): values for name, values in recording.columns()}
+        pd.DataFrame(columns).to_csv(file, index=False, lineterminator="\n")
 
 
 FORMAT = Format("plain", (".csv", ".txt"), sniff, read, write)

@@ -72,9 +72,7 @@ def read_lines(path: Path) -> tuple[list[str], list[str]]:
         encoding, note = encoding_of(data)
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
-        raise FormatError(
-            f"{path} is no text in UTF-8, UTF-16, cp1250 or GB18030: save it as UTF-8"
-        ) from error
+        raise FormatError(f"{path} is no text in UTF-8, UTF-16, cp1250 or GB18030: save it as UTF-8") from error
     if "\x00" in text:
         line = text[: text.index("\x00")].count("\n") + 1
         raise FormatError(f"{path}, line {line} holds binary zeros: export the file again")
@@ -97,10 +95,12 @@ def split_cells(lines: Sequence[str], delimiter: str | None) -> list[list[str]]:
     if delimiter is None:
         return [line.split() for line in lines]
     if any('"' in line for line in lines):
-        # A quote that never closes would swallow the lines below it, hence line by line.
-        return [
-            [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])] for line in lines
-        ]
+        # A quote that never closes would swallow the lines below it; such lines are read one by one.
+        whole = all(line.count('"') % 2 == 0 for line in lines)
+        rows = csv.reader(lines, delimiter=delimiter) if whole else (
+            next(csv.reader([line], delimiter=delimiter), []) for line in lines
+        )  # fmt: skip
+        return [[cell.strip() for cell in row] for row in rows]
     return [[cell.strip() for cell in line.split(delimiter)] for line in lines]
 
 

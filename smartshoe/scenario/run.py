@@ -20,7 +20,7 @@ from smartshoe.logs import read
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
 from smartshoe.scenario.schema import Scenario, Source, UnitTable
-from smartshoe.validate import Validation, validate
+from smartshoe.validation import Validation, validate
 
 Progress = Callable[[str], None]
 
@@ -108,9 +108,9 @@ def _record(
             progress(f"{unit.name}: reading {path.name}")
             found[path.stem] = read(
                 path,
-                time=unit.time,
-                force=unit.force,
-                sensors=[unit.sensor] if unit.sensor else [],
+                time=unit.columns.time,
+                force=unit.columns.force,
+                sensors=[unit.columns.sensor] if unit.columns.sensor else [],
                 unit=unit.name,
                 name=path.stem,
             )

@@ -83,15 +83,21 @@ class MachineTable(BaseModel):
         return dict(self.model_extra or {})
 
 
+class ColumnsTable(_Table):
+    """``columns``: which columns of a unit's files are what, where names and units do not tell."""
+
+    time: str | None = None
+    force: str | None = None
+    sensor: str | None = None
+
+
 class UnitTable(BaseModel):
     """``[[unit]]``: a sensing unit; its recordings are files, or come from the machine (further keys are its)."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
     name: str = Field(min_length=1)
     recordings: tuple[str, ...] = ()
-    time: str | None = None
-    force: str | None = None
-    sensor: str | None = None
+    columns: ColumnsTable = ColumnsTable()
 
     @property
     def options(self) -> dict[str, Any]:

@@ -1,0 +1,65 @@
+"""Devices by URL: ``SCHEME:TARGET?option=value``; the scheme names a provider found by entry point.
+
+A provider has ``open_machine(target, options, rng)``, ``open_shoe(target, options, rng)`` or both. It raises
+`UsageError` for a target that it does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from typing import Any
+from urllib.parse import parse_qsl
+
+from smartshoe.devices.base import Shoe, TestMachine
+from smartshoe.errors import UsageError
+
+GROUP = "smartshoe.devices"
+
+
+def split_url(url: str) -> tuple[str, str, dict[str, str]]:
+    """``sim:instron?unit=left_toe`` as scheme, target and options; raises `UsageError` where there is no scheme."""
+    scheme, colon, rest = url.partition(":")
+    if not colon or not scheme:
+        raise UsageError(f"device {url!r} has no scheme: write it like sim:instron or log:Specimen_RawData_1.csv")
+    target, _, query = rest.partition("?")
+    return scheme, target.removeprefix("//"), dict(parse_qsl(query, keep_blank_values=True))
+
+
+def schemes() -> tuple[str, ...]:
+    """The schemes that installed packages provide."""
+    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
+
+
+def _open(url: str, what: str, options: Mapping[str, Any]) -> Any:
+    scheme, target, in_url = split_url(url)
+    found = [entry for entry in entry_points(group=GROUP) if entry.name == scheme]
+    if not found:
+        raise UsageError(f"device {url!r}: scheme {scheme!r} is not installed; there are {', '.join(schemes())}")
+    opener = getattr(found[0].load(), f"open_{what}", None)
+    if opener is None:
+        raise UsageError(f"device {url!r}: {scheme!r} has no {what}s; use another scheme ({', '.join(schemes())})")
+    import numpy as np
+
+    merged: dict[str, Any] = {**in_url, **options}
+    seed = merged.pop("seed", 0)
+    try:
+        rng = np.random.default_rng(int(seed))
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"device {url!r}: seed is {seed!r}; give a whole number from 0") from error
+    return opener(target, merged, rng)
+
+
+def open_machine(url: str, **options: Any) -> TestMachine:
+    """The testing machine at ``url``, to be used in a with block; ``seed`` (default 0) is its random root.
+
+    Raises `UsageError` for an unknown scheme, target or option.
+    """
+    machine: TestMachine = _open(url, "machine", options)
+    return machine
+
+
+def open_shoe(url: str, **options: Any) -> Shoe:
+    """The shoe at ``url``, to be used in a with block; raises as `open_machine` does."""
+    shoe: Shoe = _open(url, "shoe", options)
+    return shoe

@@ -1,0 +1,167 @@
+"""`Identification`: what the data say of a unit, and how well."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smartshoe.compensate import Calibration, Compensator
+from smartshoe.identify.experiment import Array, Direction
+from smartshoe.identify.residual_tests import ResidualTest
+from smartshoe.models import Parameter, StandardLinearSolid, discretise
+from smartshoe.models.parameter import finite_or_none
+from smartshoe.units import Unit
+
+SCHEMA = "smartshoe.identification/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """force / reading = (b0 s + b1)/(s + a1), Chinimilli 2016 (13), with its uncertainty.
+
+    ``parameters`` a1, b0, b1 (readings in ``reading_unit``) and k1, k2, c, whatever the ``direction``, which says
+    only which signal's error was minimised; ``covariance`` (6, 6) in their order. By recording, ``offsets`` are the
+    readings at no load, ``initial_states`` the coefficients of the fading start, ``residuals`` measured minus model
+    (NaN where a sample did not count). ``delay_s`` is positive where the reading is later than the load. ``scale``
+    is N per reading unit of the paper's force. ``rmse`` in N (inverse) or reading units (forward).
+    """
+
+    unit: str
+    direction: Direction
+    method: str
+    structure: str
+    parameters: Mapping[str, Parameter]
+    covariance: Array
+    offsets: Mapping[str, Parameter]
+    delay_s: Parameter
+    initial_states: Mapping[str, Parameter]
+    fit_percent: float
+    fit_percent_by_recording: Mapping[str, float]
+    rmse: float
+    rmse_unit: str
+    iterations: int
+    converged: bool
+    residual_tests: Mapping[str, ResidualTest]
+    sample_rate_hz: float
+    reading_unit: Unit
+    scale: float
+    n_samples: int
+    n_missing: int
+    load_range_n: tuple[float, float]
+    rate_range_n_per_s: tuple[float, float]
+    residuals: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    sources: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def coefficients(self) -> tuple[float, float, float]:
+        """a1 in 1/s, b0 in N per reading unit, b1 in that per s."""
+        return self.parameters["a1"].value, self.parameters["b0"].value, self.parameters["b1"].value
+
+    @property
+    def solid(self) -> StandardLinearSolid:
+        """The standard linear solid of the parameters k1, k2, c."""
+        return StandardLinearSolid(*(self.parameters[name].value for name in ("k1", "k2", "c")))
+
+    @property
+    def correlation(self) -> Array:
+        """(6, 6) correlations in the order of ``parameters``; 0 beside a fixed parameter."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        safe = np.where(sd > 0, sd, 1.0)
+        matrix: Array = np.clip(self.covariance / np.outer(safe, safe), -1.0, 1.0)
+        np.fill_diagonal(matrix, 1.0)
+        return matrix
+
+    @property
+    def offset(self) -> float:
+        """The reading at no load, the mean over recordings, in ``reading_unit``."""
+        return float(np.mean([parameter.value for parameter in self.offsets.values()]))
+
+    def discrete(self, sample_rate_hz: float | None = None) -> tuple[Array, Array]:
+        """Numerator and denominator of the bilinear filter, by default at the data's rate."""
+        return discretise(*self.coefficients, sample_rate_hz or self.sample_rate_hz, "bilinear")
+
+    def compensator(self, sample_rate_hz: float = 100.0) -> Compensator:
+        """The filter that turns readings (in ``reading_unit``) into force in N."""
+        a1, b0, b1 = self.coefficients
+        return Compensator(
+            a1, b0, b1, offset=self.offset, sample_rate_hz=sample_rate_hz, reading_unit=self.reading_unit
+        )
+
+    def calibration(self, created: str = "") -> Calibration:
+        """The calibration to save; ``created`` is an ISO date where the caller wants one in the file."""
+        from smartshoe import __version__
+
+        a1, b0, b1 = self.coefficients
+        return Calibration(
+            a1=a1,
+            b0=b0,
+            b1=b1,
+            reading_unit=self.reading_unit,
+            offset=self.offset,
+            unit=self.unit,
+            parameters=dict(self.parameters),
+            covariance=tuple(tuple(float(value) for value in row) for row in self.covariance),
+            scale=self.scale,
+            delay_s=self.delay_s.value,
+            load_range_n=self.load_range_n,
+            rate_range_n_per_s=self.rate_range_n_per_s,
+            sample_rate_hz=self.sample_rate_hz,
+            sources=tuple({"name": source, "sha256": _sha256(source)} for source in self.sources),
+            created=created,
+            smartshoe_version=__version__,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's object, schema smartshoe.identification/1; null where a number is not finite."""
+        numerator, denominator = self.discrete()
+        names = list(self.parameters)
+        return {
+            "schema": SCHEMA,
+            "unit": self.unit,
+            "direction": self.direction,
+            "method": self.method,
+            "parameters": {name: parameter.to_dict() for name, parameter in self.parameters.items()},
+            "offsets": {name: parameter.to_dict() for name, parameter in self.offsets.items()},
+            "delay_s": self.delay_s.to_dict(),
+            "correlation": {
+                "names": names,
+                "matrix": [[finite_or_none(value) for value in row] for row in self.correlation],
+            },
+            "fit_percent": finite_or_none(self.fit_percent),
+            "rmse": {"value": finite_or_none(self.rmse), "unit": self.rmse_unit},
+            "iterations": self.iterations,
+            "converged": self.converged,
+            "residual_tests": {name: test.to_dict() for name, test in self.residual_tests.items()},
+            "discrete": {
+                "sample_rate_hz": self.sample_rate_hz,
+                "numerator": [float(value) for value in numerator],
+                "denominator": [float(value) for value in denominator],
+            },
+            "structure": self.structure,
+            "initial_states": {name: state.to_dict() for name, state in self.initial_states.items()},
+            "fit_percent_by_recording": {
+                name: finite_or_none(value) for name, value in self.fit_percent_by_recording.items()
+            },
+            "covariance": [[finite_or_none(value) for value in row] for row in self.covariance],
+            "reading_unit": self.reading_unit.symbol,
+            "scale": self.scale,
+            "n_samples": self.n_samples,
+            "n_missing": self.n_missing,
+            "load_range_n": list(self.load_range_n),
+            "rate_range_n_per_s": list(self.rate_range_n_per_s),
+            "notes": list(self.notes),
+        }
+
+
+def _sha256(source: str) -> str | None:
+    path = Path(source)
+    if not source or not path.is_file():
+        return None
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

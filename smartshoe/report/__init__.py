@@ -1,0 +1,1 @@
+"""What a person sees: tables for a terminal, figures, and one self-contained HTML page."""

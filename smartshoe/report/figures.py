@@ -1,0 +1,149 @@
+"""A unit's figures as SVG texts: signals, loops, the filter's Bode plot, residuals."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from smartshoe.recording import Recording
+from smartshoe.validation import Trace
+from smartshoe.validation.segments import by_rate, cycles
+
+Array = NDArray[np.float64]
+
+LOAD, READING, RAW, COMPENSATED = "#1f2937", "#2563eb", "#d97706", "#059669"
+FEWEST, MOST = 300, 900
+_STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "smartshoe",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e5e7eb",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+}
+
+
+def _thin(x: Array, *signals: Array) -> tuple[Array, ...]:
+    """At most about `MOST` points that keep each stretch's extremes of the first signal."""
+    if x.size <= MOST:
+        return (x, *signals)
+    block = -(-x.size // (MOST // 2))
+    count = x.size // block
+    cut = signals[0][: count * block].reshape(count, block)
+    start = np.arange(count) * block
+    index = np.unique(np.concatenate([start + cut.argmin(axis=1), start + cut.argmax(axis=1), [0, x.size - 1]]))
+    return (x[index], *(signal[index] for signal in signals))
+
+
+def _svg(figure: Figure) -> str:
+    buffer = io.StringIO()
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _figure(width: float, height: float, columns: int, rows: int = 1) -> tuple[Figure, list[Any]]:
+    figure = Figure(figsize=(width, height), layout="tight")
+    axes = figure.subplots(rows, columns, squeeze=False)
+    return figure, list(axes.ravel())
+
+
+def signals(recordings: Sequence[Recording]) -> str:
+    """Load and reading against time, one column a recording."""
+    with mpl.rc_context(_STYLE):
+        columns = len(recordings)
+        figure, axes = _figure(9.6, 3.6, columns, 2)
+        for column, recording in enumerate(recordings):
+            sensor = recording.sensor
+            for axis, values, colour, label in (
+                (axes[column], recording.force_n, LOAD, "load (N)"),
+                (axes[columns + column], sensor.values, READING, f"{sensor.name} ({sensor.unit.symbol})"),
+            ):
+                axis.plot(*_thin(recording.time_s, values), color=colour)
+                if column == 0:
+                    axis.set_ylabel(label)
+            axes[column].set_title(recording.name)
+            axes[columns + column].set_xlabel("time (s)")
+        return _svg(figure)
+
+
+def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> str | None:
+    """Raw (best static line) and compensated estimate against load at a low and a high rate, as the paper's Fig. 8.
+
+    The nearest rates there are; None where the record has no cycle.
+    """
+    found = [(trace, cycle) for trace in traces for cycle in cycles(trace.time_s, trace.load_n)]
+    groups = by_rate([cycle for _, cycle in found])
+    if not groups:
+        return None
+    owner = {id(cycle): trace for trace, cycle in found}
+    chosen = sorted({min(groups, key=lambda rate: abs(rate - wanted)) for wanted in rates_n_per_s})
+    with mpl.rc_context(_STYLE):
+        figure, axes = _figure(9.6, 3.4, len(chosen))
+        for axis, rate in zip(axes, chosen, strict=True):
+            cycle = groups[rate][-1]
+            trace, span = owner[id(cycle)], slice(cycle.start, cycle.stop)
+            load_n = trace.load_n[span]
+            axis.plot([load_n.min(), load_n.max()], [load_n.min(), load_n.max()], color="#9ca3af", lw=0.8)
+            for values, colour, label in (
+                (trace.static_n[span], RAW, "raw, best static line"),
+                (trace.compensated_n[span], COMPENSATED, "compensated"),
+            ):
+                axis.plot(*_thin(np.arange(load_n.size, dtype=float), load_n, values)[1:], color=colour, label=label)
+            axis.set_title(f"{rate:g} N/s")
+            axis.set_xlabel("load (N)")
+        axes[0].set_ylabel("estimate (N)")
+        axes[0].legend(loc="upper left")
+        return _svg(figure)
+
+
+def bode(a1: float, b0: float, b1: float, rate_hz: float, numerator: Sequence[float], denominator: Sequence[float]) -> str:
+    """Gain and phase of (b0 s + b1)/(s + a1) and of its bilinear filter at ``rate_hz``; gait's band is shaded."""
+    frequency = np.geomspace(max(a1 / (2 * np.pi) / 30, 1e-4), 0.499 * rate_hz, 200)
+    s = 2j * np.pi * frequency
+    z = np.exp(-s / rate_hz)
+    shapes = (
+        ((b0 * s + b1) / (s + a1), LOAD, "-", "identified"),
+        (np.polyval(numerator[::-1], z) / np.polyval(denominator[::-1], z), COMPENSATED, "--", f"filter at {rate_hz:g} Hz"),
+    )
+    with mpl.rc_context(_STYLE):
+        figure, (gain, phase) = _figure(9.6, 2.8, 2)
+        for response, colour, line, label in shapes:
+            gain.semilogx(frequency, np.abs(response) / (b1 / a1), line, color=colour, label=label)
+            phase.semilogx(frequency, np.degrees(np.angle(response)), line, color=colour)
+        for axis, label in ((gain, "gain over static gain"), (phase, "phase lead (°)")):
+            axis.axvspan(0.5, 5.0, color="#dbeafe", zorder=0, label="gait, 0.5–5 Hz" if axis is gain else None)
+            axis.set_xlabel("frequency (Hz)")
+            axis.set_ylabel(label)
+        gain.legend(loc="center left")
+        return _svg(figure)
+
+
+def residuals(traces: Sequence[Trace]) -> str:
+    """Compensated force less load, against time and against load."""
+    with mpl.rc_context(_STYLE):
+        figure, (by_time, by_load) = _figure(9.6, 2.8, 2)
+        start = 0.0
+        for trace in traces:
+            error = (trace.compensated_n - trace.load_n)[trace.valid]
+            time_s = trace.time_s[trace.valid]
+            by_time.plot(*_thin(start + time_s - time_s[0], error), color=COMPENSATED, lw=0.7)
+            start += float(time_s[-1] - time_s[0])
+            step = max(1, error.size // FEWEST)
+            by_load.plot(trace.load_n[trace.valid][::step], error[::step], ".", color=COMPENSATED, ms=2.0)
+        by_time.set_xlabel("time, recordings one after the other (s)")
+        by_time.set_ylabel("compensated − load (N)")
+        by_load.set_xlabel("load (N)")
+        return _svg(figure)

@@ -1,0 +1,65 @@
+"""Figures of merit of a force estimate against the reference load."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def rmse(error: Array) -> float:
+    """Root mean square of ``error`` (n,), in its unit."""
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def improvement_percent(before: float, after: float) -> float | None:
+    """P% of Chinimilli 2016, Section VI: 100 (before - after)/before; None where there was no error before."""
+    return 100.0 * (before - after) / before if before > 0 else None
+
+
+def best_static(reading: Array, load_n: Array) -> tuple[float, float]:
+    """Gain and offset (N per reading unit, N) of the least-squares line from reading to load."""
+    design = np.column_stack([reading, np.ones_like(reading)])
+    (gain, offset), *_ = np.linalg.lstsq(design, load_n, rcond=None)
+    return float(gain), float(offset)
+
+
+def loop_area(load_n: Array, estimate_n: Array) -> float:
+    """Area in N^2 enclosed by the closed path (load, estimate), by the shoelace formula; positive either way round."""
+    return float(0.5 * abs(np.dot(load_n, np.roll(estimate_n, -1)) - np.dot(estimate_n, np.roll(load_n, -1))))
+
+
+def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_down: Array) -> float:
+    """Largest difference in N between loading and unloading estimate at equal load.
+
+    Both branches are averaged in bins of load, so that the noise of single samples does not set the figure.
+    """
+    low = max(load_up.min(), load_down.min())
+    high = min(load_up.max(), load_down.max())
+    if high <= low:
+        return 0.0
+    edges = np.linspace(low, high, 21)
+
+    def branch(load: Array, estimate: Array) -> Array:
+        which = np.digitize(load, edges)
+        counts = np.bincount(which, minlength=edges.size + 1)[1 : edges.size]
+        # The mean error, not the mean estimate: where in a bin the samples lie must not matter.
+        sums = np.bincount(which, weights=estimate - load, minlength=edges.size + 1)[1 : edges.size]
+        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
+    difference = np.abs(branch(load_up, estimate_up) - branch(load_down, estimate_down))
+    return float(np.nanmax(difference)) if np.isfinite(difference).any() else 0.0
+
+
+def delay_s(load_n: Array, estimate_n: Array, sample_time_s: float) -> float | None:
+    """Time by which the estimate trails the load: least squares of (estimate - load) on -d(load)/dt.
+
+    The first-order expansion of a shift, good while the delay is short beside the ramps; None without a slope.
+    """
+    slope = np.gradient(load_n, sample_time_s)
+    centred = slope - slope.mean()
+    power = float(np.dot(centred, centred))
+    if power == 0.0:
+        return None
+    return float(-np.dot(centred, estimate_n - load_n) / power)

@@ -1,0 +1,116 @@
+"""Loading and unloading ramps of a load signal, with their rates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# A ramp counts where it spans this share of the record's load range; slower wandering is hold or rest.
+LEAST_SPAN = 0.3
+SAME_RATE = 0.10
+
+
+@dataclass(frozen=True, slots=True)
+class Ramp:
+    """Samples ``start:stop`` with load rising (``rate_n_per_s`` > 0) or falling; the rate is its mean slope."""
+
+    start: int
+    stop: int
+    rate_n_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A loading ramp and the unloading that follows it; ``start:stop`` covers both and what lies between."""
+
+    up: Ramp
+    down: Ramp
+
+    @property
+    def start(self) -> int:
+        """First sample."""
+        return self.up.start
+
+    @property
+    def stop(self) -> int:
+        """One past the last sample."""
+        return self.down.stop
+
+    @property
+    def rate_n_per_s(self) -> float:
+        """Mean of the two ramps' absolute rates."""
+        return 0.5 * (self.up.rate_n_per_s - self.down.rate_n_per_s)
+
+
+def turning_points(load_n: Array, threshold_n: float) -> list[int]:
+    """Samples at which the load turns by more than ``threshold_n`` (a zig-zag that noise does not trip)."""
+    points = [0]
+    low = high = 0
+    direction = 0
+    for k in range(1, load_n.size):
+        if load_n[k] > load_n[high]:
+            high = k
+        if load_n[k] < load_n[low]:
+            low = k
+        if direction >= 0 and load_n[high] - load_n[k] > threshold_n:
+            points.append(high)
+            direction, low, high = -1, k, k
+        elif direction <= 0 and load_n[k] - load_n[low] > threshold_n:
+            points.append(low)
+            direction, low, high = 1, k, k
+    points.append(load_n.size - 1)
+    return points
+
+
+def ramps(time_s: Array, load_n: Array) -> list[Ramp]:
+    """The ramps of a record that span at least 30 % of its load range, in order of time.
+
+    The slope is taken between 10 % and 90 % of the ramp's span, so that corners and holds do not count.
+    """
+    span_n = float(np.ptp(load_n))
+    if span_n == 0.0:
+        return []
+    found: list[Ramp] = []
+    points = turning_points(load_n, LEAST_SPAN * span_n)
+    for first, last in zip(points, points[1:], strict=False):
+        if last <= first:
+            continue
+        part = load_n[first : last + 1]
+        rise = float(part[-1] - part[0])
+        if abs(rise) < LEAST_SPAN * span_n:
+            continue
+        progress = (part - part[0]) / rise
+        begin = int(np.nonzero(progress <= 0.1)[0][-1])
+        end = begin + int(np.argmax(progress[begin:] >= 0.9))
+        if end <= begin:
+            continue
+        rate = float((part[end] - part[begin]) / (time_s[first + end] - time_s[first + begin]))
+        # The ramp itself, by its own slope, without the rest before it and the hold after it.
+        lead = int(np.ceil(0.125 * (end - begin)))
+        found.append(Ramp(first + max(begin - lead, 0), min(first + end + lead, last) + 1, rate))
+    return found
+
+
+def cycles(time_s: Array, load_n: Array) -> list[Cycle]:
+    """Each loading ramp with the unloading that follows it."""
+    found = ramps(time_s, load_n)
+    return [
+        Cycle(up, down)
+        for up, down in zip(found, found[1:], strict=False)
+        if up.rate_n_per_s > 0 > down.rate_n_per_s
+    ]
+
+
+def by_rate(found: list[Cycle]) -> dict[float, list[Cycle]]:
+    """Cycles grouped by loading rate (within 10 %); the key is the group's mean rate to two digits, ascending."""
+    groups: list[list[Cycle]] = []
+    for cycle in sorted(found, key=lambda c: c.rate_n_per_s):
+        if groups and cycle.rate_n_per_s <= (1 + SAME_RATE) * groups[-1][0].rate_n_per_s:
+            groups[-1].append(cycle)
+        else:
+            groups.append([cycle])
+    return {float(f"{np.mean([c.rate_n_per_s for c in group]):.2g}"): group for group in groups}
