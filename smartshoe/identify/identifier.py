@@ -79,12 +79,8 @@ def identify(
             raise NotIdentifiableError(
                 f"{several[0].label}: the fit runs to infinity: record a load that rises and falls at several rates"
             )
-    if strict and not converged:
-        raise NotConvergedError(
-            f"{several[0].label}: {method} did not settle within {max_iterations} iterations: raise max_iterations,"
-            " or choose another method or prefilter_rad_s"
-        )
-    return _conclude(
+    # What the data leave open is the better reason, where a fit did not settle for it.
+    found = _conclude(
         problem,
         theta,
         several,
@@ -97,6 +93,12 @@ def identify(
         iterations=iterations,
         converged=converged,
     )
+    if strict and not converged:
+        raise NotConvergedError(
+            f"{several[0].label}: {method} did not settle within {max_iterations} iterations: raise max_iterations,"
+            " or choose another method or prefilter_rad_s"
+        )
+    return found
 
 
 def _check_choices(
@@ -333,15 +335,21 @@ def _require_determined(
     """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself."""
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     gain_at = problem.shape_size - 1
-    if degenerate or sd[gain_at] > WORST_RELATIVE_GAIN_SD * abs(theta[gain_at]) or static_gain == 0.0:
+    outputs = [
+        experiment.signals(problem.settings.direction)[1][kept]
+        for experiment, kept in zip(problem.experiments, problem.kept, strict=True)
+    ]
+    left = float(np.sum(problem.residual(theta) ** 2)) / sum(float(np.sum((y - y.mean()) ** 2)) for y in outputs)
+    unexplained = left > 0.5 and (degenerate or sd[gain_at] > WORST_RELATIVE_GAIN_SD * abs(theta[gain_at]))
+    if unexplained or static_gain == 0.0:
         raise NotIdentifiableError(
             f"{where}: the reading does not follow the load, so that no gain can be found: record a load that rises and"
             " falls well above the noise"
         )
-    if sd[0] > WORST_RELATIVE_SD:
+    if degenerate or sd[0] > WORST_RELATIVE_SD:
         raise NotIdentifiableError(
-            f"{where}: the relaxation (a1 = {np.exp(theta[0]):.3g} 1/s) cannot be told from noise (its error is"
-            f" {100 * sd[0]:.0f} %): record more triangles, at several rates, with rests between"
+            f"{where}: the relaxation (a1 = {np.exp(theta[0]):.3g} 1/s) cannot be told from these data:"
+            " record more triangles, at several rates, with rests between"
         )
 
 

@@ -14,7 +14,7 @@ Solver = Literal["gn", "lm", "trf"]
 
 
 def linear_start(problem: PredictionError, alpha: float, p1: float, p2: float, delay_s: float) -> Array:
-    """theta at a given pole and delay, with all that enters linearly by least squares (in the grey box, the gains kept)."""
+    """theta at a given pole and delay, all that enters linearly by least squares (the grey box keeps its gains)."""
     settings = problem.settings
     theta = np.zeros(problem.size)
     if problem.delay_at is not None:

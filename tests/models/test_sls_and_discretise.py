@@ -41,16 +41,16 @@ def test_a_closed_cycle_dissipates_what_goes_in(k1: float, k2: float, c: float, 
     force = solid.wall_force(t, deformation)
     last = slice(t.size - 4001, t.size)
     work = np.trapezoid(force[last], deformation[last])
-    heat = solid.dissipated_energy(t, deformation) - solid.dissipated_energy(t[: t.size - 4000], deformation[: t.size - 4000])
+    heat = solid.dissipated_energy(t, deformation) - solid.dissipated_energy(
+        t[: t.size - 4000], deformation[: t.size - 4000]
+    )
     assert heat >= 0.0
     assert work == pytest.approx(heat, rel=2e-3, abs=1e-4 * k2)
 
 
 @given(a1=positive, b0=positive, b1=positive, rate=st.floats(20.0, 500.0), seed=st.integers(0, 99))
 @settings(max_examples=20)
-def test_foh_recursion_equals_its_difference_equation(
-    a1: float, b0: float, b1: float, rate: float, seed: int
-) -> None:
+def test_foh_recursion_equals_its_difference_equation(a1: float, b0: float, b1: float, rate: float, seed: int) -> None:
     u = np.random.default_rng(seed).standard_normal(200).cumsum()
     fast = simulate(a1, b0, b1, u, np.arange(200) / rate)
     assert fast == pytest.approx(run_plainly(*discretise(a1, b0, b1, rate, "foh"), u), rel=1e-9, abs=1e-9)
