@@ -1,70 +1,74 @@
-"""The HTML page: one file that needs nothing else."""
+"""The HTML report: one self-contained page."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from smartshoe.atomic import make_folder, write_text
-from smartshoe.report.model import Report, UnitReport
-from smartshoe.report.numbers import number, verdict, with_sd
-from smartshoe.report.tables import SUMMARY_HEADER, rate_rows, summary_row
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from smartshoe.atomic import write_text
+from smartshoe.recording import Recording
+from smartshoe.report import figures
+from smartshoe.report.numbers import plain, with_sd
+from smartshoe.validation import Validation
 
 
-def _unit(unit: UnitReport, index: int) -> dict[str, Any]:
-    from markupsafe import Markup
+@dataclass(frozen=True, eq=False)
+class UnitReport:
+    """What the page says of one unit; ``identification`` is `Identification.to_dict()`."""
 
-    from smartshoe.report.figures import unit_figures
+    name: str
+    identification: Mapping[str, Any]
+    validation: Validation
+    recordings: Sequence[Recording]
+    fitted: Sequence[str]
+    judged: Sequence[str]
 
-    found = unit.validation.to_dict()
-    header, rows = rate_rows(found)
-    parameters = [
-        (name, with_sd(item), str(item.get("unit", "")))
-        for name, item in unit.identification_dict["parameters"].items()
+
+def verdict(unit: UnitReport) -> str:
+    """One sentence: what compensation gains over a static line, and what is left."""
+    overall = unit.validation.overall
+    gain = overall.improvement_over_static_percent
+    left = 100.0 * overall.rmse_compensated_n / unit.validation.full_scale_n
+    if gain is None:
+        return "a static line leaves no error here"
+    said = f"compensation leaves {plain(overall.rmse_compensated_n)} N ({plain(left, 2)} % of full scale)"
+    if gain < 5.0:
+        return f"{said}, hardly less than the best static line ({plain(overall.rmse_static_n)} N)"
+    return f"{said} where the best static line leaves {plain(overall.rmse_static_n)} N: {plain(gain, 2)} % less"
+
+
+def _drawn(unit: UnitReport) -> list[tuple[str, Markup]]:
+    discrete, parameters = unit.identification["discrete"], unit.identification["parameters"]
+    a1, b0, b1 = (parameters[name]["value"] for name in ("a1", "b0", "b1"))
+    pictures = [
+        ("Load and reading against time", figures.signals(unit.recordings)),
+        ("Estimate against load, raw and compensated", figures.loops(unit.validation.traces)),
+        (
+            "The compensating filter",
+            figures.bode(a1, b0, b1, discrete["sample_rate_hz"], discrete["numerator"], discrete["denominator"]),
+        ),
+        ("What compensation leaves", figures.residuals(unit.validation.traces)),
     ]
-    return {
-        "name": unit.name,
-        "anchor": f"unit-{index}",
-        "verdict": verdict(found["overall"]),
-        "summary": summary_row(unit.name, unit.identification_dict, found),
-        "parameters": parameters,
-        "fit": number(unit.identification_dict.get("fit_percent"), 4),
-        "rate_header": header,
-        "rate_rows": rows,
-        "raw_scale": f"{number(found['raw_scale']['value'], 5)} N per reading unit ({found['raw_scale']['source']})",
-        "full_scale": number(found["full_scale_n"]),
-        "filter": [
-            (key, [f"{v:.10g}" for v in unit.compensator_info[key]]) for key in ("numerator", "denominator")
-        ],
-        "rate_hz": f"{unit.compensator_info['rate']:g}",
-        # matplotlib's own output, whose texts are escaped: the only markup that is not escaped again.
-        "figures": [(caption, Markup(svg)) for caption, svg in unit_figures(unit, f"u{index}")],
-        "notes": [*unit.notes, *(note for recording in unit.recordings for note in recording.notes)],
-    }
+    # The SVG comes from matplotlib, which escapes the texts it draws.
+    return [(title, Markup(svg)) for title, svg in pictures if svg is not None]  # noqa: S704
 
 
-def render(report: Report) -> str:
-    """The page's HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
+def write_page(path: Path, title: str, about: str, facts: Mapping[str, str], units: Sequence[UnitReport]) -> Path:
+    """Write the report to ``path``, whole or not at all, and return it."""
     environment = Environment(
         loader=PackageLoader("smartshoe.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    units = [_unit(unit, index + 1) for index, unit in enumerate(report.units)]
-    return environment.get_template("report.html.j2").render(
-        report=report, units=units, summary_header=SUMMARY_HEADER
+    environment.filters.update(plain=plain, with_sd=with_sd)
+    page = environment.get_template("report.html").render(
+        title=title,
+        about=about,
+        facts=facts,
+        units=[(unit, verdict(unit), unit.validation.overall, _drawn(unit)) for unit in units],
     )
-
-
-def write_report(folder: Path | str, report: Report, *, result_json: str | None = None) -> Path:
-    """Write ``folder``/report.html, and ``result_json`` as result.json where given; returns the page's path.
-
-    Raises `UsageError` where the folder cannot be made or written to.
-    """
-    target = make_folder(folder)
-    page = target / "report.html"
-    text = render(report)
-    if result_json is not None:
-        write_text(target / "result.json", result_json)
-    write_text(page, text)
-    return page
+    write_text(path, page)
+    return path

@@ -1,0 +1,141 @@
+"""MATLAB MAT-files: level 5 to 7 by scipy, 7.3 (HDF5) by h5py. Nothing is ever unpickled."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smartshoe.atomic import replacing
+from smartshoe.errors import FormatError
+from smartshoe.logs.sheet import Column, Format, Sheet
+from smartshoe.recording import Recording, column_name, split_column
+
+
+def _sniff(path: Path, head: bytes) -> bool:
+    return head.startswith(b"MATLAB ") or (path.suffix.casefold() == ".mat" and head.startswith(b"\x89HDF"))
+
+
+def _flatten(name: str, value: Any) -> list[tuple[str, np.ndarray]]:
+    """Numeric arrays of a variable, structs opened up as NAME.FIELD, matrices as NAME_1, NAME_2, ..."""
+    array = np.asarray(value)
+    if array.dtype.names:
+        item = array.reshape(-1)[0] if array.size else None
+        if item is None:
+            return []
+        return [pair for field in array.dtype.names for pair in _flatten(f"{name}.{field}", item[field])]
+    if array.dtype.kind == "O":
+        return _flatten(name, array.item()) if array.size == 1 else []
+    if array.dtype.kind not in "biuf":
+        return []
+    array = np.squeeze(array)
+    if array.ndim < 2:
+        return [(name, np.atleast_1d(array).astype(float))]
+    if array.ndim == 2:
+        if array.shape[0] < array.shape[1]:
+            array = array.T
+        return [(f"{name}_{column + 1}", array[:, column].astype(float)) for column in range(array.shape[1])]
+    return []
+
+
+def _load(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat, matlab
+
+    try:
+        return {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
+    except NotImplementedError:  # level 7.3 is HDF5
+        return _load_hdf5(path)
+    except (ValueError, OSError, TypeError, KeyError, EOFError, matlab.MatReadError) as error:
+        raise FormatError(f"{path} is truncated or no MAT-file ({error}): save it again") from error
+
+
+def _load_hdf5(path: Path) -> dict[str, Any]:
+    import h5py
+
+    found: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf" and not name.startswith("#"):
+            found[name.replace("/", ".")] = item[...]
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(visit)
+    except (OSError, RuntimeError) as error:
+        raise FormatError(f"{path} is truncated or no MAT-file ({error}): save it again") from error
+    return found
+
+
+def read(path: Path) -> Sheet:
+    """Vectors of one length as columns: the longest length that more than one vector has, else the longest.
+
+    Others are left out with a note. A scalar ``Ts`` (sample time) or ``fs`` (rate) gives a time column where no
+    vector is called time.
+    """
+    loaded = _load(path)
+    about = loaded.pop("smartshoe", None)
+    arrays = [pair for name, value in loaded.items() for pair in _flatten(name, value)]
+    vectors = [(name, values) for name, values in arrays if values.size > 1 or about is not None]
+    if not vectors:
+        raise FormatError(f"{path} holds no vectors of numbers: save one variable a channel")
+    counts = Counter(values.size for _, values in vectors)
+    shared = [size for size, count in counts.items() if count > 1]
+    length = max(shared or counts)
+    sheet = Sheet(path, "matlab", [])
+    left_out = [name for name, values in vectors if values.size != length]
+    if left_out:
+        shown = ", ".join(left_out[:8]) + (", ..." if len(left_out) > 8 else "")
+        sheet.notes.append(f"variables of another length than {length} were left out: {shown}")
+    roles: dict[str, Any] = {}
+    if about is not None:
+        try:
+            own = json.loads(str(np.asarray(about).item()))
+            sheet.recording_name, sheet.unit_name = own["name"], own["unit"]
+            sheet.metadata.update(own["metadata"])
+            roles = own["columns"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise FormatError(f"{path}: variable 'smartshoe' is damaged ({error}): save the file again") from error
+    if about is None and not any(name.rsplit(".", 1)[-1].casefold() in ("t", "time", "time_s") for name, _ in vectors):
+        scalars = {name.casefold(): float(values[0]) for name, values in arrays if values.size == 1}
+        step = scalars.get("ts") or (1.0 / scalars["fs"] if scalars.get("fs") else None)
+        if step is not None and step > 0:
+            sheet.columns.append(Column("time", "s", step * np.arange(length)))
+    for name, values in vectors:
+        if values.size != length:
+            continue
+        if name in roles:
+            said = roles[name]
+            sheet.columns.append(Column(said["name"], said["unit"], values, said["role"]))
+        else:
+            plain, unit = split_column(name)
+            sheet.columns.append(Column(plain, unit.symbol, values) if unit else Column(name, "", values))
+    return sheet
+
+
+def write(recording: Recording, path: Path) -> None:
+    """Variables named as a plain table's columns, and ``smartshoe``: a JSON text with name, unit, roles, metadata."""
+    from scipy.io import savemat
+
+    columns: dict[str, Any] = {"time_s": {"name": "time", "unit": "s", "role": None}}
+    variables: dict[str, Any] = {"time_s": recording.time_s[:, None]}
+    for index, channel in enumerate(recording.channels.values()):
+        name = column_name(channel)
+        if not (name.isidentifier() and name.isascii() and len(name) <= 63 and not name.startswith("_")):
+            name = f"channel_{index + 1}"  # MATLAB's names are letters, digits and _ only
+        variables[name] = channel.with_nan()[:, None]
+        columns[name] = {"name": channel.name, "unit": channel.unit.symbol, "role": channel.role}
+    about = {
+        "name": recording.name,
+        "unit": recording.unit,
+        "metadata": dict(recording.metadata),
+        "columns": columns,
+    }
+    variables["smartshoe"] = json.dumps(about)
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        savemat(file, variables, do_compression=True)
+
+
+FORMAT = Format("matlab", (".mat",), _sniff, read, write)

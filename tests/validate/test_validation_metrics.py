@@ -1,0 +1,37 @@
+"""Figures of merit and segments on cases whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.validation import metrics, segments
+
+
+@settings(max_examples=20)
+@given(a=st.floats(0.1, 1e3), b=st.floats(0.1, 1e3))
+def test_an_ellipse_encloses_pi_a_b(a, b):
+    angle = np.linspace(0.0, 2 * np.pi, 2000, endpoint=False)
+    # A polygon of n corners in an ellipse lacks 2 pi^2 / (3 n^2) of its area.
+    assert metrics.loop_area(a * np.cos(angle), b * np.sin(angle)) == pytest.approx(np.pi * a * b, rel=2e-6)
+
+
+@settings(max_examples=20)
+@given(
+    rates=st.lists(st.sampled_from([50.0, 100.0, 200.0, 400.0, 600.0, 800.0]), min_size=1, max_size=4),
+    noise_n=st.floats(0.0, 5.0),
+    seed=st.integers(0, 2**31),
+)
+def test_drawn_rates_are_recovered_from_noisy_triangles(rates, noise_n, seed):
+    at, load = [0.0], [0.0]
+    for rate in rates:
+        start = at[-1] + 2.0
+        at += [start, start + 800.0 / rate, start + 1600.0 / rate]
+        load += [0.0, 800.0, 0.0]
+    time_s = np.arange(0.0, at[-1] + 2.0, 0.01)
+    noisy = np.interp(time_s, at, load) + np.random.default_rng(seed).normal(0.0, noise_n, time_s.size)
+    found = segments.cycles(time_s, noisy)
+    # Two end samples of sd 5 N each over 640 N: 1.1 % of rate sd a ramp; four and more of those.
+    assert [cycle.rate_n_per_s for cycle in found] == pytest.approx(rates, rel=0.05)
