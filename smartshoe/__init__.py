@@ -20,20 +20,20 @@ _HOME = {
     "write": "smartshoe.logs",
     "open_shoe": "smartshoe.devices",
     "open_machine": "smartshoe.devices",
-    "identify": "smartshoe.identify",
-    "Identification": "smartshoe.identify",
-    "Calibration": "smartshoe.compensate",
-    "Compensator": "smartshoe.compensate",
-    "stack": "smartshoe.compensate",
+    "identify": "smartshoe.identification",
+    "Identification": "smartshoe.identification",
+    "Calibration": "smartshoe.compensation",
+    "Compensator": "smartshoe.compensation",
+    "stack": "smartshoe.compensation",
     "validate": "smartshoe.validation",
     "SmartShoeError": "smartshoe.errors",
 }
 
 if TYPE_CHECKING:
-    from smartshoe.compensate import Calibration, Compensator, stack
+    from smartshoe.compensation import Calibration, Compensator, stack
     from smartshoe.devices import open_machine, open_shoe
     from smartshoe.errors import SmartShoeError
-    from smartshoe.identify import Identification, identify
+    from smartshoe.identification import Identification, identify
     from smartshoe.logs import read, write
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording

@@ -25,7 +25,7 @@ def command(
     unit: str | None,
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
-    from smartshoe.compensate import Calibration, compensate
+    from smartshoe.compensation import Calibration, compensate
     from smartshoe.logs import write
 
     calibration = Calibration.load(calibration_path)

@@ -50,7 +50,7 @@ def command(
 ) -> None:
     """Identify one unit from one or more experiments (one FILE each)."""
     from smartshoe.cli.output import emit_json
-    from smartshoe.identify import identify
+    from smartshoe.identification import identify
     from smartshoe.report.tables import print_identification
 
     recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)

@@ -26,7 +26,7 @@ def command(
 ) -> None:
     """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
     from smartshoe.cli.output import emit_json
-    from smartshoe.compensate import Calibration
+    from smartshoe.compensation import Calibration
     from smartshoe.report.tables import print_validation
     from smartshoe.validation import validate
 

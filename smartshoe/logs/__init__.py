@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import importlib
-import importlib.util
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -14,8 +13,7 @@ from smartshoe.logs.sheet import Format
 from smartshoe.recording import Recording
 
 # The order in which formats are asked: those with an unmistakable beginning first, any delimited text last.
-_MODULES: tuple[str, ...] = ("tdms", "labview", "matlab", "hdf5", "plain", "bluehill", "foreign")
-_MODULES = tuple(m for m in _MODULES if importlib.util.find_spec("smartshoe.logs." + m))  # TEMPORARY
+_MODULES = ("tdms", "labview", "matlab", "hdf5", "plain", "bluehill", "foreign")
 _HEAD_BYTES = 1 << 16
 
 

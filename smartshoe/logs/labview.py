@@ -13,6 +13,9 @@ from smartshoe.recording import Recording
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
+# Keys of the header that say how the file is laid out, not what was measured.
+_LAYOUT = {"LabVIEW Measurement", "Writer_Version", "Reader_Version", "Separator", "Decimal_Separator",
+           "Multi_Headings", "X_Columns", "Time_Pref"}  # fmt: skip
 _SEPARATORS = {"tab": "\t", "comma": ",", "space": " "}
 
 
@@ -82,7 +85,7 @@ def read(path: Path) -> Sheet:
         raise FormatError(f"{path}, line {len(lines)}: the header has no end: export the file again")
     separator = _SEPARATORS.get(general.get("Separator", "Tab").casefold(), "\t")
     x_columns = general.get("X_Columns", "One").casefold()
-    sheet = Sheet(path, "labview", [], dict(general))
+    sheet = Sheet(path, "labview", [], {key: value for key, value in general.items() if key not in _LAYOUT})
     at += 1
     segments: list[list[Column]] = []
     while True:
@@ -207,9 +210,8 @@ def write(recording: Recording, path: Path) -> None:
     metadata = {**recording.metadata, "smartshoe_name": recording.name}
     if recording.unit is not None:
         metadata["smartshoe_unit"] = recording.unit
-    known = {line.split("\t")[0] for line in lines}
     lines += [
-        f"{' '.join(key.split())}\t{' '.join(value.split())}" for key, value in metadata.items() if key not in known
+        f"{' '.join(key.split())}\t{' '.join(value.split())}" for key, value in metadata.items() if key not in _LAYOUT
     ]
     lines += [
         f"{_END}\t",

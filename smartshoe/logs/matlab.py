@@ -20,7 +20,7 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _flatten(name: str, value: Any) -> list[tuple[str, np.ndarray]]:
-    """Numeric arrays of a variable, structs opened up as NAME.FIELD, matrices as NAME_1, NAME_2, ..."""
+    """Numeric arrays of a variable, structs opened up as NAME.FIELD, matrices as NAME:1, NAME:2, ..."""
     array = np.asarray(value)
     if array.dtype.names:
         item = array.reshape(-1)[0] if array.size else None
@@ -37,7 +37,7 @@ def _flatten(name: str, value: Any) -> list[tuple[str, np.ndarray]]:
     if array.ndim == 2:
         if array.shape[0] < array.shape[1]:
             array = array.T
-        return [(f"{name}_{column + 1}", array[:, column].astype(float)) for column in range(array.shape[1])]
+        return [(f"{name}:{column + 1}", array[:, column].astype(float)) for column in range(array.shape[1])]
     return []
 
 

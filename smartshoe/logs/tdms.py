@@ -30,6 +30,12 @@ def _numbers(values: Any) -> np.ndarray | None:
     return None
 
 
+def _timing(channel: Any) -> tuple[float, float] | None:
+    """Start offset and step in s of a waveform channel; None for one that is none."""
+    step = float(channel.properties.get("wf_increment", 0.0))
+    return (float(channel.properties.get("wf_start_offset", 0.0)), step) if step > 0 else None
+
+
 def read(path: Path) -> Sheet:
     """Every numeric channel as a column; time from ``wf_increment``, a channel of time stamps, or else the index."""
     from nptdms import TdmsFile
@@ -50,24 +56,25 @@ def read(path: Path) -> Sheet:
     kept = [(group, channel, values) for group, channel, values in taken if values is not None and values.size]
     if not kept:
         raise FormatError(f"{path} holds no numbers: export channels of measured values")
+    timings = {_timing(channel) for _, channel, _ in kept} - {None}
+    if len(timings) > 1:
+        # Decimated copies beside the data (LabVIEW SignalExpress): the channels that go with the longest one stay.
+        longest = _timing(max(kept, key=lambda item: item[2].size)[1])
+        slower = [channel.name for _, channel, _ in kept if _timing(channel) != longest]
+        kept = [item for item in kept if _timing(item[1]) == longest]
+        sheet.notes.append(f"channels at another sample time were left out: {', '.join(slower)}")
+        timings = {longest}
     length = max(values.size for _, _, values in kept)
     if any(values.size != length for _, _, values in kept):
         sheet.notes.append(_PADDING)
     names = [channel.name for _, channel, _ in kept]
-    timings = {
-        (float(channel.properties.get("wf_start_offset", 0.0)), float(channel.properties["wf_increment"]))
-        for _, channel, _ in kept
-        if float(channel.properties.get("wf_increment", 0.0)) > 0
-    }
-    if len(timings) > 1:
-        raise FormatError(f"{path}: channels have different sample times; export them at one rate")
     stamps = [column for column, (_, channel, _) in enumerate(kept) if channel.dtype.kind == "M"]
     has_time = bool(stamps) or any(
         name.casefold() in ("time", "time_s") or str(channel.properties.get("unit_string", "")).casefold() in ("s", "ms")
         for name, (_, channel, _) in zip(names, kept, strict=True)
     )
     if timings and not has_time:
-        start, step = timings.pop()
+        start, step = timings.pop() or (0.0, 1.0)
         sheet.columns.append(Column("time", "s", start + step * np.arange(length)))
     elif not has_time:
         sheet.columns.append(Column("time", "s", np.arange(length, dtype=float)))

@@ -55,8 +55,10 @@ def _svg(figure: Figure) -> str:
 
 
 def _figure(width: float, height: float, columns: int, rows: int = 1) -> tuple[Figure, list[Any]]:
-    figure = Figure(figsize=(width, height), layout="tight")
+    figure = Figure(figsize=(width, height))
     axes = figure.subplots(rows, columns, squeeze=False)
+    # Fixed margins (in inches over the size): a tight layout would draw every text twice.
+    figure.subplots_adjust(0.75 / width, 0.45 / height, 1 - 0.15 / width, 1 - 0.3 / height, 0.25, 0.3)
     return figure, list(axes.ravel())
 
 

@@ -14,13 +14,13 @@ from smartshoe.report.numbers import plain, with_sd
 def _console() -> Console:
     console = Console(highlight=False)
     # Where nobody looks at the width (a pipe, a file) nothing may be cut.
-    return console if console.is_terminal else Console(highlight=False, width=140)
+    return console if console.is_terminal else Console(highlight=False, width=200)
 
 
 def _table(title: str, columns: Sequence[str]) -> Table:
     table = Table(title=title, title_justify="left", header_style="bold")
     for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index == 0 else "right", no_wrap=True)
+        table.add_column(column, min_width=len(column), justify="left" if index == 0 else "right", no_wrap=True)
     return table
 
 

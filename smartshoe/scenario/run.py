@@ -12,10 +12,10 @@ import numpy as np
 from pydantic import ValidationError
 
 import smartshoe
-from smartshoe.compensate import Calibration
+from smartshoe.compensation import Calibration
 from smartshoe.devices import open_machine
 from smartshoe.errors import LimitError, SmartShoeError
-from smartshoe.identify import Identification, identify
+from smartshoe.identification import Identification, identify
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording

@@ -30,15 +30,15 @@ def loop_area(load_n: Array, estimate_n: Array) -> float:
     return float(0.5 * abs(np.dot(load_n, np.roll(estimate_n, -1)) - np.dot(estimate_n, np.roll(load_n, -1))))
 
 
-def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_down: Array) -> float:
-    """Largest difference in N between loading and unloading estimate at equal load.
+def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_down: Array) -> float | None:
+    """Largest difference in N between loading and unloading estimate at equal load; None where no load is shared.
 
     Both branches are averaged in bins of load, so that the noise of single samples does not set the figure.
     """
     low = max(load_up.min(), load_down.min())
     high = min(load_up.max(), load_down.max())
     if high <= low:
-        return 0.0
+        return None
     edges = np.linspace(low, high, 21)
 
     def branch(load: Array, estimate: Array) -> Array:
@@ -49,17 +49,21 @@ def loop_width(load_up: Array, estimate_up: Array, load_down: Array, estimate_do
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
     difference = np.abs(branch(load_up, estimate_up) - branch(load_down, estimate_down))
-    return float(np.nanmax(difference)) if np.isfinite(difference).any() else 0.0
+    return float(np.nanmax(difference)) if np.isfinite(difference).any() else None
 
 
 def delay_s(load_n: Array, estimate_n: Array, sample_time_s: float) -> float | None:
-    """Time by which the estimate trails the load: least squares of (estimate - load) on -d(load)/dt.
+    """Time by which the estimate trails the load: least squares of the estimate on load, slope of the load and one.
 
-    The first-order expansion of a shift, good while the delay is short beside the ramps; None without a slope.
+    The first-order expansion of a shift, good while the delay is short beside the ramps; gain and offset have terms
+    of their own, so that they do not pass for a delay. None where the load does not move.
     """
     slope = np.gradient(load_n, sample_time_s)
-    centred = slope - slope.mean()
-    power = float(np.dot(centred, centred))
-    if power == 0.0:
+    design = np.column_stack([load_n, slope, np.ones_like(load_n)])
+    scale = np.abs(design).max(axis=0)
+    if scale[1] == 0.0 or scale[0] == 0.0:
         return None
-    return float(-np.dot(centred, estimate_n - load_n) / power)
+    (gain, lag, _), _, rank, _ = np.linalg.lstsq(design / scale, estimate_n, rcond=None)
+    if rank < 3 or gain == 0.0:
+        return None
+    return float(-(lag / scale[1]) / (gain / scale[0]))

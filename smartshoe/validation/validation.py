@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.compensate import Calibration, compensate
+from smartshoe.compensation import Calibration, compensate
 from smartshoe.errors import InputError
 from smartshoe.recording import Recording
 from smartshoe.validation import metrics
@@ -162,7 +162,7 @@ def _judge(
             up, down = slice(c.up.start, c.up.stop), slice(c.down.start, c.down.stop)
             signal = getattr(t, name)
             each.append(metrics.loop_width(t.load_n[up], signal[up], t.load_n[down], signal[down]))
-        mean = _mean(each)
+        mean = _mean([value for value in each if value is not None])
         return None if mean is None else 100.0 * mean / full_scale_n
 
     def areas(name: str) -> float | None:

@@ -1,6 +1,6 @@
 """From readings to force: a calibration, its filters, and banks of them."""
 
-from smartshoe.compensate.calibration import Calibration, compensate
-from smartshoe.compensate.compensator import Compensator, CompensatorBank, stack
+from smartshoe.compensation.calibration import Calibration, compensate
+from smartshoe.compensation.compensator import Compensator, CompensatorBank, stack
 
 __all__ = ["Calibration", "Compensator", "CompensatorBank", "compensate", "stack"]

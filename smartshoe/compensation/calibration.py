@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from smartshoe.atomic import write_text
-from smartshoe.compensate.compensator import Compensator
+from smartshoe.compensation.compensator import Compensator
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.models.first_order import simulate, steps
 from smartshoe.models.parameter import Parameter, finite_or_none

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identify.experiment import Array, Experiment
-from smartshoe.identify.prediction_error import LARGEST_DELAY_S, Settings
+from smartshoe.identification.experiment import Array, Experiment
+from smartshoe.identification.prediction_error import LARGEST_DELAY_S, Settings
 from smartshoe.models.first_order import lag, shifted, steps
 
 

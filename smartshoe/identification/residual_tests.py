@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.identify.experiment import Array
+from smartshoe.identification.experiment import Array
 from smartshoe.models.parameter import finite_or_none
 
 Mask = NDArray[np.bool_]

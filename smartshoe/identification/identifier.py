@@ -8,12 +8,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
-from smartshoe.identify.experiment import Array, Direction, Experiment, prepare
-from smartshoe.identify.identification import Identification
-from smartshoe.identify.prediction_error import EDGE_SAMPLES, LARGEST_DELAY_S, PredictionError, Settings, Structure
-from smartshoe.identify.residual_tests import input_independence, whiteness
-from smartshoe.identify.solve import Solver, linear_start, solve
-from smartshoe.identify.srivc import coarse_delay, srivc
+from smartshoe.identification.experiment import Array, Direction, Experiment, prepare
+from smartshoe.identification.identification import Identification
+from smartshoe.identification.prediction_error import EDGE_SAMPLES, LARGEST_DELAY_S, PredictionError, Settings, Structure
+from smartshoe.identification.residual_tests import input_independence, whiteness
+from smartshoe.identification.solve import Solver, linear_start, solve
+from smartshoe.identification.srivc import coarse_delay, srivc
 from smartshoe.models import X_OVER_NRT, Parameter
 from smartshoe.recording import Recording
 from smartshoe.units import Unit

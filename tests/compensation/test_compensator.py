@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.compensate import Calibration, Compensator, compensate, stack
+from smartshoe.compensation import Calibration, Compensator, compensate, stack
 from smartshoe.errors import InputError, UnitError, UsageError
 from smartshoe.models import Parameter, discretise
 from smartshoe.models.discretise import run_plainly

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.compensate import Calibration, Compensator
-from smartshoe.identify.experiment import Array, Direction
-from smartshoe.identify.residual_tests import ResidualTest
+from smartshoe.compensation import Calibration, Compensator
+from smartshoe.identification.experiment import Array, Direction
+from smartshoe.identification.residual_tests import ResidualTest
 from smartshoe.models import Parameter, StandardLinearSolid, discretise
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.units import Unit

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.identify.experiment import Array, Direction, Experiment
+from smartshoe.identification.experiment import Array, Direction, Experiment
 from smartshoe.models.first_order import lag, lag_and_slope, shifted
 
 Structure = Literal["free", "grey_box"]

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identify.experiment import Array
-from smartshoe.identify.prediction_error import LARGEST_DELAY_S, PredictionError
+from smartshoe.identification.experiment import Array
+from smartshoe.identification.prediction_error import LARGEST_DELAY_S, PredictionError
 
 Solver = Literal["gn", "lm", "trf"]
 

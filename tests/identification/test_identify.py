@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
-from smartshoe.identify import identify
-from smartshoe.identify.experiment import prepare
-from smartshoe.identify.prediction_error import PredictionError, Settings
+from smartshoe.identification import identify
+from smartshoe.identification.experiment import prepare
+from smartshoe.identification.prediction_error import PredictionError, Settings
 from smartshoe.models import X_OVER_NRT
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Recording
