@@ -37,10 +37,11 @@ def column_options(command: _F) -> _F:
 def read_all(
     files: Sequence[str], *, time: str | None, force: str | None, sensors: Sequence[str], unit: str | None
 ) -> list[Recording]:
-    """Every file as a recording; what the readers did is said on stderr."""
+    """Every experiment as a recording; a machine's log and a data logger's are joined. Notes go to stderr."""
     from smartshoe.cli.output import show_notes
+    from smartshoe.devices.joining import join_pairs
     from smartshoe.logs import read
 
-    recordings = [read(file, time=time, force=force, sensors=list(sensors), unit=unit) for file in files]
+    recordings = join_pairs([read(file, time=time, force=force, sensors=list(sensors), unit=unit) for file in files])
     show_notes(recordings)
     return recordings

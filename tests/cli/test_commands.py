@@ -170,7 +170,7 @@ def test_help_imports_nothing_heavy() -> None:
 def test_the_pneumatic_actuators_file_is_identified_and_judged(
     measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Circle_3bar: no header, tabs, milliseconds; displacement as the sensor, load cell as the force."""
+    """Circle_3bar: no header, tabs, milliseconds; supply pressure as the sensor, load cell as the force."""
     file = str(measured / "pneumatic_actuator_friction_leak" / "friction" / "Circle_3bar.csv")
     columns = ["--time", "1[ms]", "--force", "7[N]", "--sensor", "6[bar]"]
     calibration = str(tmp_path / "c.json")
@@ -179,8 +179,8 @@ def test_the_pneumatic_actuators_file_is_identified_and_judged(
     assert found["parameters"]["b0"]["unit"] == "N/bar"
     assert run_command(["validate", file, *columns, "--calibration", calibration, "--json", "-"]) == 0
     judged = json.loads(capsys.readouterr().out)
-    # NOTES of that data: within one file the force loops by 15-20 N about a line; the filter cannot be worse.
-    assert 1.0 < judged["overall"]["rmse_compensated_n"] <= judged["overall"]["rmse_static_n"] * 1.001 < 20.0
+    # The filter with a free zero contains the static line, so on its own data it cannot be worse.
+    assert 0.0 < judged["overall"]["rmse_compensated_n"] <= judged["overall"]["rmse_static_n"]
 
 
 def test_recording_of_the_contract_reads_back(tmp_path: Path) -> None:

@@ -1,0 +1,112 @@
+"""Recordings played back through the same calls as live devices, with their own time stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.devices.base import Bladder, Block, ChannelDescription, Shoe
+from smartshoe.errors import DeviceError, MissingChannelError, UnitError, UsageError
+from smartshoe.logs import read
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+class ReplayedShoe(Shoe):
+    """A shoe's recording as a stream of blocks; nothing sleeps."""
+
+    def __init__(self, recording: Recording, block_samples: int = 20) -> None:
+        super().__init__()
+        if not recording.sensors:
+            raise MissingChannelError(f"{recording.label} has no readings of a shoe: name them with --sensor")
+        units = {channel.unit for channel in recording.sensors}
+        if len(units) > 1:
+            raise UnitError(
+                f"{recording.label}: readings are in {', '.join(sorted(u.symbol for u in units))}; convert them to one"
+            )
+        if block_samples < 1:
+            raise UsageError(f"block_samples is {block_samples}: give 1 or more")
+        self.recording = recording
+        self.block_samples = block_samples
+
+    def __str__(self) -> str:
+        return f"replay {self.recording.label}"
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """One over the recording's median step."""
+        return self.recording.sample_rate_hz
+
+    def describe(self) -> tuple[ChannelDescription, ...]:
+        """The recording's sensors."""
+        return tuple(
+            ChannelDescription(c.name, c.unit.quantity, c.unit, c.range_, c.resolution, self.sample_rate_hz)
+            for c in self.recording.sensors
+        )
+
+    def _blocks_internal(self) -> Iterator[Block]:
+        sensors = self.recording.sensors
+        readings = np.column_stack([channel.values for channel in sensors])
+        missing = np.column_stack([~channel.present for channel in sensors])
+        names = tuple(channel.name for channel in sensors)
+        for start in range(0, len(self.recording), self.block_samples):
+            span = slice(start, start + self.block_samples)
+            yield Block(self.recording.time_s[span], readings[span], missing[span], names, sensors[0].unit)
+
+
+class RecordedBladder(Bladder):
+    """A bladder as it was measured: it answers the load history that was recorded, and no other."""
+
+    def __init__(self, recording: Recording, tolerance_n: float = 5.0) -> None:
+        self.recording = recording
+        self.tolerance_n = tolerance_n
+        self._load_n, self._pressure_pa = recording.force_n, recording.pressure_pa
+        self._elapsed_s = 0.0
+
+    def reset(self) -> None:
+        """Back to the recording's first sample."""
+        self._elapsed_s = 0.0
+
+    def press(self, load_n: Array, sample_rate_hz: float) -> Array:
+        """The recorded pressure (n,) in Pa; raises `DeviceError` where the load is not the recorded one."""
+        begin = self.recording.time_s[0] + self._elapsed_s
+        time_s = begin + np.arange(load_n.size) / sample_rate_hz
+        if load_n.size and time_s[-1] > self.recording.time_s[-1] + 1.0 / sample_rate_hz:
+            raise DeviceError(f"{self.recording.label} ends before the load that was asked for: press for less long")
+        recorded_n = np.interp(time_s, self.recording.time_s, self._load_n)
+        apart = np.abs(recorded_n - load_n)
+        if load_n.size and apart.max() > self.tolerance_n:
+            at = int(np.argmax(apart))
+            raise DeviceError(
+                f"{self.recording.label} was pressed with {recorded_n[at]:.1f} N at {time_s[at]:.3f} s, not with"
+                f" {load_n[at]:.1f} N: a recording answers only its own load"
+            )
+        self._elapsed_s += load_n.size / sample_rate_hz
+        return np.interp(time_s, self.recording.time_s, self._pressure_pa)
+
+
+class _Provider:
+    """``replay:FILE?block_samples=20&time=...``."""
+
+    def open_shoe(
+        self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
+    ) -> ReplayedShoe:
+        """The recording at ``target`` as a shoe; ``rng`` is not used."""
+        given = dict(options or {})
+        samples = given.pop("block_samples", 20)
+        columns = {key: given.pop(key) for key in ("time", "unit") if key in given}
+        if given:
+            raise UsageError(f"replay:{target} has no option {sorted(given)[0]!r}; use block_samples, time and unit")
+        try:
+            count = int(samples)
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"replay:{target}: block_samples is {samples!r}; give a whole number") from error
+        return ReplayedShoe(read(Path(target), **columns), count)
+
+
+provider = _Provider()
