@@ -58,8 +58,8 @@ def _coarse(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> tu
 def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alignment:
     """Delay and clock rate between two logs of one load, with error bars.
 
-    A coarse search, then Gauss-Newton on signal(t) = offset + gain load(t + delay + rate (t - middle)). The rate is
-    left at zero where it is less than three sds away from it. Raises `InputError` where the two do not correlate.
+    A coarse search, then Gauss-Newton on signal(t) = offset + gain load(t + delay + rate (t - middle)). Raises
+    `InputError` where the two do not correlate.
     """
     delay, correlation = _coarse(machine_s, load, logger_s, signal)
     if abs(correlation) < LEAST_CORRELATION:
@@ -68,39 +68,27 @@ def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alig
         )
     slope = np.gradient(load, machine_s)
     middle = 0.5 * (logger_s[0] + logger_s[-1])
-
-    def refine(delay: float, with_rate: bool) -> tuple[float, float, float, float]:
-        rate = 0.0
-        sd = np.zeros(2)
-        for _ in range(ITERATIONS):
-            at = logger_s + delay + rate * (logger_s - middle)
-            inside = (at >= machine_s[0]) & (at <= machine_s[-1])
-            moved, tilt = np.interp(at[inside], machine_s, load), np.interp(at[inside], machine_s, slope)
-            columns = [np.ones_like(moved), moved, tilt]
-            if with_rate:
-                columns.append(tilt * (logger_s[inside] - middle))
-            design = np.column_stack(columns)
-            scale = np.abs(design).max(axis=0)
-            scale[scale == 0.0] = 1.0
-            found, _, _, _ = np.linalg.lstsq(design / scale, signal[inside], rcond=None)
-            error = signal[inside] - design @ (found / scale)
-            found = found / scale
-            if found[1] == 0.0:
-                break
-            variance = float(error @ error) / max(inside.sum() - design.shape[1], 1)
-            covariance = np.linalg.pinv((design / scale).T @ (design / scale)) * variance / np.outer(scale, scale)
-            sd = np.sqrt(np.diag(covariance))[2:] / abs(found[1])
-            change = found[2:] / found[1]
-            delay += float(change[0])
-            rate += float(change[1]) if with_rate else 0.0
-            if np.all(np.abs(change) <= 1e-3 * sd):
-                break
-        return delay, float(sd[0]), rate, float(sd[1]) if with_rate else 0.0
-
-    with_rate = refine(delay, True)
-    if abs(with_rate[2]) < 3.0 * with_rate[3]:
-        with_rate = refine(delay, False)
-    return Alignment(*with_rate, correlation)
+    rate = 0.0
+    sd = np.zeros(2)
+    for _ in range(ITERATIONS):
+        at = logger_s + delay + rate * (logger_s - middle)
+        inside = (at >= machine_s[0]) & (at <= machine_s[-1])
+        moved, tilt = np.interp(at[inside], machine_s, load), np.interp(at[inside], machine_s, slope)
+        design = np.column_stack([np.ones_like(moved), moved, tilt, tilt * (logger_s[inside] - middle)])
+        scale = np.abs(design).max(axis=0)
+        scale[scale == 0.0] = 1.0
+        found = np.linalg.lstsq(design / scale, signal[inside], rcond=None)[0] / scale
+        error = signal[inside] - design @ found
+        if found[1] == 0.0:
+            break
+        variance = float(error @ error) / max(inside.sum() - design.shape[1], 1)
+        covariance = np.linalg.pinv((design / scale).T @ (design / scale)) * variance / np.outer(scale, scale)
+        sd = np.sqrt(np.diag(covariance))[2:] / abs(found[1])
+        change = found[2:] / found[1]
+        delay, rate = delay + float(change[0]), rate + float(change[1])
+        if np.all(np.abs(change) <= 1e-3 * sd):
+            break
+    return Alignment(delay, float(sd[0]), rate, float(sd[1]), correlation)
 
 
 def join(machine_log: Recording, logger_log: Recording) -> Recording:

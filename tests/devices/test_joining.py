@@ -1,0 +1,68 @@
+"""Two logs of one test come onto one time base, with an error bar that holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.devices.joining import align, join, join_pairs
+from smartshoe.errors import InputError
+from smartshoe.protocol import dynamic_protocol
+from smartshoe.recording import Recording
+
+PROTOCOL = dynamic_protocol((100.0, 400.0, 800.0), rest_s=2.0)
+
+
+def _logs(delay_s: float, rate: float, noise: float, seed: int) -> tuple[Recording, Recording]:
+    rng = np.random.default_rng(seed)
+    machine_s = np.arange(0, PROTOCOL.duration_s, 0.01)
+    logger_s = np.arange(0, PROTOCOL.duration_s - 1.0, 0.01)
+    middle = 0.5 * (logger_s[0] + logger_s[-1])
+    at = logger_s + delay_s + rate * (logger_s - middle)
+    load = PROTOCOL.load_at(at)
+    machine = Recording.from_arrays(
+        time_s=machine_s, force_n=PROTOCOL.load_at(machine_s) + rng.normal(0, noise, machine_s.size), name="machine"
+    )
+    logger = Recording.from_arrays(
+        time_s=logger_s, load_v=0.1 + load / 200 + rng.normal(0, noise / 200, load.size), pressure_v=0.5 + load / 400
+    )
+    return machine, logger
+
+
+@settings(max_examples=15)
+@given(st.floats(-0.4, 0.9), st.sampled_from([0.0, 2e-4, -1e-4]), st.floats(0.1, 2.0), st.integers(0, 1000))
+def test_delay_and_clock_rate_are_recovered_within_their_error(
+    delay_s: float, rate: float, noise: float, seed: int
+) -> None:
+    machine, logger = _logs(delay_s, rate, noise, seed)
+    found = align(machine.time_s, machine.force_n, logger.time_s, logger["load"].values)
+    # Corners between samples and noise on the regressor add to the formal error; a tenth of a sample covers them.
+    assert found.delay_s == pytest.approx(delay_s, abs=6 * found.delay_sd_s + 1e-3)
+    assert found.rate == pytest.approx(rate, abs=6 * found.rate_sd + 3e-5)
+
+
+def test_a_joined_recording_has_load_and_reading_together() -> None:
+    machine, logger = _logs(0.35, 0.0, 0.3, 1)
+    joined = join(machine, logger)
+    # The reading is an exact line in the load; noise of the load cell is all that may be left.
+    line = np.polyfit(joined.sensor.values, joined.force_n, 1)
+    assert np.std(joined.force_n - np.polyval(line, joined.sensor.values)) < 0.6
+    assert any("joined" in note for note in joined.notes)
+
+
+def test_pairs_are_found_among_whole_recordings() -> None:
+    machine, logger = _logs(0.2, 0.0, 0.3, 2)
+    whole = join(machine, logger)
+    found = join_pairs([whole, machine, logger, whole])
+    assert len(found) == 3
+    assert all(len(recording.sensors) == 1 and recording.of_role("load") for recording in found)
+
+
+def test_logs_of_different_tests_are_refused() -> None:
+    machine, logger = _logs(0.2, 0.0, 0.3, 3)
+    rng = np.random.default_rng(0)
+    other = Recording.from_arrays(time_s=logger.time_s, pressure_v=rng.normal(0, 1, len(logger)))
+    with pytest.raises(InputError, match="one and the same test"):
+        join(machine, other)
