@@ -39,9 +39,7 @@ def check_lifecycle(device: Device) -> None:
         _require(len(described) > 0, device, "describe() names at least one channel")
         for channel in described:
             _require(bool(channel.name) and bool(channel.quantity), device, "each channel has a name and a quantity")
-            _require(
-                channel.unit.quantity == channel.quantity, device, f"{channel.name}'s unit is one of its quantity"
-            )
+            _require(channel.unit.quantity == channel.quantity, device, f"{channel.name}'s unit is one of its quantity")
             if channel.range_ is not None:
                 _require(channel.range_[0] <= channel.range_[1], device, f"{channel.name}'s range is in order")
     _require(not device.is_open, device, "leaving the with block closes the device")

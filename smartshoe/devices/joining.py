@@ -35,7 +35,8 @@ class Alignment:
     def machine_time(self, logger_time_s: Array) -> Array:
         """Logger time (n,) on the machine's clock."""
         middle = 0.5 * (logger_time_s[0] + logger_time_s[-1])
-        return logger_time_s + self.delay_s + self.rate * (logger_time_s - middle)
+        moved: Array = logger_time_s + self.delay_s + self.rate * (logger_time_s - middle)
+        return moved
 
 
 def _coarse(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> tuple[float, float]:

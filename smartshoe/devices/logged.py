@@ -95,13 +95,11 @@ class _Provider:
         """The log at ``target``; ``rng`` is not used, a log is what it is."""
         given = dict(options or {})
         logger = given.pop("daq", None)
-        columns = {key: given.pop(key) for key in ("time", "force", "unit") if key in given}
+        columns: dict[str, Any] = {key: given.pop(key) for key in ("time", "force", "unit") if key in given}
         if "sensor" in given:
             columns["sensors"] = [given.pop("sensor")]
         if given:
-            raise UsageError(
-                f"log:{target} has no option {sorted(given)[0]!r}; use daq, time, force, sensor and unit"
-            )
+            raise UsageError(f"log:{target} has no option {sorted(given)[0]!r}; use daq, time, force, sensor and unit")
         return LoggedMachine(Path(target), Path(logger) if logger else None, **columns)
 
 

@@ -87,7 +87,8 @@ class RecordedBladder(Bladder):
                 f" {load_n[at]:.1f} N: a recording answers only its own load"
             )
         self._elapsed_s += load_n.size / sample_rate_hz
-        return np.interp(time_s, self.recording.time_s, self._pressure_pa)
+        pressure_pa: Array = np.interp(time_s, self.recording.time_s, self._pressure_pa)
+        return pressure_pa
 
 
 class _Provider:

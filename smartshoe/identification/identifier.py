@@ -10,7 +10,13 @@ import numpy as np
 from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.experiment import Array, Direction, Experiment, prepare
 from smartshoe.identification.identification import Identification
-from smartshoe.identification.prediction_error import EDGE_SAMPLES, LARGEST_DELAY_S, PredictionError, Settings, Structure
+from smartshoe.identification.prediction_error import (
+    EDGE_SAMPLES,
+    LARGEST_DELAY_S,
+    PredictionError,
+    Settings,
+    Structure,
+)
 from smartshoe.identification.residual_tests import input_independence, whiteness
 from smartshoe.identification.solve import Solver, linear_start, solve
 from smartshoe.identification.srivc import coarse_delay, srivc

@@ -332,7 +332,7 @@ def recording_from(
         channel = _channel(sheet, names[position], column, final_units[position], final_roles[position], notes)
         if channel is None:
             continue
-        if channel.role == "load" and sheet.format in _MACHINE_LOGS:
+        if channel.role == "load" and column.role is None and sheet.format in _MACHINE_LOGS:
             turned = _compression_positive(channel)
             if turned is not channel:
                 notes.append(f"Column {column.name} logs compression as negative load; its sign was turned.")

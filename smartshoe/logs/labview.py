@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast, get_args
 
 import numpy as np
 
 from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError
 from smartshoe.logs.sheet import Column, Format, Sheet
-from smartshoe.recording import Recording
+from smartshoe.recording import Recording, Role
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -99,7 +100,9 @@ def read(path: Path) -> Sheet:
         raise FormatError(f"{path} has a header and no data: export the file again")
     names = [column.name for column in segments[0]]
     if any([column.name for column in columns] != names for columns in segments[1:]):
-        raise FormatError(f"{path} holds {len(segments)} segments with different channels: save them as files of their own")
+        raise FormatError(
+            f"{path} holds {len(segments)} segments with different channels: save them as files of their own"
+        )
     sheet.columns = segments[0]
     if len(segments) > 1:
         sheet.notes.append(f"{len(segments)} segments were put one after the other")
@@ -107,6 +110,11 @@ def read(path: Path) -> Sheet:
             column.values = np.concatenate([columns[position].values for columns in segments])
     sheet.recording_name = sheet.metadata.pop("smartshoe_name", None)
     sheet.unit_name = sheet.metadata.pop("smartshoe_unit", None)
+    roles = sheet.metadata.pop("smartshoe_roles", "").split()
+    for column, role in zip(sheet.columns[1:], roles, strict=False):
+        if role not in get_args(Role):
+            raise FormatError(f"{path}: smartshoe_roles names {role!r}: write the file again")
+        column.role = cast(Role, role)
     return sheet
 
 
@@ -163,7 +171,7 @@ def _segment(
         if len(timing) != 1:
             raise FormatError(f"{path}: channels have {len(timing)} sample times; export them at one rate")
         x0, dx = timing.pop()
-        time_s = x0 + dx * np.arange(len(rows))
+        time_s = np.asarray(x0 + dx * np.arange(len(rows)), dtype=float)
     else:
         time_s = table[0]
         if multi and any(not np.array_equal(table[2 * k], time_s, equal_nan=True) for k in range(1, channels)):
@@ -210,6 +218,7 @@ def write(recording: Recording, path: Path) -> None:
     metadata = {**recording.metadata, "smartshoe_name": recording.name}
     if recording.unit is not None:
         metadata["smartshoe_unit"] = recording.unit
+    metadata["smartshoe_roles"] = " ".join(channel.role for channel in channels)
     lines += [
         f"{' '.join(key.split())}\t{' '.join(value.split())}" for key, value in metadata.items() if key not in _LAYOUT
     ]
@@ -227,8 +236,7 @@ def write(recording: Recording, path: Path) -> None:
     ]
     signals = [recording.time_s.tolist(), *(channel.with_nan().tolist() for channel in channels)]
     lines += [
-        "\t".join("" if value != value else repr(value) for value in values)
-        for values in zip(*signals, strict=True)
+        "\t".join("" if value != value else repr(value) for value in values) for values in zip(*signals, strict=True)
     ]
     with replacing(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ def _load(path: Path) -> dict[str, Any]:
         return {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
     except NotImplementedError:  # level 7.3 is HDF5
         return _load_hdf5(path)
-    except (ValueError, OSError, TypeError, KeyError, EOFError, matlab.MatReadError) as error:
+    except (ValueError, OSError, TypeError, LookupError, EOFError, zlib.error, matlab.MatReadError) as error:
         raise FormatError(f"{path} is truncated or no MAT-file ({error}): save it again") from error
 
 
@@ -102,7 +103,7 @@ def read(path: Path) -> Sheet:
         scalars = {name.casefold(): float(values[0]) for name, values in arrays if values.size == 1}
         step = scalars.get("ts") or (1.0 / scalars["fs"] if scalars.get("fs") else None)
         if step is not None and step > 0:
-            sheet.columns.append(Column("time", "s", step * np.arange(length)))
+            sheet.columns.append(Column("time", "s", np.asarray(step * np.arange(length), dtype=float)))
     for name, values in vectors:
         if values.size != length:
             continue
@@ -135,7 +136,7 @@ def write(recording: Recording, path: Path) -> None:
     }
     variables["smartshoe"] = json.dumps(about)
     with replacing(path) as temporary, temporary.open("wb") as file:
-        savemat(file, variables, do_compression=True)
+        savemat(file, variables, do_compression=True)  # type: ignore[arg-type]  # any binary file will do
 
 
 FORMAT = Format("matlab", (".mat",), _sniff, read, write)

@@ -54,6 +54,9 @@ def read(path: Path) -> Sheet:
     if left_out:
         sheet.notes.append(f"channels that hold no numbers were left out: {', '.join(left_out)}")
     kept = [(group, channel, values) for group, channel, values in taken if values is not None and values.size]
+    own = any("smartshoe_role" in channel.properties for _, channel in raw)
+    if own and len({len(values) for _, _, values in taken if values is not None}) > 1:
+        raise FormatError(f"{path} is truncated: its channels end at different samples; write it again")
     if not kept:
         raise FormatError(f"{path} holds no numbers: export channels of measured values")
     timings = {_timing(channel) for _, channel, _ in kept} - {None}
@@ -70,12 +73,13 @@ def read(path: Path) -> Sheet:
     names = [channel.name for _, channel, _ in kept]
     stamps = [column for column, (_, channel, _) in enumerate(kept) if channel.dtype.kind == "M"]
     has_time = bool(stamps) or any(
-        name.casefold() in ("time", "time_s") or str(channel.properties.get("unit_string", "")).casefold() in ("s", "ms")
+        name.casefold() in ("time", "time_s")
+        or str(channel.properties.get("unit_string", "")).casefold() in ("s", "ms")
         for name, (_, channel, _) in zip(names, kept, strict=True)
     )
     if timings and not has_time:
         start, step = timings.pop() or (0.0, 1.0)
-        sheet.columns.append(Column("time", "s", start + step * np.arange(length)))
+        sheet.columns.append(Column("time", "s", np.asarray(start + step * np.arange(length), dtype=float)))
     elif not has_time:
         sheet.columns.append(Column("time", "s", np.arange(length, dtype=float)))
         sheet.metadata["time"] = "sample index"

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 LOAD, READING, RAW, COMPENSATED = "#1f2937", "#2563eb", "#d97706", "#059669"
 FEWEST, MOST = 300, 900
-_STYLE = {
+_STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "smartshoe",
     "font.family": "sans-serif",
@@ -49,7 +49,7 @@ def _thin(x: Array, *signals: Array) -> tuple[Array, ...]:
 
 def _svg(figure: Figure) -> str:
     buffer = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
     text = buffer.getvalue()
     return text[text.index("<svg") :]
 
@@ -111,14 +111,21 @@ def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.
         return _svg(figure)
 
 
-def bode(a1: float, b0: float, b1: float, rate_hz: float, numerator: Sequence[float], denominator: Sequence[float]) -> str:
+def bode(
+    a1: float, b0: float, b1: float, rate_hz: float, numerator: Sequence[float], denominator: Sequence[float]
+) -> str:
     """Gain and phase of (b0 s + b1)/(s + a1) and of its bilinear filter at ``rate_hz``; gait's band is shaded."""
     frequency = np.geomspace(max(a1 / (2 * np.pi) / 30, 1e-4), 0.499 * rate_hz, 200)
     s = 2j * np.pi * frequency
     z = np.exp(-s / rate_hz)
     shapes = (
         ((b0 * s + b1) / (s + a1), LOAD, "-", "identified"),
-        (np.polyval(numerator[::-1], z) / np.polyval(denominator[::-1], z), COMPENSATED, "--", f"filter at {rate_hz:g} Hz"),
+        (
+            np.polyval(numerator[::-1], z) / np.polyval(denominator[::-1], z),
+            COMPENSATED,
+            "--",
+            f"filter at {rate_hz:g} Hz",
+        ),
     )
     with mpl.rc_context(_STYLE):
         figure, (gain, phase) = _figure(9.6, 2.8, 2)

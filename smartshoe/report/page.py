@@ -55,7 +55,7 @@ def _drawn(unit: UnitReport) -> list[tuple[str, Markup]]:
         ("What compensation leaves", figures.residuals(unit.validation.traces)),
     ]
     # The SVG comes from matplotlib, which escapes the texts it draws.
-    return [(title, Markup(svg)) for title, svg in pictures if svg is not None]  # noqa: S704
+    return [(title, Markup(svg)) for title, svg in pictures if svg is not None]
 
 
 def write_page(path: Path, title: str, about: str, facts: Mapping[str, str], units: Sequence[UnitReport]) -> Path:

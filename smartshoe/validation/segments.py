@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ def ramps(time_s: Array, load_n: Array) -> list[Ramp]:
         return []
     found: list[Ramp] = []
     points = turning_points(load_n, LEAST_SPAN * span_n)
-    for first, last in zip(points, points[1:], strict=False):
+    for first, last in pairwise(points):
         if last <= first:
             continue
         part = load_n[first : last + 1]
@@ -98,11 +99,7 @@ def ramps(time_s: Array, load_n: Array) -> list[Ramp]:
 def cycles(time_s: Array, load_n: Array) -> list[Cycle]:
     """Each loading ramp with the unloading that follows it."""
     found = ramps(time_s, load_n)
-    return [
-        Cycle(up, down)
-        for up, down in zip(found, found[1:], strict=False)
-        if up.rate_n_per_s > 0 > down.rate_n_per_s
-    ]
+    return [Cycle(up, down) for up, down in pairwise(found) if up.rate_n_per_s > 0 > down.rate_n_per_s]
 
 
 def by_rate(found: list[Cycle]) -> dict[float, list[Cycle]]:

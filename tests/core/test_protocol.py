@@ -23,7 +23,10 @@ def test_static_protocol_is_the_papers() -> None:
 
 
 @given(
-    st.lists(st.floats(10, 900), min_size=1, max_size=5), st.floats(50, 1500), st.integers(1, 3), st.sampled_from([0.0, 0.5, 5.0])
+    st.lists(st.floats(10, 900), min_size=1, max_size=5),
+    st.floats(50, 1500),
+    st.integers(1, 3),
+    st.sampled_from([0.0, 0.5, 5.0]),
 )
 def test_dynamic_protocol_climbs_and_falls_at_each_rate(
     rates: list[float], peak: float, repeats: int, rest: float

@@ -39,7 +39,9 @@ def test_to_si_and_back_is_the_same_number(symbol: str, value: float) -> None:
     there = unit(symbol)
     back = there.from_si(there.to_si([value]))
     # Relative to the offset too: 273.15 K swallows the last digits of a tiny temperature.
-    assert back[0] == pytest.approx(value, rel=1e-14, abs=4 * np.spacing(there.offset / there.scale + abs(value)) + 1e-300)
+    assert back[0] == pytest.approx(
+        value, rel=1e-14, abs=4 * np.spacing(there.offset / there.scale + abs(value)) + 1e-300
+    )
 
 
 def test_other_quantities_do_not_convert() -> None:

@@ -17,7 +17,7 @@ from smartshoe.recording import Recording
 
 ENDINGS = ("lvm", "tdms", "mat", "h5")
 number = st.floats(-1e9, 1e9, allow_subnormal=False) | st.just(float("nan"))
-word = st.from_regex(r"[A-Za-z][A-Za-z0-9 ._]{0,11}[A-Za-z0-9]", fullmatch=True)
+word = st.from_regex(r"[A-Za-z][A-Za-z0-9._]{0,11}[A-Za-z0-9]", fullmatch=True)
 
 
 @st.composite
@@ -27,7 +27,7 @@ def recordings(draw: st.DrawFn) -> Recording:
 
     def signal() -> NDArray[np.float64]:
         # One sample at least is there: a channel without any is dropped on purpose.
-        return np.array([draw(st.floats(-1e6, 1e6))] + draw(st.lists(number, min_size=count - 1, max_size=count - 1)))
+        return np.array([draw(st.floats(-1e6, 1e6)), *draw(st.lists(number, min_size=count - 1, max_size=count - 1))])
 
     metadata = draw(st.dictionaries(word.map(lambda key: f"key {key}"), word, max_size=3))
     return Recording.from_arrays(
@@ -135,13 +135,8 @@ def test_truncated_files_are_refused_by_name(ending: str, tmp_path: Path) -> Non
     for keep in (40, len(raw) // 3):
         cut = tmp_path / f"cut{keep}.{ending}"
         cut.write_bytes(raw[:keep])
-        try:
-            recording = smartshoe.read(cut)
-        except InputError as error:
-            assert cut.name in str(error)
-        else:  # TDMS is made to be read up to where it ends: what comes out is then a true beginning
-            assert ending == "tdms"
-            np.testing.assert_array_equal(recording.force_n, values[: len(recording)])
+        with pytest.raises(InputError, match=cut.name):
+            smartshoe.read(cut)
 
 
 def test_pickles_are_never_opened(tmp_path: Path) -> None:

@@ -83,7 +83,14 @@ def test_each_figure_is_valid_svg_and_says_what_it_is(page: str) -> None:
 
 @pytest.mark.parametrize(
     ("value", "digits", "text"),
-    [(1234.5, 3, "1234"), (0.012345, 3, "0.0123"), (0, 3, "0"), (None, 3, "–"), (float("nan"), 3, "–"), (9.996, 3, "10.00")],
+    [
+        (1234.5, 3, "1234"),
+        (0.012345, 3, "0.0123"),
+        (0, 3, "0"),
+        (None, 3, "–"),
+        (float("nan"), 3, "–"),
+        (9.996, 3, "10.00"),
+    ],
 )
 def test_numbers_are_short(value: float | None, digits: int, text: str) -> None:
     assert plain(value, digits) == text
