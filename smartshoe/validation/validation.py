@@ -38,8 +38,8 @@ class RateResult:
     """Errors over the cycles of one loading rate (``rate_n_per_s`` None: over everything).
 
     ``improvement_percent`` is the paper's P%, which mixes the gain with the dynamics;
-    ``improvement_over_static_percent`` compares with the best static gain and offset. Hysteresis is the largest loading-unloading difference, and the loop
-    area over full scale squared, both in percent of the load's full scale.
+    ``improvement_over_static_percent`` compares with the best static gain and offset. Hysteresis is the largest
+    loading-unloading difference, and the loop area over full scale squared, both in percent of the load's full scale.
     """
 
     rate_n_per_s: float | None

@@ -71,7 +71,10 @@ def test_hdf5_opens_in_xarray(tmp_path: Path) -> None:
         assert dataset["force"].attrs["units"] == "N"
 
 
-HEAD = "LabVIEW Measurement\t\nWriter_Version\t{version}\nSeparator\tTab\n{mark}X_Columns\t{x}\n***End_of_Header***\t\n\t\n"
+HEAD = (
+    "LabVIEW Measurement\t\nWriter_Version\t{version}\nSeparator\tTab\n{mark}X_Columns\t{x}\n"
+    "***End_of_Header***\t\n\t\n"
+)
 LVM = {
     "version 0.92, no declared mark, X No, comma in Time": (
         HEAD.format(version="0.92", mark="", x="No")
