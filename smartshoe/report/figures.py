@@ -93,8 +93,9 @@ def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.
     owner = {id(cycle): trace for trace, cycle in found}
     chosen = sorted({min(groups, key=lambda rate: abs(rate - wanted)) for wanted in rates_n_per_s})
     with mpl.rc_context(_STYLE):
-        figure, axes = _figure(9.6, 3.4, len(chosen))
-        for axis, rate in zip(axes, chosen, strict=True):
+        figure, axes = _figure(9.6, 5.2, len(chosen), 2)
+        # Below each loop its distance from the load: a loop of one percent is no more than a thick line above.
+        for axis, distance, rate in zip(axes, axes[len(chosen) :], chosen, strict=False):
             cycle = groups[rate][-1]
             trace, span = owner[id(cycle)], slice(cycle.start, cycle.stop)
             load_n = trace.load_n[span]
@@ -104,9 +105,13 @@ def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.
                 (trace.compensated_n[span], COMPENSATED, "compensated"),
             ):
                 axis.plot(*_thin(np.arange(load_n.size, dtype=float), load_n, values)[1:], color=colour, label=label)
+                distance.plot(
+                    *_thin(np.arange(load_n.size, dtype=float), load_n, values - load_n)[1:], color=colour, lw=0.8
+                )
             axis.set_title(f"{rate:g} N/s")
-            axis.set_xlabel("load (N)")
+            distance.set_xlabel("load (N)")
         axes[0].set_ylabel("estimate (N)")
+        axes[len(chosen)].set_ylabel("estimate − load (N)")
         axes[0].legend(loc="upper left")
         return _svg(figure)
 
@@ -136,7 +141,7 @@ def bode(
             axis.axvspan(0.5, 5.0, color="#dbeafe", zorder=0, label="gait, 0.5–5 Hz" if axis is gain else None)
             axis.set_xlabel("frequency (Hz)")
             axis.set_ylabel(label)
-        gain.legend(loc="center left")
+        gain.legend(loc="upper left", fontsize=8)
         return _svg(figure)
 
 
