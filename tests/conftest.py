@@ -5,10 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-# As the command line does, before numpy is imported: small matrices lose by threads, the more so beside xdist's.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-os.environ.setdefault("MKL_NUM_THREADS", "1")
-
 import pytest
 from hypothesis import HealthCheck, settings
 

@@ -98,7 +98,4 @@ def run_command(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point of the ``smartshoe`` command."""
-    # The matrices here are a few columns wide: a BLAS that shares them out over threads is several times slower.
-    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     sys.exit(run_command(sys.argv[1:]))

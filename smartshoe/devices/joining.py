@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.blas import on_one_thread
 from smartshoe.errors import InputError
 from smartshoe.recording import Channel, Recording
 
@@ -56,6 +57,7 @@ def _coarse(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> tu
     return float(machine_s[0] - logger_s[0] + lag * step), float(product[best] / size)
 
 
+@on_one_thread
 def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alignment:
     """Delay and clock rate between two logs of one load, with error bars.
 

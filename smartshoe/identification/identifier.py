@@ -7,6 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from smartshoe.blas import on_one_thread
 from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.experiment import Array, Direction, Experiment, prepare
 from smartshoe.identification.identification import Identification
@@ -31,6 +32,7 @@ FALLBACK_POLES_RAD_S = (0.01, 0.1, 1.0, 10.0, 100.0)
 PERSISTENT_CONDITION = 1e-13
 
 
+@on_one_thread
 def identify(
     recordings: Recording | Sequence[Recording],
     *,

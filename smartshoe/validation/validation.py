@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.blas import on_one_thread
 from smartshoe.compensation import Calibration, compensate
 from smartshoe.errors import InputError
 from smartshoe.recording import Recording
@@ -84,6 +85,7 @@ class Validation:
         }
 
 
+@on_one_thread
 def validate(recordings: Recording | Sequence[Recording], calibration: Calibration) -> Validation:
     """Judge ``calibration`` on recordings with a reference load and one sensor each.
 
