@@ -1,13 +1,22 @@
-"""Small matrices on one thread: a BLAS that shares out a few columns over threads is several times slower."""
+"""Small matrices on one thread: a pool of threads costs more than their product."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
-from functools import wraps
-from typing import ParamSpec, TypeVar
+from functools import cache, wraps
+from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+@cache
+def _controller(with_scipy: bool) -> Any:
+    """The BLAS libraries loaded; looked for anew once SciPy has brought its own, since the search takes long."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
@@ -15,9 +24,7 @@ def on_one_thread(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def held(*args: P.args, **kwargs: P.kwargs) -> R:
-        from threadpoolctl import threadpool_limits
-
-        with threadpool_limits(limits=1, user_api="blas"):
+        with _controller("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
     return held

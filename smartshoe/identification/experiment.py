@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -36,15 +36,44 @@ class Experiment:
     reading: Array
     kept: Mask
     n_missing: int
-
-    def signals(self, direction: Direction) -> tuple[Array, Array]:
-        """Input and output of the direction: inverse reading -> load, forward load -> reading."""
-        return (self.reading, self.load_n) if direction == "inverse" else (self.load_n, self.reading)
+    command_n: Array | None = None
 
     @property
     def sample_time_s(self) -> float:
         """The even step, or the median of the uneven ones."""
         return self.step if isinstance(self.step, float) else float(np.median(self.step))
+
+    def decimated(self, factor: int) -> Experiment:
+        """Means of ``factor`` neighbours: a start for a fit, at a fraction of its cost."""
+        blocks = self.time_s.size // factor
+        if factor <= 1 or blocks < 2:
+            return self
+
+        time_s = block_means(self.time_s, factor)
+        return replace(
+            self,
+            time_s=time_s,
+            step=self.step * factor if isinstance(self.step, float) else np.diff(time_s),
+            load_n=block_means(self.load_n, factor),
+            reading=block_means(self.reading, factor),
+            kept=whole_blocks(self.kept, factor),
+        )
+
+
+def block_means(signal: Array, factor: int) -> Array:
+    """(n // factor,) means of ``factor`` neighbours; what does not fill a block is left out."""
+    blocks = signal[: signal.size // factor * factor].reshape(-1, factor)
+    # A product is many times faster than a mean over so short an axis.
+    means: Array = blocks @ np.full(factor, 1.0 / factor)
+    return means
+
+
+def whole_blocks(kept: Mask, factor: int) -> Mask:
+    """(n // factor,) whether all ``factor`` neighbours are kept."""
+    if kept.all():
+        return np.ones(kept.size // factor, dtype=bool)
+    whole: Mask = block_means(kept.astype(float), factor) > 1.0 - 0.5 / factor
+    return whole
 
 
 def _unique_names(recordings: Sequence[Recording]) -> list[str]:
@@ -57,19 +86,33 @@ def _unique_names(recordings: Sequence[Recording]) -> list[str]:
     return names
 
 
-def prepare(recordings: Sequence[Recording]) -> tuple[list[Experiment], Unit]:
+def prepare(
+    recordings: Sequence[Recording], counted: Mapping[str, Mask] | None = None
+) -> tuple[list[Experiment], Unit]:
     """The experiments and their common reading unit (the first recording's).
 
+    ``counted`` gives, by recording name, the samples (n,) whose error counts; all of them where a name is not given.
     Raises `UnitError` where a reading is of another quantity, `MissingChannelError` without load or reading,
     `NotIdentifiableError` where the signals cannot hold the answer, naming what is missing.
     """
     if not recordings:
         raise UsageError("identify was given no recording: give one at least")
     reading_unit = recordings[0].sensor.unit
+    names = _unique_names(recordings)
+    masks = dict(counted or {})
+    for name in masks:
+        if name not in names:
+            raise UsageError(f"counted names {name!r}, which is no recording here: use {', '.join(names)}")
     experiments = []
-    for recording, name in zip(recordings, _unique_names(recordings), strict=True):
+    for recording, name in zip(recordings, names, strict=True):
         load, sensor = recording.load, recording.sensor
-        kept = load.present & sensor.present
+        present = load.present & sensor.present
+        kept = present
+        if name in masks:
+            mask = np.asarray(masks[name], dtype=bool)
+            if mask.shape != present.shape:
+                raise UsageError(f"counted[{name!r}] has shape {mask.shape}: give one flag a sample, {present.shape}")
+            kept = present & mask
         time_s = recording.time_s - recording.time_s[0]
         experiments.append(
             Experiment(
@@ -79,7 +122,8 @@ def prepare(recordings: Sequence[Recording]) -> tuple[list[Experiment], Unit]:
                 _bridged(time_s, np.asarray(load.si, dtype=float), load.present),
                 _bridged(time_s, sensor.in_unit(reading_unit), sensor.present),
                 kept,
-                int(np.count_nonzero(~kept)),
+                int(np.count_nonzero(~present)),
+                recording.command_n,
             )
         )
     _require_identifiable(experiments, recordings)
@@ -100,17 +144,19 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
         raise NotIdentifiableError(
             f"{where} holds {count} samples with both load and reading: record {FEWEST_SAMPLES} at least"
         )
-    loads = [experiment.load_n[experiment.kept] for experiment in experiments]
-    readings = [experiment.reading[experiment.kept] for experiment in experiments]
+    counted = [experiment for experiment in experiments if experiment.kept.any()]
+    loads = [kept_of(experiment.load_n, experiment.kept) for experiment in counted]
+    readings = [kept_of(experiment.reading, experiment.kept) for experiment in counted]
     for what, signals in (("load", loads), ("reading", readings)):
-        largest = max((float(np.max(np.abs(signal))) for signal in signals if signal.size), default=0.0)
-        spread = max((float(np.ptp(signal)) for signal in signals if signal.size), default=0.0)
+        ends = [(float(signal.min()), float(signal.max())) for signal in signals]
+        largest = max(max(abs(low), abs(high)) for low, high in ends)
+        spread = max(high - low for low, high in ends)
         if spread <= 1e-12 * largest or spread == 0.0:
             raise NotIdentifiableError(
                 f"{where}: the {what} is constant, a single static level: record a load that rises and falls"
             )
-    ends = [(float(load.min()), float(load.max())) for load in loads if load.size]
-    span = max(end[1] for end in ends) - min(end[0] for end in ends)
+        if what == "load":
+            span = max(high for _, high in ends) - min(low for low, _ in ends)
     rise = max(_largest_rise(load) for load in loads)
     fall = max(_largest_rise(-load) for load in loads)
     if min(rise, fall) < LEAST_RETURN * span:
@@ -120,5 +166,13 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
         )
 
 
+def kept_of(signal: Array, kept: Mask) -> Array:
+    """``signal`` (n,) at the samples that count; itself where all do."""
+    return signal if kept.all() else signal[kept]
+
+
 def _largest_rise(signal: Array) -> float:
-    return float(np.max(signal - np.minimum.accumulate(signal))) if signal.size else 0.0
+    """The largest climb from an earlier sample; over means of a few samples where there are thousands."""
+    few = max(signal.size // 2000, 1)
+    coarse = block_means(signal, few) if few > 1 else signal
+    return float(np.max(coarse - np.minimum.accumulate(coarse)))

@@ -5,14 +5,18 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from smartshoe.compensation import Calibration, Compensator
+from smartshoe.errors import RefusedError
+from smartshoe.identification.consistency import ConsistencyTest, consistency_test
+from smartshoe.identification.estimator import Fit
 from smartshoe.identification.experiment import Array, Direction
-from smartshoe.identification.residual_tests import ResidualTest
+from smartshoe.identification.residual_tests import ResidualTest, residual_tests
 from smartshoe.models import Parameter, StandardLinearSolid, discretise
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.units import Unit
@@ -25,28 +29,30 @@ class Identification:
     """force / reading = (b0 s + b1)/(s + a1), Chinimilli 2016 (13), with its uncertainty.
 
     ``parameters`` a1, b0, b1 (readings in ``reading_unit``) and k1, k2, c, whatever the ``direction``, which says
-    only which signal's error was minimised; ``covariance`` (6, 6) in their order. By recording, ``offsets`` are the
-    readings at no load, ``initial_states`` the coefficients of the fading start, ``residuals`` measured minus model
-    (NaN where a sample did not count). ``delay_s`` is positive where the reading is later than the load. ``scale``
-    is N per reading unit of the paper's force. ``rmse`` in N (inverse) or reading units (forward).
+    only which signal's error was minimised, and the ``estimator``, which says what noise was allowed for;
+    ``covariance`` (6, 6) in their order. By recording, ``offsets`` are the readings at no load, ``load_offsets`` the
+    load cell's zero (one of the two is fixed), ``initial_states`` the coefficients of the fading start. ``delay_s`` is
+    positive where the reading is later than the load. ``noise`` is the white noise of load and reading, ``scale`` N
+    per reading unit of the paper's force. ``rmse`` in N (inverse) or reading units (forward).
     """
 
     unit: str
     direction: Direction
     method: str
     structure: str
+    estimator: str
     parameters: Mapping[str, Parameter]
     covariance: Array
     offsets: Mapping[str, Parameter]
+    load_offsets: Mapping[str, Parameter]
     delay_s: Parameter
     initial_states: Mapping[str, Parameter]
+    noise: Mapping[str, Parameter]
     fit_percent: float
-    fit_percent_by_recording: Mapping[str, float]
     rmse: float
     rmse_unit: str
     iterations: int
     converged: bool
-    residual_tests: Mapping[str, ResidualTest]
     sample_rate_hz: float
     reading_unit: Unit
     scale: float
@@ -54,9 +60,58 @@ class Identification:
     n_missing: int
     load_range_n: tuple[float, float]
     rate_range_n_per_s: tuple[float, float]
-    residuals: Mapping[str, Array] = field(default_factory=dict, repr=False)
-    sources: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    sources: tuple[str, ...]
+    remarks: tuple[str, ...]
+    fit: Fit = field(repr=False)
+
+    # -- what is left ----------------------------------------------------------------------------------------
+    @cached_property
+    def errors(self) -> Mapping[str, Array]:
+        """By recording, model minus measured (n,) at every sample, those that did not count too."""
+        problem = self.fit.problem
+        return {
+            experiment.name: problem.model_error(self.fit.theta, index)
+            for index, experiment in enumerate(problem.experiments)
+        }
+
+    @property
+    def residuals(self) -> Mapping[str, Array]:
+        """By recording, measured minus model (n,), NaN where a sample did not count."""
+        return {
+            name: np.where(kept, -error, np.nan)
+            for (name, error), kept in zip(self.errors.items(), self.fit.problem.kept, strict=True)
+        }
+
+    @property
+    def fit_percent_by_recording(self) -> Mapping[str, float]:
+        """``fit_percent`` of each recording."""
+        problem = self.fit.problem
+        return {
+            name: fit_percent(y[kept], error[kept])
+            for (name, error), y, kept in zip(self.errors.items(), problem.outputs, problem.kept, strict=True)
+        }
+
+    @cached_property
+    def residual_tests(self) -> Mapping[str, ResidualTest]:
+        """Whiteness, and independence of the input."""
+        return residual_tests(self.fit.problem, self.fit.theta, list(self.errors.values()))
+
+    @cached_property
+    def consistency(self) -> ConsistencyTest:
+        """Whether c = 1, the paper's two-parameter form, agrees with the three coefficients (free structure only)."""
+        if self.structure != "free":
+            raise RefusedError("a grey box holds c by itself: ask for the consistency of a free fit")
+        return consistency_test(self.coefficients, self.covariance[:3, :3], scale=self.scale)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of this result, one sentence each."""
+        if self.residual_tests["whiteness"].p_value < 0.01:
+            return (
+                *self.remarks,
+                "the residual is not white: the error bars hold for white noise only and are too small here",
+            )
+        return self.remarks
 
     @property
     def coefficients(self) -> tuple[float, float, float]:
@@ -155,8 +210,18 @@ class Identification:
             "n_missing": self.n_missing,
             "load_range_n": list(self.load_range_n),
             "rate_range_n_per_s": list(self.rate_range_n_per_s),
+            "estimator": self.estimator,
+            "load_offsets": {name: parameter.to_dict() for name, parameter in self.load_offsets.items()},
+            "noise": {name: parameter.to_dict() for name, parameter in self.noise.items()},
+            "consistency": self.consistency.to_dict() if self.structure == "free" else None,
             "notes": list(self.notes),
         }
+
+
+def fit_percent(y: Array, error: Array) -> float:
+    """100 (1 - ||error||/||y - mean y||), as MATLAB's compare has it."""
+    spread = float(np.linalg.norm(y - y.mean())) if y.size else 0.0
+    return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0 else float("nan")
 
 
 def _sha256(source: str) -> str | None:

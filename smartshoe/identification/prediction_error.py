@@ -1,123 +1,119 @@
 """The prediction error of the first-order model: one residual and one analytic gradient for every method.
 
 Written for an input u and an output y, as y = p1 (u - w) + p2 w + offset + h exp(-alpha t), where w = alpha/(s +
-alpha) u started in steady state. p1 is the gain at high frequency and p2 the static gain: far less correlated than
-the coefficients of Chinimilli 2016 (13), which are functions of (alpha, p1, p2).
+alpha) u started in steady state. `PredictionError.evaluate` takes one compiled pass over the data;
+`PredictionError.residual` and `jacobian` are its slow twin, and what the statistics are computed from.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smartshoe.identification.experiment import Array, Direction, Experiment
-from smartshoe.models.first_order import lag, lag_and_slope, shifted
+from smartshoe.identification.experiment import Array, Direction, Experiment, Mask, whole_blocks
+from smartshoe.identification.parametrisation import FreeForm, Parametrisation, Shape
+from smartshoe.identification.solve import Evaluation
+from smartshoe.identification.whitening import Whitening, whiten, whitening
+from smartshoe.models.first_order import (
+    HALF_WIDTH,
+    hold_coefficients,
+    hold_slopes,
+    interpolation_gain,
+    lag,
+    lag_and_slope,
+    shifted,
+)
 
-Structure = Literal["free", "grey_box"]
 LARGEST_DELAY_S = 0.5
-EDGE_SAMPLES = 3  # at either end, whose delayed input lies beyond the log
+EDGE_SAMPLES = HALF_WIDTH  # at either end, whose delayed input lies beyond the log
+COARSEST_STEP_S = 0.05
+IMPULSE_SAMPLES = 2048
+MOST_NOISE = 0.99  # of the gradient's inner products, in any direction of theta
+NONE = np.zeros(0)
+EVERY = np.zeros(0, dtype=bool)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is fitted: a float fixes a nuisance, None estimates it. ``offset`` in reading units, ``delay_s`` in s."""
+    """What is fitted: a float fixes a nuisance, None estimates it. ``offset`` in reading units, ``delay_s`` in s.
+
+    ``load_offset_n`` is the load's own zero; the free constant at the output stands for either. ``noise_ratio`` is
+    the variance of the input's noise over that of the output's (0: only the output is noisy).
+    """
 
     direction: Direction = "inverse"
-    structure: Structure = "free"
     offset: float | None = None
+    load_offset_n: float = 0.0
+    free_constant: bool = True
     delay_s: float | None = None
     steady: bool = False
-    stiffness: float = 1.0  # scale times X: newtons per reading unit and unit of k, for the grey box
+    noise_ratio: float = 0.0
 
 
 class PredictionError:
-    """Residual (model minus measured, kept samples only) and Jacobian over theta.
+    """Residual (model minus measured, counted samples only), whitened where the input is noisy too.
 
-    theta = (ln alpha, p1, p2) or, in the grey box, (ln a1, static gain), then the delay where it is estimated, then
-    one offset at the output and one initial state a recording where they are: all but the pole and the delay enter
-    the free form linearly. ``residual`` and ``jacobian`` share one pass.
+    theta = the parametrisation's unknowns, then the delay in s where it is estimated, then one constant at the output
+    and one initial state a recording where they are. All but the pole and the delay enter the free form linearly.
     """
 
-    def __init__(self, experiments: Sequence[Experiment], settings: Settings) -> None:
+    def __init__(
+        self, experiments: Sequence[Experiment], settings: Settings, form: Parametrisation | None = None
+    ) -> None:
         self.experiments, self.settings = list(experiments), settings
-        self.shape_size = 3 if settings.structure == "free" else 2
+        self.form: Parametrisation = form or FreeForm(settings.direction)
+        self.shape_size = self.form.size
         self.delay_at = self.shape_size if settings.delay_s is None else None
         at = self.shape_size + (self.delay_at is not None)
         count = len(self.experiments)
-        self.offset_at = at if settings.offset is None else None
-        at += count if settings.offset is None else 0
+        self.offset_at = at if settings.free_constant else None
+        at += count if settings.free_constant else 0
         self.state_at = at if not settings.steady else None
         self.size = at + (0 if settings.steady else count)
-        self.kept: list[NDArray[np.bool_]] = [experiment.kept for experiment in self.experiments]
+        low, high = self.form.bounds()
+        self.lower, self.upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        self.lower[: self.shape_size], self.upper[: self.shape_size] = low, high
+        if self.delay_at is not None:
+            self.lower[self.delay_at], self.upper[self.delay_at] = -LARGEST_DELAY_S, LARGEST_DELAY_S
+        self.kept: list[Mask] = [experiment.kept for experiment in self.experiments]
         if self.delay_at is not None:
             self.drop_edges(EDGE_SAMPLES)
-        self._key = b""
-        self._last: tuple[Array, Array] | None = None
+        self._pairs = [self._signals(experiment) for experiment in self.experiments]
+        self._coarse: PredictionError | None = None
+        self._delayed: tuple[float, list[tuple[Array, Array]]] | None = None
+
+    def _signals(self, experiment: Experiment) -> tuple[Array, Array]:
+        """Input and output with the fixed zeros taken out."""
+        load = experiment.load_n - self.settings.load_offset_n if self.settings.load_offset_n else experiment.load_n
+        zero = self.settings.offset or 0.0
+        reading = experiment.reading - zero if zero else experiment.reading
+        return (reading, load) if self.settings.direction == "inverse" else (load, reading)
 
     # -- parameters ------------------------------------------------------------------------------------------
-    def shape(self, theta: Array) -> tuple[float, float, float, Array]:
-        """alpha, p1, p2 and d(ln alpha, p1, p2)/d(shape parameters) (3, k)."""
-        if self.settings.structure == "free":
-            return float(np.exp(theta[0])), float(theta[1]), float(theta[2]), np.eye(3)
-        a1, static = float(np.exp(theta[0])), float(theta[1])
-        spring = self.settings.stiffness * a1
-        b0 = static + spring
-        if self.settings.direction == "inverse":
-            return a1, b0, static, np.array([[1.0, 0.0], [spring, 1.0], [0.0, 1.0]])
-        slope = np.array(
-            [
-                [1 - spring / b0, 1 / static - 1 / b0],
-                [-spring / b0**2, -1 / b0**2],
-                [0.0, -1 / static**2],
-            ]
-        )
-        return abs(static * a1 / b0), 1 / b0, 1 / static, slope
+    def shape(self, theta: Array) -> Shape:
+        """The response at ``theta``."""
+        return self.form.shape(theta[: self.shape_size])
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
-        """(a1, b0, b1) of Chinimilli 2016 (13) and their Jacobian (3, k) over the shape parameters."""
-        if self.settings.structure == "grey_box":
-            a1, static = float(np.exp(theta[0])), float(theta[1])
-            spring = self.settings.stiffness * a1
-            values = np.array([a1, static + spring, static * a1])
-            return values, np.array([[a1, 0.0], [spring, 1.0], [static * a1, a1]])
-        alpha, p1, p2 = float(np.exp(theta[0])), float(theta[1]), float(theta[2])
-        if self.settings.direction == "inverse":
-            return np.array([alpha, p1, p2 * alpha]), np.array([[alpha, 0, 0], [0, 1, 0], [p2 * alpha, 0, alpha]])
-        a1, b0, b1 = alpha * p2 / p1, 1 / p1, alpha / p1
-        slope = np.array([[a1, -a1 / p1, alpha / p1], [0.0, -b0 / p1, 0.0], [b1, -b1 / p1, 0.0]])
-        return np.array([a1, b0, b1]), slope
+        """(a1, b0, b1) of Chinimilli 2016 (13) and their Jacobian (3, shape_size)."""
+        return self.form.coefficients(theta[: self.shape_size])
 
-    def delay_s(self, theta: Array) -> tuple[float, float]:
-        """The delay in s (reading later than load is positive) and its slope; a sine keeps it within bounds."""
-        if self.delay_at is None:
-            return float(self.settings.delay_s or 0.0), 0.0
-        q = float(theta[self.delay_at])
-        return LARGEST_DELAY_S * float(np.sin(q / LARGEST_DELAY_S)), float(np.cos(q / LARGEST_DELAY_S))
+    def delay_s(self, theta: Array) -> float:
+        """The delay in s; positive where the reading is later than the load."""
+        return float(self.settings.delay_s or 0.0) if self.delay_at is None else float(theta[self.delay_at])
 
-    def offset(self, theta: Array, index: int) -> tuple[float, Array]:
-        """The reading at no load of one recording, and its gradient over theta.
+    def constant(self, theta: Array, index: int) -> float:
+        """The free constant at the output of one recording; 0 where there is none."""
+        return 0.0 if self.offset_at is None else float(theta[self.offset_at + index])
 
-        An offset of the output itself in the forward direction; in the inverse one it has passed the static gain.
-        """
-        gradient = np.zeros(self.size)
-        if self.offset_at is None:
-            return float(self.settings.offset or 0.0), gradient
-        at, value = self.offset_at + index, float(theta[self.offset_at + index])
-        if self.settings.direction == "forward":
-            gradient[at] = 1.0
-            return value, gradient
-        gain_at = self.shape_size - 1  # p2, and in the inverse grey box the static gain: the same number
-        gain = float(theta[gain_at])
-        gradient[at], gradient[gain_at] = -1.0 / gain, value / gain**2
-        return -value / gain, gradient
+    def state(self, theta: Array, index: int) -> float:
+        """The coefficient of the fading start of one recording."""
+        return 0.0 if self.state_at is None else float(theta[self.state_at + index])
 
     def drop_edges(self, count: int) -> None:
         """Leave ``count`` samples at either end of every recording out of the error."""
-        self._key = b""
         for index, experiment in enumerate(self.experiments):
             kept = experiment.kept.copy()
             if kept.size > 4 * count:
@@ -125,75 +121,241 @@ class PredictionError:
                 kept[kept.size - count :] = False
             self.kept[index] = kept
 
-    # -- the error -------------------------------------------------------------------------------------------
+    @property
+    def count(self) -> int:
+        """How many samples count."""
+        return sum(int(np.count_nonzero(kept)) for kept in self.kept)
+
+    # -- signals ---------------------------------------------------------------------------------------------
+    @property
+    def outputs(self) -> list[Array]:
+        """Per recording the output (n,), fixed zeros taken out."""
+        return [y for _, y in self._pairs]
+
+    def inputs_at(self, delay_s: float) -> list[Array]:
+        """Per recording the input (n,) with ``delay_s`` undone."""
+        if delay_s == 0.0:
+            return [u for u, _ in self._pairs]
+        sign = 1.0 if self.settings.direction == "inverse" else -1.0
+        return [
+            shifted(u, experiment.time_s, experiment.step, sign * delay_s)[0]
+            for (u, _), experiment in zip(self._pairs, self.experiments, strict=True)
+        ]
+
+    def coarse(self, most: int) -> PredictionError:
+        """This problem on means of neighbouring samples, about ``most`` of them; itself where it is small."""
+        total = sum(experiment.time_s.size for experiment in self.experiments)
+        step_s = max(experiment.sample_time_s for experiment in self.experiments)
+        factor = min(max(total // most, 1), max(int(COARSEST_STEP_S / step_s), 1))
+        if self._coarse is None:
+            self._coarse = self.thinned(factor)
+        return self._coarse
+
+    def with_noise_ratio(self, ratio: float) -> PredictionError:
+        """This problem with the input's noise allowed for."""
+        other = PredictionError(self.experiments, replace(self.settings, noise_ratio=ratio), self.form)
+        other.kept = self.kept
+        return other
+
+    def thinned(self, factor: int) -> PredictionError:
+        """This problem on means of ``factor`` neighbouring samples."""
+        if factor == 1:
+            return self
+        thin = PredictionError(
+            [experiment.decimated(factor) for experiment in self.experiments], self.settings, self.form
+        )
+        for index, kept in enumerate(self.kept):
+            thin.kept[index] = (
+                kept if thin.experiments[index] is self.experiments[index] else whole_blocks(kept, factor)
+            )
+        return thin
+
+    def delayed(self, theta: Array) -> list[tuple[Array, Array]]:
+        """Per recording the input at the delay, and its derivative with respect to it (empty where it is fixed)."""
+        delay_s = self.delay_s(theta)
+        if self._delayed is not None and self._delayed[0] == delay_s:
+            return self._delayed[1]
+        sign = 1.0 if self.settings.direction == "inverse" else -1.0
+        if self.delay_at is None and delay_s == 0.0:
+            found = [(u, NONE) for u, _ in self._pairs]
+        else:
+            found = []
+            for (u, _), experiment in zip(self._pairs, self.experiments, strict=True):
+                value, slope = shifted(u, experiment.time_s, experiment.step, sign * delay_s)
+                found.append((value, sign * slope if self.delay_at is not None else NONE))
+        self._delayed = (delay_s, found)
+        return found
+
+    # -- the error, in one pass --------------------------------------------------------------------------------
+    def evaluate(self, theta: Array) -> Evaluation:
+        """Cost, gradient and normal matrix at ``theta``: no residual is stored."""
+        if self.settings.noise_ratio:
+            return self._evaluate_plainly(theta)
+        from smartshoe.kernels.first_order import COLUMNS, inner_products
+
+        shape = self.shape(theta)
+        active = np.array(
+            [0, 1, 2]
+            + [3] * (self.delay_at is not None)
+            + [4] * (self.offset_at is not None)
+            + [5] * (self.state_at is not None)
+            + [COLUMNS - 1]
+        )
+        # From the kernel's six columns to theta, less the constants and states, which are each recording's own.
+        to_theta = np.zeros((4, self.size))
+        to_theta[:3, : self.shape_size] = shape.slope
+        if self.delay_at is not None:
+            to_theta[3, self.delay_at] = 1.0
+        normal, gradient, cost = np.zeros((self.size, self.size)), np.zeros(self.size), 0.0
+        for index, (experiment, (u, slope)) in enumerate(zip(self.experiments, self.delayed(theta), strict=True)):
+            products = np.zeros((COLUMNS, COLUMNS))
+            kept = self.kept[index]
+            inner_products(
+                u,
+                slope,
+                self._pairs[index][1],
+                EVERY if kept.all() else kept,
+                np.atleast_1d(experiment.step),
+                holds(shape.alpha, experiment.step),
+                shape.alpha,
+                shape.p1,
+                shape.p2,
+                self.constant(theta, index),
+                self.state(theta, index),
+                active,
+                products,
+            )
+            products += np.triu(products, 1).T
+            own = np.zeros((COLUMNS - 1, self.size))
+            own[:4] = to_theta
+            if self.offset_at is not None:
+                own[4, self.offset_at + index] = 1.0
+            if self.state_at is not None:
+                own[5, self.state_at + index] = 1.0
+            normal += own.T @ products[:-1, :-1] @ own
+            gradient += own.T @ products[:-1, -1]
+            cost += float(products[-1, -1])
+        return Evaluation(cost, gradient, normal, self.count)
+
+    def _evaluate_plainly(self, theta: Array) -> Evaluation:
+        residual, jacobian = self.residual_and_jacobian(theta)
+        cost, normal = float(residual @ residual), jacobian.T @ jacobian
+        # The noise in the gradient belongs to no curvature of the likelihood: left in, it would shorten every step.
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+        root = vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))
+        half = (vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))).T / scale
+        shares, axes = np.linalg.eigh(half @ (cost * self._noise_of_gradient(theta)) @ half.T)
+        # Far from the optimum the expectation may exceed what is there: some curvature is always left.
+        left = (root.T * scale).T @ axes
+        signal = (left * (1.0 - np.minimum(shares, MOST_NOISE))) @ left.T
+        return Evaluation(cost, jacobian.T @ residual, signal, residual.size)
+
+    def _noise_of_gradient(self, theta: Array) -> Array:
+        """(size, size) expected inner products of the whitened error's gradient with itself due to noise alone.
+
+        Relative to the error's variance; from the gradient's responses to an impulse at the input and at the output.
+        """
+        white = self.whitening(theta)
+        if white is None:
+            return np.zeros((self.size, self.size))
+        shape, step_s = self.shape(theta), self.experiments[0].sample_time_s
+        sign = 1.0 if self.settings.direction == "inverse" else -1.0
+        impulse = np.zeros(IMPULSE_SAMPLES)
+        impulse[2 * HALF_WIDTH] = 1.0
+        u, slope = shifted(
+            impulse, np.arange(impulse.size, dtype=float) * step_s, step_s, np.mod(sign * self.delay_s(theta), step_s)
+        )
+        w, w_slope = lag_and_slope(u, shape.alpha, step_s)
+        jacobian = np.zeros((self.size, impulse.size))
+        own = np.stack([shape.alpha * (shape.p2 - shape.p1) * w_slope, u - w, w])
+        jacobian[: self.shape_size] = shape.slope.T @ own
+        if self.delay_at is not None:
+            slow = lag(slope, shape.alpha, step_s)
+            jacobian[self.delay_at] = sign * (shape.p1 * (slope - slow) + shape.p2 * slow)
+        from_input = whiten(white, shape.p1 * (u - w) + shape.p2 * w, jacobian)[1]
+        from_output = whiten(white, -impulse, np.zeros_like(jacobian))[1]
+        products: Array = self.settings.noise_ratio * from_input @ from_input.T + from_output @ from_output.T
+        return products
+
+    # -- the error, stored -------------------------------------------------------------------------------------
     def residual(self, theta: Array) -> Array:
-        """(m,) model minus measured, in N (inverse) or reading units (forward)."""
-        return self._evaluate(theta)[0]
+        """(m,) model minus measured of the counted samples, in units of the output; whitened where asked for."""
+        return self.residual_and_jacobian(theta)[0]
 
     def jacobian(self, theta: Array) -> Array:
         """(m, size) derivative of `residual`."""
-        return self._evaluate(theta)[1]
+        return self.residual_and_jacobian(theta)[1]
 
-    def _evaluate(self, theta: Array) -> tuple[Array, Array]:
-        key = theta.tobytes()
-        if key == self._key and self._last is not None:
-            return self._last
-        sizes = [int(np.count_nonzero(kept)) for kept in self.kept]
-        residual = np.empty(sum(sizes))
-        jacobian = np.zeros((residual.size, self.size), order="F")
-        at = 0
-        for index, size in enumerate(sizes):
-            rows = slice(at, at + size)
-            error, slopes = self._one(theta, index, with_slopes=True)
-            kept = self.kept[index]
-            residual[rows] = error[kept]
-            for column, slope in slopes.items():
-                jacobian[rows, column] = slope[kept] if isinstance(slope, np.ndarray) else slope
-            at += size
-        self._key, self._last = key, (residual, jacobian)
-        return self._last
+    def residual_and_jacobian(self, theta: Array) -> tuple[Array, Array]:
+        """Both, from plain filters over whole signals."""
+        errors, slopes = [], []
+        white = self.whitening(theta)
+        for index, kept in enumerate(self.kept):
+            error, jacobian = self.error_and_slopes(theta, index)
+            if white is not None:
+                error, jacobian = whiten(white, np.where(kept, error, 0.0), jacobian * kept)
+            errors.append(error[kept])
+            slopes.append(jacobian[:, kept])
+        return np.concatenate(errors), np.concatenate(slopes, axis=1).T
+
+    def whitening(self, theta: Array) -> Whitening | None:
+        """The filter that makes the error white where the input is noisy; None where it is not."""
+        if not self.settings.noise_ratio:
+            return None
+        step = self.experiments[0].sample_time_s
+        delay_s = self.delay_s(theta)
+        sign = 1.0 if self.settings.direction == "inverse" else -1.0
+        gain, gain_slope = interpolation_gain(sign * delay_s, step)
+        slope = np.zeros((3, self.size))
+        slope[:, : self.shape_size] = self.shape(theta).slope
+        ratio_slope = np.zeros(self.size)
+        if self.delay_at is not None:
+            ratio_slope[self.delay_at] = self.settings.noise_ratio * sign * gain_slope
+        return whitening(self.shape(theta), slope, step, self.settings.noise_ratio * gain, ratio_slope)
 
     def model_error(self, theta: Array, index: int) -> Array:
-        """(n,) model minus measured of one recording at every sample, missing ones too."""
-        return self._one(theta, index, with_slopes=False)[0]
+        """(n,) model minus measured of one recording at every sample, missing ones too; never whitened."""
+        u = self.delayed(theta)[index][0]
+        experiment, shape = self.experiments[index], self.shape(theta)
+        w = lag(u, shape.alpha, experiment.step)
+        fade = np.exp(-shape.alpha * experiment.time_s)
+        error: Array = shape.p1 * (u - w) + shape.p2 * w + self.constant(theta, index) - self._pairs[index][1]
+        return error + self.state(theta, index) * fade
 
-    def _one(self, theta: Array, index: int, *, with_slopes: bool) -> tuple[Array, dict[int, Array | float]]:
-        experiment = self.experiments[index]
-        inverse = self.settings.direction == "inverse"
-        u, y = experiment.signals(self.settings.direction)
-        alpha, p1, p2, to_shape = self.shape(theta)
-        delay_s, delay_slope = self.delay_s(theta)
-        sign = 1.0 if inverse else -1.0
-        u_slope = None
-        if self.delay_at is not None or delay_s != 0.0:
-            u, u_slope = shifted(u, experiment.time_s, experiment.step, sign * delay_s)
-        w, w_slope = (
-            lag_and_slope(u, alpha, experiment.step) if with_slopes else (lag(u, alpha, experiment.step), np.empty(0))
-        )
-        zero = float(self.settings.offset or 0.0)
+    def error_and_slopes(
+        self, theta: Array, index: int, signals: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
+        """(n,) model minus measured of one recording and its derivatives (size, n) over theta.
+
+        ``signals`` stands in for the delayed input and its slope: an instrument's.
+        """
+        u, u_slope = self.delayed(theta)[index] if signals is None else signals
+        experiment, shape = self.experiments[index], self.shape(theta)
+        alpha, p1, p2 = shape.alpha, shape.p1, shape.p2
+        w, w_slope = lag_and_slope(u, alpha, experiment.step)
         fade = np.exp(-alpha * experiment.time_s)
-        state = 0.0 if self.state_at is None else float(theta[self.state_at + index])
-        # A fixed offset is the reading's: it passes the static gain where the reading is the input.
-        error = p1 * (u - w) + p2 * (w - zero if inverse else w) + state * fade - y
-        if self.offset_at is not None:
-            error += float(theta[self.offset_at + index])
-        elif not inverse:
-            error += zero
-        if not with_slopes:
-            return error, {}
-        shape = np.stack(
-            [
-                alpha * ((p2 - p1) * w_slope - state * experiment.time_s * fade),
-                u - w,
-                w - zero if inverse else w,
-            ]
-        )
-        slopes: dict[int, Array | float] = dict(enumerate(to_shape.T @ shape))
-        if self.delay_at is not None and u_slope is not None:
+        state = self.state(theta, index)
+        error = p1 * (u - w) + p2 * w + self.constant(theta, index) + state * fade - self._pairs[index][1]
+        slopes = np.zeros((self.size, u.size))
+        own = np.stack([alpha * ((p2 - p1) * w_slope - state * experiment.time_s * fade), u - w, w])
+        slopes[: self.shape_size] = shape.slope.T @ own
+        if self.delay_at is not None:
             slow = lag(u_slope, alpha, experiment.step)
-            slopes[self.delay_at] = (sign * delay_slope) * (p1 * (u_slope - slow) + p2 * slow)
+            slopes[self.delay_at] = p1 * (u_slope - slow) + p2 * slow
         if self.offset_at is not None:
             slopes[self.offset_at + index] = 1.0
         if self.state_at is not None:
             slopes[self.state_at + index] = fade
         return error, slopes
+
+
+def holds(alpha: float, step: float | Array) -> Array:
+    """(1 or n - 1, 6) first-order-hold coefficients and their derivatives with respect to ``alpha``."""
+    if isinstance(step, float):
+        x = alpha * step
+        return np.array([[*hold_coefficients(x), *(step * slope for slope in hold_slopes(x))]])
+    values: Array = np.stack(
+        [*hold_coefficients(alpha * step), *(step * slope for slope in hold_slopes(alpha * step))], axis=1
+    )
+    return np.ascontiguousarray(values)

@@ -1,98 +1,230 @@
-"""Non-linear least squares on the one residual: Gauss-Newton here, Levenberg-Marquardt and trust region from SciPy."""
+"""Non-linear least squares on normal equations: Gauss-Newton, Levenberg-Marquardt, trust region reflective.
+
+The three differ in how they take a step. They share the problem's error and gradient, the bounds and the test that
+ends them, so that they end at one optimum.
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.experiment import Array
-from smartshoe.identification.prediction_error import LARGEST_DELAY_S, PredictionError
 
+Array = NDArray[np.float64]
 Solver = Literal["gn", "lm", "trf"]
 
-
-def linear_start(problem: PredictionError, alpha: float, p1: float, p2: float, delay_s: float) -> Array:
-    """theta at a given pole and delay, all that enters linearly by least squares (the grey box keeps its gains)."""
-    settings = problem.settings
-    theta = np.zeros(problem.size)
-    if problem.delay_at is not None:
-        theta[problem.delay_at] = LARGEST_DELAY_S * np.arcsin(delay_s / LARGEST_DELAY_S)
-    linear = [index for index in range(1, problem.size) if index != problem.delay_at]
-    if settings.structure == "free":
-        theta[0] = np.log(alpha)
-    else:
-        linear = linear[1:]
-        pole, gain = (alpha, p2) if settings.direction == "inverse" else (abs(alpha * p2 / p1), 1 / p2)
-        theta[:2] = np.log(pole), gain
-    if linear:
-        change = _solve_normal(problem.jacobian(theta)[:, linear], problem.residual(theta))
-        theta[linear] -= change
-    return theta
+# A Gauss-Newton step that promises less than this share of one residual's variance is a hundred-thousandth of a
+# standard error long: nothing is left to gain.
+NEGLIGIBLE = 1e-10
+ROUNDING = 1e-14  # of the cost: below it a change is arithmetic, not descent
+SINGULAR = 1e-15
 
 
-def _solve_normal(jacobian: Array, residual: Array) -> Array:
-    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
-    scale[scale == 0.0] = 1.0
-    scaled = jacobian / scale
-    change: Array = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ residual, rcond=1e-15)[0] / scale
-    return change
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """At one theta: ``cost`` = e'e, ``gradient`` (p,) = J'e, ``normal`` (p, p) = J'J, ``count`` errors in e."""
+
+    cost: float
+    gradient: Array
+    normal: Array
+    count: int
 
 
-def gauss_newton(
-    problem: PredictionError, theta: Array, *, tolerance: float, max_iterations: int
-) -> tuple[Array, int, bool]:
-    """Damped Gauss-Newton: the full step, halved until the error no longer grows (Chinimilli 2016, Section V)."""
-    cost = float(problem.residual(theta) @ problem.residual(theta))
-    for iteration in range(1, max_iterations + 1):
-        residual, jacobian = problem.residual(theta), problem.jacobian(theta)
-        step = _solve_normal(jacobian, residual)
-        # The step in units of each parameter's own standard error does not depend on anybody's choice of units.
-        promised = float(np.sum((jacobian @ step) ** 2))
-        fraction = 1.0
-        for _ in range(40):
-            trial = theta - fraction * step
-            trial_residual = problem.residual(trial)
-            trial_cost = float(trial_residual @ trial_residual)
-            if trial_cost <= cost:
-                break
-            fraction /= 2
-        else:
-            # No descent is left within rounding: this is the optimum if little was promised.
-            return theta, iteration, promised <= 1e-9 * cost + 1e-20 * max(cost, 1.0)
-        theta, before, cost = trial, cost, trial_cost
-        settled = np.max(np.abs(fraction * step) / (np.abs(theta) + 1e-3 * np.max(np.abs(theta[:3])))) < tolerance
-        if settled or before - cost <= 1e-13 * before:
-            return theta, iteration, True
-    return theta, max_iterations, False
+class Problem(Protocol):
+    """What `minimise` needs: bounds (size,), infinite where there are none, and one pass over the data."""
+
+    @property
+    def size(self) -> int:
+        """How many unknowns."""
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds."""
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds."""
+
+    def evaluate(self, theta: Array) -> Evaluation:
+        """Cost, gradient and normal matrix at ``theta`` (size,)."""
 
 
-def solve(
-    problem: PredictionError, theta: Array, method: Solver, *, tolerance: float, max_iterations: int
-) -> tuple[Array, int, bool]:
-    """The minimum from ``theta``, the number of iterations, and whether it settled; raises on numerical failure."""
-    if method == "gn":
-        try:
-            return gauss_newton(problem, theta, tolerance=tolerance, max_iterations=max_iterations)
-        except np.linalg.LinAlgError as error:
-            raise NotIdentifiableError(f"the normal equations have no solution ({error})") from error
-    from scipy.optimize import least_squares
+@dataclass(frozen=True, slots=True)
+class Minimum:
+    """Where `minimise` ended, what it saw there, after how many ``iterations``, and whether it settled."""
 
-    try:
-        found = least_squares(
-            problem.residual,
-            theta,
-            problem.jacobian,
-            method=method,
-            x_scale="jac",
-            ftol=1e-13,
-            xtol=tolerance,
-            gtol=1e-14,
-            max_nfev=max_iterations,
-        )
-    except (np.linalg.LinAlgError, ValueError) as error:
+    theta: Array
+    evaluation: Evaluation
+    iterations: int
+    converged: bool
+
+
+def solve_normal(normal: Array, right: Array) -> Array:
+    """x with normal x = right, columns scaled by their norm; the smallest x where it is singular."""
+    scale = np.sqrt(np.diag(normal))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    usable = values > SINGULAR * values[-1]
+    inverse = np.where(usable, 1.0 / np.where(usable, values, 1.0), 0.0)
+    x: Array = vectors @ (inverse * (vectors.T @ (right / scale))) / scale
+    return x
+
+
+def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float, max_iterations: int) -> Minimum:
+    """The least squares from ``theta``; ``tolerance`` is the relative change of theta that ends the iteration.
+
+    It also ends where the full Gauss-Newton step is below 1e-5 standard errors. Raises `NotIdentifiableError` where
+    the normal equations have no finite solution.
+    """
+    theta = np.clip(np.asarray(theta, dtype=float), problem.lower, problem.upper)
+    now = problem.evaluate(theta)
+    if not np.isfinite(now.cost):
         raise NotIdentifiableError(
-            f"the fit has no finite solution ({error}): record a load that rises and falls at several rates"
-        ) from error
-    return np.asarray(found.x), int(found.njev or found.nfev), found.status > 0
+            "the error is not finite where the fit starts: record a load that rises and falls at several rates"
+        )
+    walk = _WALKS[method](now)
+    for iteration in range(1, max_iterations + 1):
+        free = _free(problem, theta, now.gradient)
+        newton = _newton_step(now, free)
+        promised = float(newton @ now.gradient)
+        if promised <= NEGLIGIBLE * now.cost / max(now.count, 1):
+            # The step is worth taking, a new look at the data is not.
+            return Minimum(np.clip(theta - newton, problem.lower, problem.upper), now, iteration, True)
+        accepted = False
+        for _ in range(60):
+            step = walk.step(now, newton, free)
+            trial = walk.keep_inside(theta - step, problem)
+            move = theta - trial
+            following = problem.evaluate(trial)
+            foretold = float(2.0 * move @ now.gradient - move @ now.normal @ move)
+            accepted = walk.judge(now, following, foretold, move)
+            if accepted or float(np.max(np.abs(move) / (np.abs(theta) + 1e-300))) < 1e-16:
+                break
+        if not accepted:
+            # No descent is left within rounding: this is the optimum if little was promised.
+            return Minimum(theta, now, iteration, promised <= 1e-7 * now.cost)
+        change = float(np.max(np.abs(move) / (np.abs(trial) + 1e-3 * np.max(np.abs(trial)) + 1e-300)))
+        gained = now.cost - following.cost
+        theta, before, now = trial, now.cost, following
+        if change < tolerance or (gained <= ROUNDING * before and foretold <= 1e-6 * before):
+            return Minimum(theta, now, iteration, True)
+    return Minimum(theta, now, max_iterations, False)
+
+
+def _free(problem: Problem, theta: Array, gradient: Array) -> NDArray[np.bool_]:
+    """Unknowns that may move: not those at a bound that the descent would cross."""
+    held = ((theta <= problem.lower) & (gradient > 0)) | ((theta >= problem.upper) & (gradient < 0))
+    return ~held
+
+
+def _newton_step(now: Evaluation, free: NDArray[np.bool_]) -> Array:
+    if not (np.isfinite(now.normal).all() and np.isfinite(now.gradient).all()):
+        raise NotIdentifiableError(
+            "the normal equations are not finite: record a load that rises and falls at several rates"
+        )
+    if free.all():
+        return solve_normal(now.normal, now.gradient)
+    step = np.zeros(free.size)
+    if free.any():
+        step[free] = solve_normal(now.normal[np.ix_(free, free)], now.gradient[free])
+    return step
+
+
+class _GaussNewton:
+    """The full step, halved until the error no longer grows (Chinimilli 2016, Section V)."""
+
+    def __init__(self, _: Evaluation) -> None:
+        self.fraction = 1.0
+
+    def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
+        return self.fraction * newton
+
+    def keep_inside(self, trial: Array, problem: Problem) -> Array:
+        inside: Array = np.clip(trial, problem.lower, problem.upper)
+        return inside
+
+    def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
+        accepted = bool(following.cost <= now.cost)
+        self.fraction = 1.0 if accepted else self.fraction / 2
+        return accepted
+
+
+class _LevenbergMarquardt(_GaussNewton):
+    """Marquardt's scaling, damping by Nielsen's rule (Madsen, Nielsen, Tingleff 2004, Algorithm 3.16)."""
+
+    def __init__(self, first: Evaluation) -> None:
+        self.damping, self.growth = 1e-4, 2.0
+        self.scale = np.diag(first.normal).copy()
+
+    def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
+        self.scale = np.maximum(self.scale, np.diag(now.normal))
+        damped = now.normal + self.damping * np.diag(self.scale)
+        step = np.zeros(newton.size)
+        step[free] = solve_normal(damped[np.ix_(free, free)], now.gradient[free])
+        return step
+
+    def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
+        gained = now.cost - following.cost
+        if gained >= 0.0 and np.isfinite(following.cost):
+            share = gained / foretold if foretold > 0.0 else 1.0
+            self.damping = max(self.damping * max(1 / 3, 1 - (2 * share - 1) ** 3), 1e-14)
+            self.growth = 2.0
+            return True
+        self.damping *= self.growth
+        self.growth *= 2.0
+        return False
+
+
+class _TrustRegion(_GaussNewton):
+    """Exact step within an ellipsoid of the columns' norms, reflected at bounds (Branch, Coleman, Li 1999)."""
+
+    def __init__(self, first: Evaluation) -> None:
+        self.radius = np.inf
+        self.scale = np.sqrt(np.maximum(np.diag(first.normal), 1e-300))
+
+    def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
+        self.scale = np.maximum(self.scale, np.sqrt(np.diag(now.normal)))
+        if float(np.linalg.norm(self.scale * newton)) <= self.radius:
+            return newton
+        scale = self.scale[free]
+        values, vectors = np.linalg.eigh(now.normal[np.ix_(free, free)] / np.outer(scale, scale))
+        values = np.maximum(values, 0.0)
+        along = vectors.T @ (now.gradient[free] / scale)
+        # |along/(values + mu)| falls with mu: bisection in the logarithm needs no derivative and cannot fail.
+        low, high = 0.0, float(np.linalg.norm(along)) / self.radius
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if float(np.linalg.norm(along / (values + middle))) > self.radius:
+                low = middle
+            else:
+                high = middle
+        step = np.zeros(newton.size)
+        step[free] = vectors @ (along / (values + high)) / scale
+        return step
+
+    def keep_inside(self, trial: Array, problem: Problem) -> Array:
+        reflected = np.where(trial < problem.lower, 2 * problem.lower - trial, trial)
+        reflected = np.where(reflected > problem.upper, 2 * problem.upper - reflected, reflected)
+        inside: Array = np.clip(np.where(np.isfinite(reflected), reflected, trial), problem.lower, problem.upper)
+        # A reflection that would climb ends on the bound instead.
+        crossed = (trial < problem.lower) | (trial > problem.upper)
+        if crossed.any() and self.radius < np.inf:
+            inside = np.where(crossed, np.clip(trial, problem.lower, problem.upper), inside)
+        return inside
+
+    def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
+        gained = now.cost - following.cost
+        share = gained / foretold if foretold > 0.0 else -1.0
+        length = float(np.linalg.norm(self.scale * move))
+        if not np.isfinite(following.cost) or share < 0.25:
+            self.radius = 0.25 * length
+        elif share > 0.75 and length > 0.95 * self.radius:
+            self.radius *= 2.0
+        return bool(gained >= 0.0 and np.isfinite(following.cost))
+
+
+_WALKS: dict[str, type[_GaussNewton]] = {"gn": _GaussNewton, "lm": _LevenbergMarquardt, "trf": _TrustRegion}

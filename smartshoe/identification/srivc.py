@@ -1,4 +1,7 @@
-"""SRIVC: the simplified refined instrumental variable method for continuous time (Chinimilli 2016, Section V)."""
+"""SRIVC: the simplified refined instrumental variable method for continuous time (Chinimilli 2016, Section V).
+
+Young and Jakeman 1980, Int. J. Control 31, 741-764; Garnier and Wang 2008, ch. 4.
+"""
 
 from __future__ import annotations
 
@@ -7,33 +10,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.experiment import Array, Experiment
-from smartshoe.identification.prediction_error import LARGEST_DELAY_S, Settings
-from smartshoe.models.first_order import lag, shifted, steps
+from smartshoe.identification.experiment import Array
+from smartshoe.identification.prediction_error import EVERY, LARGEST_DELAY_S, PredictionError, holds
+from smartshoe.models.first_order import lag
 
-
-def _signals(experiment: Experiment, settings: Settings, delay_s: float) -> tuple[Array, Array]:
-    """Input and output with the fixed offset and the delay taken out."""
-    u, y = experiment.signals(settings.direction)
-    sign = 1.0 if settings.direction == "inverse" else -1.0
-    zero = settings.offset or 0.0
-    if settings.direction == "inverse":
-        u = u - zero
-    else:
-        y = y - zero
-    if delay_s:
-        u = shifted(u, experiment.time_s, experiment.step, sign * delay_s)[0]
-    return u, y
+COARSE_STEP_S = 0.05  # the grid on which a delay is first looked for
 
 
 def srivc(
-    experiments: Sequence[Experiment],
-    settings: Settings,
-    *,
-    prefilter_rad_s: float,
-    tolerance: float,
-    max_iterations: int,
-    delay_s: float = 0.0,
+    problem: PredictionError, *, prefilter_rad_s: float, tolerance: float, max_iterations: int, delay_s: float = 0.0
 ) -> tuple[float, float, float, int, bool]:
     """alpha, p1, p2 (see `prediction_error`), iterations and whether they settled to ``tolerance``.
 
@@ -42,14 +27,13 @@ def srivc(
     and a decaying exponential for each recording stand for its offset and initial state. Missing outputs are filled
     with the auxiliary model's. An unstable pole is reflected into the left half plane.
     """
-    pairs = [_signals(experiment, settings, delay_s) for experiment in experiments]
-    outputs = [y for _, y in pairs]
-    auxiliary: list[Array] = outputs
-    longest_s = max(float(experiment.time_s[-1]) for experiment in experiments)
+    inputs, measured = problem.inputs_at(delay_s), problem.outputs
+    outputs, auxiliary = list(measured), list(measured)
+    longest_s = max(float(experiment.time_s[-1]) for experiment in problem.experiments)
     slowest, pole = 1e-3 / longest_s, prefilter_rad_s
     estimate = np.array([pole, 0.0, 0.0])
     for iteration in range(max_iterations + 1):
-        solution = _step(experiments, [u for u, _ in pairs], outputs, auxiliary, settings, pole)
+        solution = _step(problem, inputs, outputs, auxiliary, pole)
         alpha = max(abs(float(solution[0])), slowest)
         renewed = np.array([alpha, solution[1], solution[2] / alpha])
         change = float(np.max(np.abs(renewed - estimate) / np.maximum(np.abs(renewed), 1e-300)))
@@ -57,46 +41,47 @@ def srivc(
         if iteration and change < tolerance:
             return float(estimate[0]), float(estimate[1]), float(estimate[2]), iteration, True
         auxiliary, outputs = [], []
-        for experiment, (u, y) in zip(experiments, pairs, strict=True):
+        for index, (u, y) in enumerate(zip(inputs, measured, strict=True)):
+            experiment = problem.experiments[index]
             w = lag(u, alpha, experiment.step)
+            # Offset and start stand among the instruments as they are: the auxiliary model needs neither.
             model = estimate[1] * (u - w) + estimate[2] * w
-            full = model + _nuisance(experiment, settings, alpha, y - model)
-            auxiliary.append(full)
-            outputs.append(y if experiment.kept.all() else np.where(experiment.kept, y, full))
+            auxiliary.append(model)
+            if not experiment.kept.all():
+                y = np.where(experiment.kept, y, model + _nuisance(problem, index, alpha, y - model))
+            outputs.append(y)
     return float(estimate[0]), float(estimate[1]), float(estimate[2]), max_iterations, False
 
 
 def _step(
-    experiments: Sequence[Experiment],
+    problem: PredictionError,
     inputs: Sequence[Array],
     outputs: Sequence[Array],
     instruments: Sequence[Array],
-    settings: Settings,
     pole: float,
 ) -> Array:
     """One instrumental-variable solution (alpha, beta0, beta1, nuisances)."""
-    count = len(experiments)
-    columns = (settings.offset is None) + (not settings.steady)
-    size = 3 + columns * count
-    normal, right = np.zeros((size, size)), np.zeros(size)
-    for index, experiment in enumerate(experiments):
-        u, y, x = inputs[index], outputs[index], instruments[index]
-        u_slow, y_slow = lag(u, pole, experiment.step), lag(y, pole, experiment.step)
-        x_slow = y_slow if x is y else lag(x, pole, experiment.step)
-        shared = [u - u_slow, u_slow / pole]
-        at = list(range(3))
-        if settings.offset is None:
-            shared.append(np.ones_like(u))
-            at.append(3 + index)
-        if not settings.steady:
-            shared.append(np.exp(-pole * experiment.time_s))
-            at.append(size - count + index)
-        kept = slice(None) if experiment.kept.all() else experiment.kept
-        rest = np.stack(shared)[:, kept]
-        regressors = np.vstack([-y_slow[kept] / pole, rest])
-        instrument = np.vstack([-x_slow[kept] / pole, rest])
-        normal[np.ix_(at, at)] += instrument @ regressors.T
-        right[at] += instrument @ (y - y_slow)[kept]
+    from smartshoe.kernels.srivc import instrument_products
+
+    count = len(inputs)
+    columns = np.array([0, 1, 2] + [3] * (problem.offset_at is not None) + [4] * (problem.state_at is not None))
+    own = columns.size - 3
+    normal, right = np.zeros((3 + own * count, 3 + own * count)), np.zeros(3 + own * count)
+    for index, experiment in enumerate(problem.experiments):
+        products, targets = np.zeros((5, 5)), np.zeros(5)
+        instrument_products(
+            inputs[index],
+            outputs[index],
+            instruments[index],
+            EVERY if experiment.kept.all() else experiment.kept,
+            holds(pole, experiment.step),
+            pole,
+            products,
+            targets,
+        )
+        at = np.r_[0:3, 3 + own * index : 3 + own * (index + 1)]
+        normal[np.ix_(at, at)] += products[np.ix_(columns, columns)]
+        right[at] += targets[columns]
     scale = np.sqrt(np.abs(np.diag(normal)))
     if not np.isfinite(normal).all() or not scale.all():
         raise NotIdentifiableError(
@@ -106,44 +91,55 @@ def _step(
     return solution
 
 
-def _nuisance(experiment: Experiment, settings: Settings, alpha: float, rest: Array) -> Array:
+def _nuisance(problem: PredictionError, index: int, alpha: float, rest: Array) -> Array:
     """Offset and initial state of one recording, by least squares on what the model leaves."""
+    experiment = problem.experiments[index]
     columns = []
-    if settings.offset is None:
+    if problem.offset_at is not None:
         columns.append(np.ones_like(rest))
-    if not settings.steady:
+    if problem.state_at is not None:
         columns.append(np.exp(-alpha * experiment.time_s))
-    if not columns:
-        return np.zeros_like(rest)
-    basis = np.stack(columns, axis=1)
     kept = experiment.kept
-    fitted: Array = basis @ np.linalg.lstsq(basis[kept].T @ basis[kept], basis[kept].T @ rest[kept], rcond=None)[0]
+    if not columns or not kept.any():
+        return np.zeros_like(rest)
+    basis = np.stack(columns)
+    inside, target = basis[:, kept], rest[kept]
+    fitted: Array = np.linalg.lstsq(inside @ inside.T, inside @ target, rcond=None)[0] @ basis
     return fitted
 
 
-def coarse_delay(experiments: Sequence[Experiment], settings: Settings, prefilter_rad_s: float) -> float:
-    """The delay in s, on a grid of a tenth of the limit, from which a gradient finds the right one.
+def coarse_delay(problem: PredictionError, pole: float) -> float:
+    """The delay in s, on a grid of 0.05 s, from which a gradient finds the right one.
 
-    Least squares of the output on the delayed input and its slow part alone: enough to tell tenths of a second.
+    Least squares of the output on the delayed input, its slow part and a constant: enough to tell tenths of a second.
     """
-    most = 4000  # samples a recording: the grid is coarse, and so may the signals be
-    costs = []
-    grid = np.linspace(-0.9, 0.9, 19) * LARGEST_DELAY_S
-    for delay_s in grid:
-        cost = 0.0
-        for experiment in experiments:
-            u, y = experiment.signals(settings.direction)
-            stride = max(1, -(-u.size // most))
-            at = (1.0 if settings.direction == "inverse" else -1.0) * delay_s
-            time_s = experiment.time_s[::stride]
-            delayed = np.interp(time_s + at, time_s, u[::stride])
-            slow = lag(delayed, prefilter_rad_s, steps(time_s))
-            basis = np.stack([delayed, slow, np.ones_like(slow)], axis=1)
-            kept = experiment.kept[::stride] & (time_s > LARGEST_DELAY_S) & (time_s < time_s[-1] - LARGEST_DELAY_S)
-            if np.count_nonzero(kept) < 10:
-                continue
-            target, basis = y[::stride][kept], basis[kept]
-            fitted = basis @ np.linalg.lstsq(basis.T @ basis, basis.T @ target, rcond=None)[0]
-            cost += float(np.sum((target - fitted) ** 2))
-        costs.append(cost)
-    return float(grid[int(np.argmin(costs))]) if min(costs) < 0.5 * costs[len(costs) // 2] else 0.0
+    steps = [experiment.sample_time_s for experiment in problem.experiments]
+    reach = int(0.9 * LARGEST_DELAY_S / COARSE_STEP_S)
+    costs = np.zeros(2 * reach + 1)
+    grid_s = 0.0
+    for index, (u, y) in enumerate(zip(problem.inputs_at(0.0), problem.outputs, strict=True)):
+        experiment = problem.experiments[index]
+        stride = max(round(COARSE_STEP_S / steps[index]), 1)
+        edge = reach * stride
+        inside = np.where(experiment.kept, 1.0, 0.0)[edge : y.size - edge]
+        count = float(inside.sum())
+        if count < 10:
+            continue
+        grid_s = grid_s or stride * steps[index]
+        target = y[edge : y.size - edge]
+        target = (target - float(target @ inside) / count) * inside
+        w = lag(u, pole, experiment.step)
+        # Every sum that the least squares need, at every shift, is a correlation with the samples that count.
+        at = slice(None, None, stride)
+        mean_u, mean_w = (np.correlate(signal, inside)[at] / count for signal in (u, w))
+        uu, uw, ww = (np.correlate(product, inside)[at] for product in (u * u, u * w, w * w))
+        uu, uw, ww = uu - count * mean_u**2, uw - count * mean_u * mean_w, ww - count * mean_w**2
+        uy, wy = np.correlate(u, target)[at], np.correlate(w, target)[at]
+        determinant = np.maximum(uu * ww - uw**2, 1e-9 * uu * ww + 1e-300)
+        costs += float(target @ target) - (uy**2 * ww - 2 * uy * wy * uw + wy**2 * uu) / determinant
+    if grid_s == 0.0 or costs.min() >= 0.5 * costs[reach]:
+        return 0.0
+    best = int(np.argmin(costs)) - reach
+    # In the inverse direction the input is shifted forwards to undo the reading's delay.
+    sign = 1.0 if problem.settings.direction == "inverse" else -1.0
+    return sign * best * grid_s

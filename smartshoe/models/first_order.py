@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Literal
@@ -14,6 +15,7 @@ from smartshoe.errors import UsageError
 
 Array = NDArray[np.float64]
 Steps = float | Array
+SMALL = 1e-3
 EVEN_TOLERANCE = 1e-3  # of a step: far below the jitter that moves an estimate, above rounded time stamps
 
 
@@ -29,26 +31,37 @@ def steps(time_s: Array) -> Steps:
 def hold_coefficients(x: Any) -> tuple[Any, Any, Any]:
     """E, A, B of ``w_k = E w_{k-1} + A u_k + B u_{k-1}`` for w = alpha/(s + alpha) u under first-order hold.
 
-    ``x`` = alpha times the step. With phi = (1 - E)/x: E = exp(-x), A = 1 - phi, B = phi - E.
+    ``x`` = alpha times the step, a float or an array. With phi = (1 - E)/x: E = exp(-x), A = 1 - phi, B = phi - E.
     """
+    if isinstance(x, float):
+        now = 1.0 + math.expm1(-x) / x if x > SMALL else _now_series(x)
+        return math.exp(-x), now, -math.expm1(-x) - now
     x = np.asarray(x, dtype=float)
-    decay = np.exp(-x)
-    safe = np.where(x > 1e-3, x, 1.0)
-    # 1 - phi loses digits for small x; its series does not.
-    series = x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x / 720))))
-    now = np.where(x > 1e-3, 1.0 + np.expm1(-safe) / safe, series)
-    return decay, now, -np.expm1(-x) - now
+    safe = np.where(x > SMALL, x, 1.0)
+    now = np.where(x > SMALL, 1.0 + np.expm1(-safe) / safe, _now_series(x))
+    return np.exp(-x), now, -np.expm1(-x) - now
 
 
 def hold_slopes(x: Any) -> tuple[Any, Any, Any]:
     """Derivatives of `hold_coefficients` with respect to ``x``."""
+    if isinstance(x, float):
+        decay = math.exp(-x)
+        slope = (decay + math.expm1(-x) / x) / x if x > SMALL else _phi_slope_series(x)
+        return -decay, -slope, slope + decay
     x = np.asarray(x, dtype=float)
     decay = np.exp(-x)
-    safe = np.where(x > 1e-3, x, 1.0)
-    phi = -np.expm1(-safe) / safe
-    series = -1 / 2 + x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x / 144)))
-    slope = np.where(x > 1e-3, (np.exp(-safe) - phi) / safe, series)
+    safe = np.where(x > SMALL, x, 1.0)
+    slope = np.where(x > SMALL, (np.exp(-safe) + np.expm1(-safe) / safe) / safe, _phi_slope_series(x))
     return -decay, -slope, slope + decay
+
+
+def _now_series(x: Any) -> Any:
+    # 1 - phi loses digits for small x; its series does not.
+    return x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x / 720))))
+
+
+def _phi_slope_series(x: Any) -> Any:
+    return -1 / 2 + x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x / 144)))
 
 
 @cache
@@ -114,23 +127,57 @@ def simulate(
     return y
 
 
-def shifted(u: Array, time_s: Array, step: Steps, shift_s: float) -> tuple[Array, Array]:
-    """u(t + shift) (n,) and its derivative with respect to the shift, by cubic Hermite (Catmull-Rom) interpolation.
+HALF_WIDTH = 8  # neighbours on either side: all-pass up to nine tenths of the Nyquist frequency
 
-    It passes through the samples and has no kinks, so that a delay can be found by its gradient. Beyond the ends
-    the end values hold.
+
+def interpolation_taps(fraction: float) -> tuple[Array, Array]:
+    """Weights (16,) of the neighbours -7 ... 8 for a value at ``fraction`` (0 to 1) past a sample, and their slopes.
+
+    A sinc behind a raised-cosine window, mended to pass constants and ramps as they are. Interpolation over few
+    neighbours would smooth the noise, by an amount that depends on the fraction, and a fit would take that for a
+    delay.
+    """
+    x = fraction - np.arange(1 - HALF_WIDTH, HALF_WIDTH + 1)
+    angle = np.pi * x
+    safe = np.where(np.abs(x) > 1e-4, x, 1.0)
+    near = np.abs(x) <= 1e-4
+    sinc = np.where(near, 1 - angle**2 / 6, np.sin(angle) / (np.pi * safe))
+    sinc_slope = np.where(near, -np.pi * angle / 3, (np.cos(angle) - np.sin(angle) / (np.pi * safe)) / safe)
+    window = 0.5 + 0.5 * np.cos(angle / HALF_WIDTH)
+    window_slope = -0.5 * np.pi / HALF_WIDTH * np.sin(angle / HALF_WIDTH)
+    taps, slopes = sinc * window, sinc_slope * window + sinc * window_slope
+    total = taps.sum()
+    taps, slopes = taps / total, (slopes - taps * slopes.sum() / total) / total
+    places = np.arange(1.0 - HALF_WIDTH, HALF_WIDTH + 1.0)
+    missing, missing_slope = fraction - places @ taps, 1.0 - places @ slopes
+    nearest = slice(HALF_WIDTH - 1, HALF_WIDTH + 1)
+    taps[nearest] += np.array([-missing, missing])
+    slopes[nearest] += np.array([-missing_slope, missing_slope])
+    return taps, slopes
+
+
+def interpolation_gain(shift_s: float, step_s: float) -> tuple[float, float]:
+    """The share of white noise's power that `shifted` lets through, and its derivative with respect to the shift."""
+    taps, slopes = interpolation_taps(shift_s / step_s - np.floor(shift_s / step_s))
+    return float(taps @ taps), float(2.0 * taps @ slopes) / step_s
+
+
+def shifted(u: Array, time_s: Array, step: Steps, shift_s: float) -> tuple[Array, Array]:
+    """u(t + shift) (n,) and its derivative with respect to the shift.
+
+    `interpolation_taps` on even steps; cubic Hermite on uneven ones. Either passes through the samples and has no
+    kinks, so that a delay can be found by its gradient. Beyond the ends the end values hold.
     """
     n = u.size
     if isinstance(step, float):
+        from smartshoe.kernels.shift import weighted_neighbours
+
         whole = int(np.floor(shift_s / step))
-        f = shift_s / step - whole
-        taps = _catmull_rom(f)
-        slopes = _catmull_rom_slope(f)
-        index = np.arange(n) + whole
-        points = [u[np.clip(index + j, 0, n - 1)] for j in (-1, 0, 1, 2)]
-        value = sum((tap * point for tap, point in zip(taps, points, strict=True)), np.zeros(n))
-        slope = sum((tap * point for tap, point in zip(slopes, points, strict=True)), np.zeros(n))
-        return value, slope / step
+        taps, slopes = interpolation_taps(shift_s / step - whole)
+        value, slope = np.empty(n), np.empty(n)
+        weighted_neighbours(u, whole + 1 - HALF_WIDTH, taps, value)
+        weighted_neighbours(u, whole + 1 - HALF_WIDTH, slopes / step, slope)
+        return value, slope
     gradient = np.gradient(u, time_s)
     at = np.clip(time_s + shift_s, time_s[0], time_s[-1])
     k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, n - 2)
@@ -140,21 +187,3 @@ def shifted(u: Array, time_s: Array, step: Steps, shift_s: float) -> tuple[Array
     first, last = h * gradient[k], h * gradient[k + 1]
     third, second = first + last - 2 * rise, 3 * rise - 2 * first - last
     return u[k] + f_ * (first + f_ * (second + f_ * third)), (first + f_ * (2 * second + 3 * f_ * third)) / h
-
-
-def _catmull_rom(f: float) -> tuple[float, float, float, float]:
-    return (
-        0.5 * f * (-1 + f * (2 - f)),
-        1 + 0.5 * f * f * (-5 + 3 * f),
-        0.5 * f * (1 + f * (4 - 3 * f)),
-        0.5 * f * f * (f - 1),
-    )
-
-
-def _catmull_rom_slope(f: float) -> tuple[float, float, float, float]:
-    return (
-        -0.5 + f * (2 - 1.5 * f),
-        f * (-5 + 4.5 * f),
-        0.5 + f * (4 - 4.5 * f),
-        f * (1.5 * f - 1),
-    )

@@ -11,6 +11,7 @@ from scipy import signal
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification import identify
 from smartshoe.identification.experiment import prepare
+from smartshoe.identification.parametrisation import GREY_FIXED, FreeForm, GreyBox
 from smartshoe.identification.prediction_error import PredictionError, Settings
 from smartshoe.models import X_OVER_NRT
 from smartshoe.protocol import dynamic_protocol
@@ -90,10 +91,13 @@ def test_srivc_is_as_good_as_its_error_bars() -> None:
 
 @pytest.mark.parametrize("direction", ["inverse", "forward"])
 @pytest.mark.parametrize("structure", ["free", "grey_box"])
-def test_the_gradient_is_the_difference_quotient(direction: str, structure: str) -> None:
+@pytest.mark.parametrize("noise_ratio", [0.0, 0.3])
+def test_the_gradient_is_the_difference_quotient(direction: str, structure: str, noise_ratio: float) -> None:
     experiments, _ = prepare([press(load_noise=1.0, offset=3.0), press(load_noise=1.0, seed=1, name="more")])
-    problem = PredictionError(experiments, Settings(direction=direction, structure=structure, stiffness=0.4))
-    theta = np.array([-1.3, 1.5, 1.4] if structure == "free" else [-1.3, 1.4])
+    form = FreeForm(direction) if structure == "free" else GreyBox(direction, 1.1, GREY_FIXED, {})
+    settings_ = Settings(direction=direction, noise_ratio=noise_ratio)
+    problem = PredictionError(experiments, settings_, form)
+    theta = np.array([-1.3, 1.5, 1.4] if structure == "free" else [1.2, 0.3])
     theta = np.concatenate([theta, [0.003, 2.0, -1.0, 3.0, 5.0]])
     jacobian = problem.jacobian(theta).copy()
     for index in range(theta.size):
