@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from smartshoe.cli.inputs import column_options, read_all
+from smartshoe.errors import UsageError
 
 
 @click.command(
@@ -31,22 +34,44 @@ from smartshoe.cli.inputs import column_options, read_all
     type=click.Choice(["free", "grey_box"]),
     default="free",
     show_default=True,
-    help="a1, b0 and b1 free, or k1 and k2 with c = 1 as in the paper.",
+    help="a1, b0 and b1 free, or k1 and k2 with c = 1 as in the paper (see --fix, --bound).",
 )
+@click.option(
+    "--estimator",
+    type=click.Choice(["auto", "output_error", "errors_in_variables", "command", "cycles"]),
+    default="auto",
+    show_default=True,
+    help="Whose noise is allowed for: auto goes beyond the output's where the input's would bias the result.",
+)
+@click.option("--offset", metavar="READING", help="Fix the reading at no load (default: estimated).")
+@click.option(
+    "--delay", metavar="SECONDS", help="Fix the delay, reading later than load positive (default: estimated)."
+)
+@click.option(
+    "--initial-state",
+    type=click.Choice(["estimate", "steady"]),
+    default="estimate",
+    show_default=True,
+    help="Estimate each experiment's start, or take its first reading to have lasted for ever.",
+)
+@click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Grey box: fix k1, k2, c or x_over_nrt.")
+@click.option("--bound", "bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Grey box: keep a parameter within.")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 @click.option("--calibration", "calibration_path", metavar="OUT.json", help="Write a calibration for compensate.")
 @column_options
 def command(
     files: tuple[str, ...],
-    direction: str,
-    method: str,
-    structure: str,
     json_path: str | None,
     calibration_path: str | None,
     time: str | None,
     force: str | None,
     sensors: tuple[str, ...],
     unit: str | None,
+    offset: str | None,
+    delay: str | None,
+    fixed: tuple[str, ...],
+    bounds: tuple[str, ...],
+    **choices: Any,
 ) -> None:
     """Identify one unit from one or more experiments (one FILE each)."""
     from smartshoe.cli.output import emit_json
@@ -54,7 +79,14 @@ def command(
     from smartshoe.report.tables import print_identification
 
     recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
-    found = identify(recordings, direction=direction, method=method, structure=structure)  # type: ignore[arg-type]
+    found = identify(
+        recordings,
+        offset="estimate" if offset is None else _number("--offset", offset),
+        delay="estimate" if delay is None else _number("--delay", delay),
+        fixed=dict(_named("--fix", text) for text in fixed) or None,
+        bounds={name: _range("--bound", name, limits) for name, limits in (_split("--bound", text) for text in bounds)},
+        **choices,
+    )
     if calibration_path is not None:
         import datetime
 
@@ -65,3 +97,32 @@ def command(
         print_identification(result)
         if calibration_path is not None:
             click.echo(f"calibration: {calibration_path}")
+
+
+def _number(option: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UsageError(f"{option} is {text!r}: give a number") from None
+
+
+def _split(option: str, text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise UsageError(f"{option} is {text!r}: write NAME=VALUE, for example k1=1.3")
+    return name.strip(), value.strip()
+
+
+def _named(option: str, text: str) -> tuple[str, float]:
+    name, value = _split(option, text)
+    return name, _number(f"{option} {name}", value)
+
+
+def _range(option: str, name: str, text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise UsageError(f"{option} {name} is {text!r}: write NAME=LOW:HIGH, either side empty for no limit")
+    return (
+        _number(f"{option} {name}", low or "-inf"),
+        _number(f"{option} {name}", high or "inf"),
+    )

@@ -27,7 +27,8 @@ def _table(title: str, columns: Sequence[str]) -> Table:
 def print_identification(result: Mapping[str, Any]) -> None:
     """The parameters with error bars, the fit and its tests."""
     table = _table(
-        f"{result.get('unit') or 'unit'}: {result['direction']} fit by {result['method']}",
+        f"{result.get('unit') or 'unit'}: {result['direction']} fit by {result['method']},"
+        f" {result['estimator'].replace('_', ' ')}",
         ["parameter", "value ± sd", "95 % interval", "unit"],
     )
     for name, parameter in result["parameters"].items():
@@ -46,6 +47,8 @@ def print_identification(result: Mapping[str, Any]) -> None:
         f" residual: whiteness p = {plain(tests['whiteness']['p_value'], 2)},"
         f" input independence p = {plain(tests['input_independence']['p_value'], 2)}"
     )
+    if result.get("consistency"):
+        console.print(f"c = 1, the paper's form: {result['consistency']['says']}", soft_wrap=True)
     for note in result.get("notes", ()):
         console.print(f"note: {note}", soft_wrap=True)
 

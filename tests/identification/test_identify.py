@@ -6,58 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import signal
+from presses import FIXED, SIX_RATES, TOE, coefficients, press
 
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification import identify
 from smartshoe.identification.experiment import prepare
 from smartshoe.identification.parametrisation import GREY_FIXED, FreeForm, GreyBox
 from smartshoe.identification.prediction_error import PredictionError, Settings
-from smartshoe.models import X_OVER_NRT
-from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Recording
 
 METHODS = ("srivc", "gn", "lm", "trf")
-TOE = (1.341, 0.215, 1.0)
-FIXED = {"offset": 0.0, "delay": 0.0, "initial_state": "steady"}
-
-
-def coefficients(k1: float, k2: float, c: float) -> tuple[float, float, float]:
-    """a1, b0, b1 of Chinimilli 2016 (3), (4), (14)."""
-    return k2 / c, 1 + (k1 + k2) * X_OVER_NRT, k2 / c * (1 + k1 * X_OVER_NRT)
-
-
-def press(
-    solid: tuple[float, float, float] = TOE,
-    *,
-    seed: int = 0,
-    load_noise: float = 0.0,
-    reading_noise: float = 0.0,
-    offset: float = 0.0,
-    delay_s: float = 0.0,
-    start_s: float = 0.0,
-    rates: tuple[float, ...] = (100.0, 400.0, 800.0),
-    repeats: int = 2,
-    rest_s: float = 2.0,
-    name: str = "triangles",
-    metadata: dict[str, str] | None = None,
-    gap: slice | None = None,
-) -> Recording:
-    """The paper's triangles at 100 Hz on a plant solved by scipy at 1 kHz."""
-    a1, b0, b1 = coefficients(*solid)
-    protocol = dynamic_protocol(rates, repeats=repeats, rest_s=rest_s)
-    fine = np.arange(0.0, protocol.duration_s, 1e-3)
-    load = protocol.load_at(fine)
-    reading = signal.lsim(([1.0, a1], [b0, b1]), load, fine)[1]
-    time_s = np.arange(start_s, protocol.duration_s - 0.5, 0.01)
-    rng = np.random.default_rng(seed)
-    measured = np.interp(time_s - delay_s, fine, reading) + offset + reading_noise * rng.standard_normal(time_s.size)
-    force_n = np.interp(time_s, fine, load) + load_noise * rng.standard_normal(time_s.size)
-    if gap is not None:
-        measured[gap] = np.nan
-    return Recording.from_arrays(
-        time_s=time_s, force_n=force_n, pressure_mbar=measured, name=name, unit="left_toe", metadata=metadata
-    )
 
 
 @given(
@@ -108,7 +66,7 @@ def test_the_gradient_is_the_difference_quotient(direction: str, structure: str,
 
 
 def test_the_papers_triangles_reach_the_known_error_bars() -> None:
-    recording = press(load_noise=2.23, rates=(50.0, 100.0, 200.0, 400.0, 600.0, 800.0), repeats=3, rest_s=0.0)
+    recording = press(load_noise=2.23, rates=SIX_RATES, repeats=3, rest_s=0.0)
     found = identify(recording, **FIXED)
     relative = [100 * found.parameters[name].sd / found.parameters[name].value for name in ("a1", "b0", "b1")]
     assert relative == pytest.approx([0.378, 0.0099, 0.379], rel=0.03)
