@@ -17,7 +17,7 @@ from smartshoe.models.parameter import finite_or_none
 Mask = NDArray[np.bool_]
 WHITENESS_LAGS = 20
 INPUT_LAGS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
-BLOCKS = 2000  # means of samples that the input's test looks at
+BLOCKS = 1500  # means of samples that the input's test looks at
 
 
 @dataclass(frozen=True, slots=True)

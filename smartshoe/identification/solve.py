@@ -17,9 +17,9 @@ from smartshoe.errors import NotIdentifiableError
 Array = NDArray[np.float64]
 Solver = Literal["gn", "lm", "trf"]
 
-# A Gauss-Newton step that promises less than this share of one residual's variance is a hundred-thousandth of a
-# standard error long: nothing is left to gain.
-NEGLIGIBLE = 1e-10
+# A Gauss-Newton step that promises less than this share of one residual's variance is a ten-thousandth of a
+# standard error long, and once it is taken what is left is of second order.
+NEGLIGIBLE = 1e-8
 ROUNDING = 1e-14  # of the cost: below it a change is arithmetic, not descent
 SINGULAR = 1e-15
 
@@ -77,7 +77,7 @@ def solve_normal(normal: Array, right: Array) -> Array:
 def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float, max_iterations: int) -> Minimum:
     """The least squares from ``theta``; ``tolerance`` is the relative change of theta that ends the iteration.
 
-    It also ends where the full Gauss-Newton step is below 1e-5 standard errors. Raises `NotIdentifiableError` where
+    It also ends where the full Gauss-Newton step, which is still taken, is below 1e-4 standard errors. Raises `NotIdentifiableError` where
     the normal equations have no finite solution.
     """
     theta = np.clip(np.asarray(theta, dtype=float), problem.lower, problem.upper)
