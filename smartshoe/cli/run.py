@@ -12,6 +12,9 @@ import click
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 def command(scenario: str, seed: int | None, out_folder: str | None, json_path: str | None) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
+    from smartshoe.kernels import warm_up
+
+    warm_up.begin()
     from smartshoe.atomic import make_folder
     from smartshoe.cli.output import emit_json, progress, to_json
     from smartshoe.report.tables import print_summary

@@ -119,7 +119,7 @@ def prepare(
                 name,
                 time_s,
                 steps(time_s),
-                _bridged(time_s, np.asarray(load.si, dtype=float), load.present),
+                _bridged(time_s, load.si, load.present),
                 _bridged(time_s, sensor.in_unit(reading_unit), sensor.present),
                 kept,
                 int(np.count_nonzero(~present)),
@@ -131,9 +131,12 @@ def prepare(
 
 
 def _bridged(time_s: Array, values: Array, present: Mask) -> Array:
-    """``values`` with missing samples on the line between their neighbours: what the model takes for granted anyway."""
+    """A copy of ``values``, missing samples on the line between their neighbours: what the model takes for granted.
+
+    A copy, since a compiled pass is compiled anew for arrays that may not be written.
+    """
     if present.all() or not present.any():
-        return values
+        return np.array(values, dtype=float)
     return np.interp(time_s, time_s[present], values[present])
 
 
