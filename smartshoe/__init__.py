@@ -22,6 +22,12 @@ _HOME = {
     "open_machine": "smartshoe.devices",
     "identify": "smartshoe.identification",
     "Identification": "smartshoe.identification",
+    "identify_transfer_function": "smartshoe.identification.transfer_function",
+    "select_order": "smartshoe.identification.transfer_function",
+    "TransferFunctionEstimate": "smartshoe.identification.transfer_function",
+    "RecursiveIdentification": "smartshoe.identification.recursive",
+    "lack_of_fit": "smartshoe.identification.lack_of_fit",
+    "leave_one_rate_out": "smartshoe.identification.leave_out",
     "Calibration": "smartshoe.compensation",
     "Compensator": "smartshoe.compensation",
     "stack": "smartshoe.compensation",
@@ -34,6 +40,14 @@ if TYPE_CHECKING:
     from smartshoe.devices import open_machine, open_shoe
     from smartshoe.errors import SmartShoeError
     from smartshoe.identification import Identification, identify
+    from smartshoe.identification.lack_of_fit import lack_of_fit
+    from smartshoe.identification.leave_out import leave_one_rate_out
+    from smartshoe.identification.recursive import RecursiveIdentification
+    from smartshoe.identification.transfer_function import (
+        TransferFunctionEstimate,
+        identify_transfer_function,
+        select_order,
+    )
     from smartshoe.logs import read, write
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
@@ -46,12 +60,18 @@ __all__ = [
     "Identification",
     "Protocol",
     "Recording",
+    "RecursiveIdentification",
     "SmartShoeError",
+    "TransferFunctionEstimate",
     "dynamic_protocol",
     "identify",
+    "identify_transfer_function",
+    "lack_of_fit",
+    "leave_one_rate_out",
     "open_machine",
     "open_shoe",
     "read",
+    "select_order",
     "stack",
     "static_protocol",
     "validate",

@@ -32,11 +32,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if "hardware" in item.keywords:
                 item.add_marker(skip)
-    if "bank" not in (config.getoption("-m") or ""):
-        skip = pytest.mark.skip(reason="a long bank: run it with -m bank")
-        for item in items:
-            if "bank" in item.keywords:
-                item.add_marker(skip)
+    for mark, reason in (("bank", "a long bank"), ("benchmark", "figures against peers")):
+        if mark not in (config.getoption("-m") or ""):
+            skip = pytest.mark.skip(reason=f"{reason}: run it with -m {mark}")
+            for item in items:
+                if mark in item.keywords:
+                    item.add_marker(skip)
 
 
 @pytest.fixture(scope="session")

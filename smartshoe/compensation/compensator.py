@@ -15,6 +15,7 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit
 
 Array = NDArray[np.float64]
+_FLOAT64 = np.dtype(np.float64)
 
 
 class Compensator:
@@ -95,6 +96,11 @@ class Compensator:
             reading_unit=self.reading_unit,
         )
 
+    def _column(self) -> list[float]:
+        """The filter as a column of a bank, in the order of `smartshoe.kernels.streaming`, with no past."""
+        n0, n1 = self.numerator
+        return [float(n0), float(n1), float(self.denominator[1]), self._static_gain, self.offset, 0.0, np.nan, 0.0]
+
     def _push_block(self, block: Array) -> Array:
         finite = np.isfinite(block)
         self._missing += int(block.size - np.count_nonzero(finite))
@@ -121,7 +127,10 @@ class Compensator:
 
 
 class CompensatorBank:
-    """Several units at once: one `Compensator` a unit, in the order given to `stack`."""
+    """Several units at once: one `Compensator` a unit, in the order given to `stack`.
+
+    Its kernel is compiled (or fetched from numba's cache) here, so that the first tick of a live session does not wait.
+    """
 
     def __init__(self, filters: Sequence[Compensator]) -> None:
         self.filters = tuple(item._copy() for item in filters)
@@ -130,32 +139,67 @@ class CompensatorBank:
         rates = sorted({item.sample_rate_hz for item in self.filters})
         if len(rates) > 1:
             raise UsageError(f"filters of {rates[0]:g} and {rates[-1]:g} Hz cannot run together: make them at one rate")
+        from smartshoe.kernels.streaming import push_block, push_tick
+
+        self._push_tick, self._push_block = push_tick, push_block
+        self._bank = np.array([item._column() for item in self.filters]).T.copy()
+        self.reset()
 
     def __len__(self) -> int:
         return len(self.filters)
 
     def reset(self) -> None:
         """Forget the past of every unit."""
-        for item in self.filters:
-            item.reset()
+        self._bank[5:] = np.array([[0.0], [np.nan], [0.0]])
 
     @property
     def missing_count(self) -> tuple[int, ...]:
         """Per unit, how many readings since `reset` were not finite."""
-        return tuple(item.missing_count for item in self.filters)
+        return tuple(int(count) for count in self._bank[7])
 
-    def push(self, readings: ArrayLike) -> Array:
-        """Forces in N of one tick (units,) or a block (ticks, units), of the same shape as ``readings``."""
-        block = np.asarray(readings, dtype=float)
-        if block.ndim not in (1, 2) or block.shape[-1] != len(self.filters):
-            raise InputError(
-                f"readings have shape {block.shape}: give ({len(self.filters)},) or (ticks, {len(self.filters)})"
+    def push(self, readings: ArrayLike, out: Array | None = None) -> Array:
+        """Forces in N of one tick (units,) or a block (ticks, units), of the same shape as ``readings``.
+
+        A new array, or ``out`` where it is given: float64, C-contiguous, of the readings' shape. It may be ``readings``
+        itself but not overlap it otherwise. A tick of float64 with ``out`` allocates no array.
+        Raises `InputError` for other shapes, and `UsageError` for an ``out`` that cannot be written to.
+        """
+        if out is not None:
+            # Numba tells the types apart more cheaply than Python can, and refuses before it does anything.
+            try:
+                if out.ndim == 1 and self._push_tick(readings, out, self._bank):
+                    return out
+            except (TypeError, AttributeError):
+                pass
+        elif (
+            type(readings) is np.ndarray
+            and readings.shape == (len(self.filters),)
+            and readings.dtype is _FLOAT64
+            and readings.flags.carray
+        ):
+            out = np.empty(len(self.filters))
+            self._push_tick(readings, out, self._bank)
+            return out
+        return self._push_any(readings, out)
+
+    def _push_any(self, readings: ArrayLike, out: Array | None) -> Array:
+        block = np.require(readings, dtype=np.float64, requirements=["C", "A", "W"])
+        units = len(self.filters)
+        if np.ndim(readings) not in (1, 2) or block.shape[-1] != units:
+            raise InputError(f"readings have shape {np.shape(readings)}: give ({units},) or (ticks, {units})")
+        if out is None:
+            out = np.empty(block.shape)
+        elif (
+            not isinstance(out, np.ndarray)
+            or out.dtype != np.float64
+            or out.shape != block.shape
+            or not out.flags.carray
+        ):
+            raise UsageError(
+                f"out cannot hold the forces: give a writeable C-contiguous float64 array of {block.shape}"
             )
-        rows = block.reshape(-1, len(self.filters))
-        forces_n = np.empty_like(rows)
-        for column, item in enumerate(self.filters):
-            forces_n[:, column] = item._push_block(rows[:, column])
-        return forces_n.reshape(block.shape)
+        self._push_block(block.reshape(-1, units), out.reshape(-1, units), self._bank)
+        return out
 
 
 def stack(filters: Sequence[Compensator]) -> CompensatorBank:

@@ -129,7 +129,7 @@ def _parameters(fit: Fit, choice: Choice, theta: Array | None = None) -> tuple[A
         solid, to_solid = form.solid(theta[: problem.shape_size])
         scale = form.scale
     else:
-        solid, by_coefficients, scale = _solid(coefficients, choice.newtons)
+        solid, by_coefficients, scale = solid_of(coefficients, choice.newtons)
         to_solid = by_coefficients @ to_coefficients
     slope = np.zeros((6, problem.size))
     slope[:3, : problem.shape_size], slope[3:, : problem.shape_size] = to_coefficients, to_solid
@@ -144,7 +144,7 @@ def _function(fit: Fit, choice: Choice, index: int) -> Function:
     return parameter
 
 
-def _solid(coefficients: Array, newtons: float | None) -> tuple[Array, Array, float]:
+def solid_of(coefficients: Array, newtons: float | None) -> tuple[Array, Array, float]:
     """(k1, k2, c), their Jacobian (3, 3) over (a1, b0, b1), and the scale; newtons None: c = 1 and scale free."""
     a1, b0, b1 = (float(value) for value in coefficients)
     static = b1 / a1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ Mask = NDArray[np.bool_]
 Direction = Literal["inverse", "forward"]
 
 FEWEST_SAMPLES = 20
+MOST_SKIPPED = 4  # times as many samples, put back, as there are
+SKIPPED_TOLERANCE = 0.05  # of a step
 LEAST_RETURN = 0.1  # of the load's range that must be travelled both ways
 
 
@@ -26,7 +28,8 @@ LEAST_RETURN = 0.1  # of the load's range that must be travelled both ways
 class Experiment:
     """One recording as load in N and reading in the common reading unit, both (n,), gaps bridged by straight lines.
 
-    ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``kept`` marks the samples whose error counts.
+    ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``kept`` marks the samples whose error
+    counts. ``rows`` says which samples are the recording's, where skipped ones were put back; None: all are.
     """
 
     name: str
@@ -37,11 +40,16 @@ class Experiment:
     kept: Mask
     n_missing: int
     command_n: Array | None = None
+    rows: NDArray[np.intp] | None = None
 
     @property
     def sample_time_s(self) -> float:
         """The even step, or the median of the uneven ones."""
         return self.step if isinstance(self.step, float) else float(np.median(self.step))
+
+    def of_recording(self, signal: Any) -> Any:
+        """``signal`` (n,) at the recording's own samples."""
+        return signal if self.rows is None else signal[self.rows]
 
     def decimated(self, factor: int) -> Experiment:
         """Means of ``factor`` neighbours: a start for a fit, at a fraction of its cost."""
@@ -113,21 +121,52 @@ def prepare(
             if mask.shape != present.shape:
                 raise UsageError(f"counted[{name!r}] has shape {mask.shape}: give one flag a sample, {present.shape}")
             kept = present & mask
-        time_s = recording.time_s - recording.time_s[0]
-        experiments.append(
-            Experiment(
-                name,
-                time_s,
-                steps(time_s),
-                _bridged(time_s, load.si, load.present),
-                _bridged(time_s, sensor.in_unit(reading_unit), sensor.present),
-                kept,
-                int(np.count_nonzero(~present)),
-                recording.command_n,
-            )
+        command_n = recording.command_n
+        experiment = Experiment(
+            name,
+            recording.time_s - recording.time_s[0],
+            steps(recording.time_s),
+            _bridged(recording.time_s, load.si, load.present),
+            _bridged(recording.time_s, sensor.in_unit(reading_unit), sensor.present),
+            kept,
+            int(np.count_nonzero(~present)),
+            None if command_n is None else np.array(command_n, dtype=float),
         )
+        experiments.append(_on_one_step(experiment))
     _require_identifiable(experiments, recordings)
     return experiments, reading_unit
+
+
+def _on_one_step(experiment: Experiment) -> Experiment:
+    """The experiment with rows that a logger has skipped put back as samples that do not count, where that is all.
+
+    Straight lines over the gaps, as the model takes them anyway: nothing changes but that even steps are fast, and
+    that a delay moves the input by the better interpolation.
+    """
+    if isinstance(experiment.step, float):
+        return experiment
+    step_s = float(np.median(experiment.step))
+    places = np.concatenate([[0.0], np.cumsum(np.round(experiment.step / step_s))])
+    size = int(places[-1]) + 1
+    if np.min(np.diff(places)) < 1 or size > MOST_SKIPPED * places.size:
+        return experiment
+    step_s = float(experiment.time_s[-1] / places[-1])
+    if np.max(np.abs(experiment.time_s - step_s * places)) > SKIPPED_TOLERANCE * step_s:
+        return experiment
+    time_s, at = step_s * np.arange(size, dtype=float), places.astype(int)
+    kept = np.zeros(size, dtype=bool)
+    kept[at] = experiment.kept
+    command_n = experiment.command_n
+    return replace(
+        experiment,
+        time_s=time_s,
+        step=step_s,
+        load_n=np.interp(np.arange(size), places, experiment.load_n),
+        reading=np.interp(np.arange(size), places, experiment.reading),
+        kept=kept,
+        command_n=None if command_n is None else np.interp(np.arange(size), places, command_n),
+        rows=at,
+    )
 
 
 def _bridged(time_s: Array, values: Array, present: Mask) -> Array:

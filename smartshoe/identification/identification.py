@@ -70,16 +70,17 @@ class Identification:
         """By recording, model minus measured (n,) at every sample, those that did not count too."""
         problem = self.fit.problem
         return {
-            experiment.name: problem.model_error(self.fit.theta, index)
+            experiment.name: experiment.of_recording(problem.model_error(self.fit.theta, index))
             for index, experiment in enumerate(problem.experiments)
         }
 
     @property
     def residuals(self) -> Mapping[str, Array]:
         """By recording, measured minus model (n,), NaN where a sample did not count."""
+        problem = self.fit.problem
         return {
-            name: np.where(kept, -error, np.nan)
-            for (name, error), kept in zip(self.errors.items(), self.fit.problem.kept, strict=True)
+            experiment.name: np.where(experiment.of_recording(kept), -self.errors[experiment.name], np.nan)
+            for experiment, kept in zip(problem.experiments, problem.kept, strict=True)
         }
 
     @property
@@ -87,14 +88,18 @@ class Identification:
         """``fit_percent`` of each recording."""
         problem = self.fit.problem
         return {
-            name: fit_percent(y[kept], error[kept])
-            for (name, error), y, kept in zip(self.errors.items(), problem.outputs, problem.kept, strict=True)
+            experiment.name: fit_percent(y[kept], problem.model_error(self.fit.theta, index)[kept])
+            for index, (experiment, y, kept) in enumerate(
+                zip(problem.experiments, problem.outputs, problem.kept, strict=True)
+            )
         }
 
     @cached_property
     def residual_tests(self) -> Mapping[str, ResidualTest]:
         """Whiteness, and independence of the input."""
-        return residual_tests(self.fit.problem, self.fit.theta, list(self.errors.values()))
+        problem = self.fit.problem
+        errors = [problem.model_error(self.fit.theta, index) for index in range(len(problem.experiments))]
+        return residual_tests(problem, self.fit.theta, errors)
 
     @cached_property
     def consistency(self) -> ConsistencyTest:

@@ -51,7 +51,8 @@ def input_noise_bias(problem: PredictionError, theta: Array, normal: Array, inpu
     The cost grows by count sd^2 |G|^2, with G from noise to error; its gradient, taken through ``normal`` (size,
     size), moves the minimum (Soderstrom 2007, Automatica 43, 939-958).
     """
-    shape, step_s = problem.shape(theta), problem.experiments[0].sample_time_s
+    first = problem.experiments[0]
+    shape, step_s = problem.shape(theta), first.sample_time_s
     impulse = np.zeros(IMPULSE_SAMPLES)
     impulse[1] = 1.0
     w, w_slope = lag_and_slope(impulse, shape.alpha, step_s)
@@ -60,7 +61,7 @@ def input_noise_bias(problem: PredictionError, theta: Array, normal: Array, inpu
     push = np.zeros(problem.size)
     push[: problem.shape_size] = shape.slope.T @ (own @ response)
     delay_s = problem.delay_s(theta)
-    gain, gain_slope = interpolation_gain(delay_s, step_s)
+    gain, gain_slope = interpolation_gain(delay_s, first.time_s, first.step)
     push *= gain
     if problem.delay_at is not None:
         push[problem.delay_at] = 0.5 * gain_slope * float(response @ response)
@@ -71,10 +72,11 @@ def input_noise_bias(problem: PredictionError, theta: Array, normal: Array, inpu
 
 def output_variance(problem: PredictionError, theta: Array, variance: float, input_sd: float) -> float:
     """What of the error's ``variance`` the input's noise does not account for; never below a thousandth of it."""
-    shape, step_s = problem.shape(theta), problem.experiments[0].sample_time_s
+    first = problem.experiments[0]
+    shape, step_s = problem.shape(theta), first.sample_time_s
     impulse = np.zeros(IMPULSE_SAMPLES)
     impulse[1] = 1.0
     w = lag(impulse, shape.alpha, step_s)
     response = shape.p1 * (impulse - w) + shape.p2 * w
-    gain, _ = interpolation_gain(problem.delay_s(theta), step_s)
+    gain, _ = interpolation_gain(problem.delay_s(theta), first.time_s, first.step)
     return max(variance - input_sd**2 * gain * float(response @ response), 1e-3 * variance)

@@ -306,7 +306,7 @@ class PredictionError:
         step = self.experiments[0].sample_time_s
         delay_s = self.delay_s(theta)
         sign = 1.0 if self.settings.direction == "inverse" else -1.0
-        gain, gain_slope = interpolation_gain(sign * delay_s, step)
+        gain, gain_slope = interpolation_gain(sign * delay_s, self.experiments[0].time_s, self.experiments[0].step)
         slope = np.zeros((3, self.size))
         slope[:, : self.shape_size] = self.shape(theta).slope
         ratio_slope = np.zeros(self.size)

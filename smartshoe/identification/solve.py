@@ -77,8 +77,8 @@ def solve_normal(normal: Array, right: Array) -> Array:
 def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float, max_iterations: int) -> Minimum:
     """The least squares from ``theta``; ``tolerance`` is the relative change of theta that ends the iteration.
 
-    It also ends where the full Gauss-Newton step, which is still taken, is below 1e-4 standard errors. Raises `NotIdentifiableError` where
-    the normal equations have no finite solution.
+    It also ends where the full Gauss-Newton step, which is still taken, is below 1e-4 standard errors. Raises
+    `NotIdentifiableError` where the normal equations have no finite solution.
     """
     theta = np.clip(np.asarray(theta, dtype=float), problem.lower, problem.upper)
     now = problem.evaluate(theta)

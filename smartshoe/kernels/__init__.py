@@ -1,1 +1,1 @@
-"""Compiled inner loops (numba), each beside a plain twin that the tests compare it with."""
+"""Compiled passes over the data, and nothing else: what is fitted or filtered is decided above."""

@@ -156,10 +156,19 @@ def interpolation_taps(fraction: float) -> tuple[Array, Array]:
     return taps, slopes
 
 
-def interpolation_gain(shift_s: float, step_s: float) -> tuple[float, float]:
+def interpolation_gain(shift_s: float, time_s: Array, step: Steps) -> tuple[float, float]:
     """The share of white noise's power that `shifted` lets through, and its derivative with respect to the shift."""
-    taps, slopes = interpolation_taps(shift_s / step_s - np.floor(shift_s / step_s))
-    return float(taps @ taps), float(2.0 * taps @ slopes) / step_s
+    if isinstance(step, float):
+        taps, slopes = interpolation_taps(shift_s / step - np.floor(shift_s / step))
+        return float(taps @ taps), float(2.0 * taps @ slopes) / step
+    some = time_s[: 2000 + 2]
+    at = np.clip(some[:-1] + shift_s, some[0], some[-1])
+    k = np.clip(np.searchsorted(some, at, side="right") - 1, 0, some.size - 2)
+    f, h = (at - some[k]) / step[k], step[k]
+    # The four weights of the cubic that has the neighbours' mean slopes (Catmull and Rom 1974), on even steps.
+    taps = 0.5 * np.stack([f * (-1 + f * (2 - f)), 2 + f**2 * (3 * f - 5), f * (1 + f * (4 - 3 * f)), f**2 * (f - 1)])
+    slopes = 0.5 * np.stack([-1 + f * (4 - 3 * f), f * (9 * f - 10), 1 + f * (8 - 9 * f), f * (3 * f - 2)])
+    return float(np.mean(np.sum(taps**2, axis=0))), float(np.mean(np.sum(2 * taps * slopes, axis=0) / h))
 
 
 def shifted(u: Array, time_s: Array, step: Steps, shift_s: float) -> tuple[Array, Array]:

@@ -12,9 +12,9 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from smartshoe.loading import by_rate, cycles
 from smartshoe.recording import Recording
 from smartshoe.validation import Trace
-from smartshoe.validation.segments import by_rate, cycles
 
 Array = NDArray[np.float64]
 

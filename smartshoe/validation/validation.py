@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from smartshoe.blas import on_one_thread
 from smartshoe.compensation import Calibration, compensate
 from smartshoe.errors import InputError
+from smartshoe.loading import Cycle, by_rate, cycles
 from smartshoe.recording import Recording
 from smartshoe.validation import metrics
-from smartshoe.validation.segments import Cycle, by_rate, cycles
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,6 +7,7 @@ from presses import FIXED, SIX_RATES, TOE, coefficients, press
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification import consistency_test, identify
 from smartshoe.models import X_OVER_NRT
+from smartshoe.recording import Recording
 
 
 @pytest.mark.parametrize("free", [("k1",), ("k2",), ("k1", "k2"), ("k1", "k2", "c"), ("k1", "k2", "x_over_nrt")])
@@ -53,10 +54,16 @@ def test_wrong_grey_boxes_are_named(wrong: dict[str, object], says: str) -> None
 
 
 def test_the_papers_form_is_consistent_where_it_holds() -> None:
-    p_values = [
-        identify(press(seed=seed, load_noise=2.23, rates=SIX_RATES, repeats=1), **FIXED).consistency.p_value
-        for seed in range(40)
-    ]
+    clean, rng = press(rates=SIX_RATES, repeats=1), np.random.default_rng(11)
+    noisy = (
+        Recording.from_arrays(
+            time_s=clean.time_s,
+            force_n=clean.force_n + 2.23 * rng.standard_normal(len(clean)),
+            pressure_mbar=clean.sensor.values,
+        )
+        for _ in range(40)
+    )
+    p_values = [identify(recording, **FIXED).consistency.p_value for recording in noisy]
     # Uniform if the test has its size: 40 draws below 0.1 are 4 on average, more than 12 once in 10,000.
     assert 0 <= sum(p < 0.1 for p in p_values) <= 12
     assert min(p_values) > 1e-4

@@ -173,3 +173,21 @@ def test_a_loose_pole_gets_the_profile_of_its_likelihood() -> None:
             lambda rest, end=end: residual(np.array([np.log(end), *rest])), found.fit.theta[1:], xtol=1e-12
         )
         assert 2 * at.cost - found.fit.cost == pytest.approx(1.96**2 * found.fit.variance, rel=0.05)
+
+
+def test_rows_that_a_logger_skipped_are_samples_that_do_not_count() -> None:
+    whole = press(load_noise=1.0, offset=3.0, delay_s=0.004)
+    skipped = np.random.default_rng(3).random(len(whole)) < 0.1
+    skipped[[0, -1]] = False
+    fewer = whole.taken(~skipped)
+    marked = Recording.from_arrays(
+        time_s=whole.time_s,
+        force_n=np.where(skipped, np.nan, whole.force_n),
+        pressure_mbar=np.where(skipped, np.nan, whole.sensor.values),
+        name="triangles",
+    )
+    left_out, missing = identify(fewer), identify(marked)
+    for name in ("a1", "b0", "b1"):
+        assert left_out.parameters[name].value == pytest.approx(missing.parameters[name].value, rel=1e-6)
+    assert left_out.errors["triangles"].size == len(fewer)
+    assert left_out.n_missing == 0

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.validation import metrics, segments
+from smartshoe import loading
+from smartshoe.validation import metrics
 
 
 @settings(max_examples=20)
@@ -32,6 +33,6 @@ def test_drawn_rates_are_recovered_from_noisy_triangles(rates, noise_n, seed):
         load += [0.0, 800.0, 0.0]
     time_s = np.arange(0.0, at[-1] + 2.0, 0.01)
     noisy = np.interp(time_s, at, load) + np.random.default_rng(seed).normal(0.0, noise_n, time_s.size)
-    found = segments.cycles(time_s, noisy)
+    found = loading.cycles(time_s, noisy)
     # Two end samples of sd 5 N each over 640 N: 1.1 % of rate sd a ramp; four and more of those.
     assert [cycle.rate_n_per_s for cycle in found] == pytest.approx(rates, rel=0.05)

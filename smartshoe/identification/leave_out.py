@@ -1,0 +1,209 @@
+"""Leave-one-rate-out validation: whether the parameters, and the force, hold for a loading rate that was not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from smartshoe import loading
+from smartshoe.errors import NotConvergedError, NotIdentifiableError
+from smartshoe.identification.experiment import Array, Experiment, Mask, prepare
+from smartshoe.identification.identification import Identification
+from smartshoe.identification.identifier import identify
+from smartshoe.models.first_order import lag, shifted
+from smartshoe.recording import Channel, Recording
+
+MOVED_SD = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class RateFold:
+    """What was ``found`` without the cycles of one rate; force errors in N on those cycles, and on what was fitted.
+
+    Where `identify` refused without that rate, ``found`` is None, ``refused`` says why, and the errors are NaN.
+    """
+
+    rate_n_per_s: float
+    cycles: int
+    found: Identification | None
+    rmse_left_out_n: float
+    max_left_out_n: float
+    rmse_fitted_n: float
+    max_fitted_n: float
+    refused: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Movement:
+    """A parameter over the folds: its ``value`` from all rates, ``lowest`` and ``highest`` without one, and the
+    largest distance from ``value`` in standard deviations of the fold, ``moved_sd``; a right model stays within 3."""
+
+    value: float
+    lowest: float
+    highest: float
+    moved_sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class LeaveOneRateOut:
+    """``folds`` by ascending rate, ``movements`` of a1, b0 and b1, the fit to ``everything``, one sentence."""
+
+    folds: tuple[RateFold, ...]
+    movements: Mapping[str, Movement]
+    everything: Identification
+    says: str
+
+
+def leave_one_rate_out(recordings: Recording | Sequence[Recording], **options: Any) -> LeaveOneRateOut:
+    """Identify once without each loading rate (rates within 10 % are one); ``options`` are those of `identify`.
+
+    A cycle goes out together with the rest after it. A recording of which nothing else is left goes out whole: its
+    reading at no load is then the mean over its rest before the first ramp, or the other recordings' where it has
+    none. Errors are of force: in the forward direction the reading's error behind the compensator.
+    Raises `NotIdentifiableError` where there is only one rate or each fold is refused, and what `identify` raises of
+    all recordings together.
+    """
+    several = _in_one_unit([recordings] if isinstance(recordings, Recording) else list(recordings))
+    counted: Mapping[str, Mask] = dict(options.pop("counted", None) or {})
+    everything = identify(several, counted=counted, **options)
+    experiments, _ = prepare(several, counted)
+    cycles = [loading.cycles(one.time_s, one.load_n) for one in experiments]
+    rates = loading.by_rate([cycle for found in cycles for cycle in found])
+    if len(rates) < 2:
+        raise NotIdentifiableError(
+            f"{several[0].label}: the load cycles are of {len(rates)} rate, so that none can be left out: record a"
+            " second loading rate"
+        )
+    folds = []
+    for rate, group in rates.items():
+        members = {id(cycle) for cycle in group}
+        left_out = [_span_of(experiment, found, members) for experiment, found in zip(experiments, cycles, strict=True)]
+        folds.append(_fold(rate, len(group), several, experiments, cycles, left_out, members, options))
+    refused = [fold for fold in folds if fold.found is None]
+    if len(refused) == len(folds):
+        raise NotIdentifiableError(
+            f"{several[0].label}: without any one rate the fit is refused, as without {refused[0].rate_n_per_s:g} N/s:"
+            f" {refused[0].refused}"
+        )
+    movements = {}
+    for name in ("a1", "b0", "b1"):
+        value = everything.parameters[name].value
+        fold_values = [fold.found.parameters[name] for fold in folds if fold.found is not None]
+        movements[name] = Movement(
+            value,
+            min(one.value for one in fold_values),
+            max(one.value for one in fold_values),
+            max(abs(one.value - value) / one.sd if one.sd > 0 else 0.0 for one in fold_values),
+        )
+    worst = max(movements, key=lambda name: movements[name].moved_sd)
+    moved = movements[worst]
+    if moved.moved_sd > MOVED_SD:
+        says = (
+            f"{worst} runs from {moved.lowest:.4g} to {moved.highest:.4g} as one rate or another is left out, up to"
+            f" {moved.moved_sd:.0f} of its standard deviations: the model is wrong, whatever its fit in percent"
+        )
+    else:
+        says = f"no parameter moves by more than {moved.moved_sd:.1f} standard deviations as one rate is left out"
+    if refused:
+        named = " or ".join(f"{fold.rate_n_per_s:g} N/s" for fold in refused)
+        says += f"; without {named} the fit is refused"
+    return LeaveOneRateOut(tuple(folds), movements, everything, says)
+
+
+def _in_one_unit(recordings: Sequence[Recording]) -> list[Recording]:
+    """Readings in the first recording's unit, which must not change as that one is left out."""
+    same = []
+    for recording in recordings:
+        sensor, unit = recording.sensor, recordings[0].sensor.unit
+        if sensor.unit != unit:
+            values = np.where(sensor.present, sensor.in_unit(unit), np.nan)
+            recording = recording.with_channel(Channel.from_values(sensor.name, values, unit, sensor.role))
+        same.append(recording)
+    return same
+
+
+def _span_of(experiment: Experiment, found: list[loading.Cycle], members: set[int]) -> Mask:
+    """(n,) the samples of the cycles in ``members``, each up to the next cycle."""
+    span = np.zeros(experiment.time_s.size, dtype=bool)
+    stops = [cycle.start for cycle in found[1:]] + [span.size]
+    for cycle, stop in zip(found, stops, strict=True):
+        if id(cycle) in members:
+            span[cycle.start : max(stop, cycle.stop)] = True
+    return span
+
+
+def _fold(
+    rate: float,
+    count: int,
+    recordings: Sequence[Recording],
+    experiments: Sequence[Experiment],
+    cycles: Sequence[list[loading.Cycle]],
+    left_out: Sequence[Mask],
+    members: set[int],
+    options: Mapping[str, Any],
+) -> RateFold:
+    whole = [bool(found) and all(id(cycle) in members for cycle in found) for found in cycles]
+    # Names as `identify` will know them: unique over all recordings, with some of these gone.
+    named = [replace(one, name=experiment.name) for one, experiment in zip(recordings, experiments, strict=True)]
+    kept = [index for index, gone in enumerate(whole) if not gone]
+    masks = {experiments[index].name: experiments[index].kept & ~left_out[index] for index in kept}
+    try:
+        found = identify([named[index] for index in kept], counted=masks, **options)
+    except (NotIdentifiableError, NotConvergedError) as refusal:
+        # One rate on which everything hangs is a finding, and the other folds stand.
+        return RateFold(rate, count, None, *(4 * (float("nan"),)), refused=str(refusal))
+    outside: list[Array] = []
+    inside: list[Array] = []
+    for index, experiment in enumerate(experiments):
+        if whole[index]:
+            error = _error_of_unseen(found, experiment, cycles[index][0].start)
+        else:
+            error = _force_error(found, experiment, found.errors[experiment.name])
+        outside.append(error[experiment.kept & left_out[index]])
+        if not whole[index]:
+            inside.append(error[masks[experiment.name]])
+    return RateFold(rate, count, found, *_figures(outside), *_figures(inside))
+
+
+def _figures(errors: Sequence[Array]) -> tuple[float, float]:
+    """Root mean square and largest absolute value; NaN where there is no sample."""
+    error = np.concatenate(errors)
+    if not error.size:
+        return float("nan"), float("nan")
+    return float(np.sqrt(np.mean(error**2))), float(np.max(np.abs(error)))
+
+
+def _compensated(found: Identification, reading: Array, experiment: Experiment) -> Array:
+    """(n,) force of a reading about its zero: (b0 s + b1)/(s + a1), as if the first reading had lasted for ever."""
+    a1, b0, b1 = found.coefficients
+    slow = lag(reading, a1, experiment.step)
+    force_n: Array = b0 * (reading - slow) + b1 / a1 * slow
+    return force_n
+
+
+def _force_error(found: Identification, experiment: Experiment, error: Array) -> Array:
+    """The model's error (n,) as force, model minus measured."""
+    if found.direction == "inverse":
+        return error
+    # Of reading = force/G the force estimate is G reading, so that G times the reading's error is its own, reversed.
+    return -_compensated(found, error, experiment)
+
+
+def _error_of_unseen(found: Identification, experiment: Experiment, first_ramp: int) -> Array:
+    """Force error (n,) of a recording that no part of the fit has seen."""
+    a1, _, b1 = found.coefficients
+    load_zero_n = float(np.mean([one.value for one in found.load_offsets.values()]))
+    rest = experiment.kept.copy()
+    rest[first_ramp:] = False
+    offset = found.offset
+    if rest.any():
+        offset = float(np.mean(experiment.reading[rest] - (experiment.load_n[rest] - load_zero_n) * a1 / b1))
+    reading, _ = shifted(experiment.reading - offset, experiment.time_s, experiment.step, found.delay_s.value)
+    if rest.any():
+        # The filter starts from its first sample, which must not be one sample's noise.
+        reading[0] = float(np.mean(reading[rest]))
+    error: Array = _compensated(found, reading, experiment) + load_zero_n - experiment.load_n
+    return error

@@ -1,0 +1,35 @@
+"""One input through many first-order lags at once; the plain twin is `smartshoe.models.first_order.lag`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from smartshoe.kernels.coefficients import hold_row
+
+
+@njit(cache=True)
+def lag_bank(u, at, poles, step, last_u, last_at, lags, out):  # type: ignore[no-untyped-def]
+    """w = pole/(s + pole) u under first-order hold into ``out`` (n, p), and at the end into ``lags`` (p,).
+
+    ``u`` (n,) at the whole times ``at`` (n,) of ``step`` s, rising, ``poles`` (p,) in 1/s, ``last_u`` at ``last_at``
+    and ``lags`` what went before. A gap is one long straight line, for which the hold is exact.
+    """
+    count = poles.size
+    row = np.empty((1, 6))
+    even, wide = np.empty((3, count)), np.empty((3, count))
+    for i in range(count):
+        hold_row(poles[i], step, row)
+        even[0, i], even[1, i], even[2, i] = row[0, 0], row[0, 1], row[0, 2]
+    for k in range(u.size):
+        gap = at[k] - last_at
+        hold = even
+        if gap != 1:
+            for i in range(count):
+                hold_row(poles[i], gap * step, row)
+                wide[0, i], wide[1, i], wide[2, i] = row[0, 0], row[0, 1], row[0, 2]
+            hold = wide
+        for i in range(count):
+            lags[i] = hold[0, i] * lags[i] + hold[1, i] * u[k] + hold[2, i] * last_u
+            out[k, i] = lags[i]
+        last_u, last_at = u[k], at[k]
