@@ -193,8 +193,12 @@ def _errors_in_variables(fit: Fit, method: str, noise: Mapping[str, float | None
             output = output_sd**2 if output_sd else output_variance(problem, theta, variance, input_sd)
             ratio = min(input_sd**2 / output, MOST_RATIO) if output > 0 else MOST_RATIO
             level = level.with_noise_ratio(ratio)
-            if level.settings.delay_s is None and iterations == 0 and number == 0:
-                theta = _best_delay(level, theta, problem.experiments[0].sample_time_s)
+            if number == 0:
+                # The likelihood may have several optima along the delay: every method sets out from the same one.
+                if level.settings.delay_s is None and iterations == 0:
+                    theta = _best_delay(level, theta, problem.experiments[0].sample_time_s)
+                else:
+                    theta = minimise(level, theta, "trf", tolerance=1e-6, max_iterations=100).theta
             found = _minimise(level, theta, method, limits)
             iterations, converged = iterations + found.iterations, found.converged
             moved = float(np.max(np.abs(found.theta - theta) / (np.sqrt(np.diag(fit.covariance)) + 1e-300)))

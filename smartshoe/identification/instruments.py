@@ -15,12 +15,14 @@ import numpy as np
 from smartshoe.errors import NotIdentifiableError, RefusedError
 from smartshoe.identification.experiment import Array, Mask
 from smartshoe.identification.prediction_error import PredictionError
+from smartshoe.identification.solve import solve_normal
 from smartshoe.models.first_order import lag, shifted
 
 Source = Literal["command", "cycles"]
 LEAST_CORRELATION = 0.9
 LONGEST_STEP = 0.5  # of ln alpha
 MOST_ITERATIONS = 50  # Newton settles in five or not at all
+HALVINGS = 4
 
 
 class Instruments:
@@ -110,22 +112,39 @@ def solve_instrumental(
     """
     problem = instruments.problem
     converged, iterations = False, 0
+    seen = instruments.equations(theta)
     while not converged and iterations < min(max_iterations, MOST_ITERATIONS):
         iterations += 1
-        right, normal, power, cost = instruments.equations(theta)
-        variance = cost / max(instruments.count - problem.size, 1)
-        inverse = _inverse(normal)
-        step = inverse @ right
-        covariance = variance * inverse @ power @ inverse.T
+        step = _inverse(seen[1]) @ seen[0]
         longest = float(np.max(np.abs(problem.shape(theta).slope[0] @ step[: problem.shape_size])))
-        theta = np.clip(theta - step * min(1.0, LONGEST_STEP / max(longest, 1e-300)), problem.lower, problem.upper)
-        if not np.isfinite(theta).all():
+        fraction = min(1.0, LONGEST_STEP / max(longest, 1e-300))
+        best = None
+        for _ in range(HALVINGS):
+            trial = np.clip(theta - fraction * step, problem.lower, problem.upper)
+            following = instruments.equations(trial)
+            if best is None or _merit(following) < _merit(best[1]):
+                best = trial, following
+            # The instruments move with theta as well, which Newton's step does not know: it may swing about the root.
+            if _merit(best[1]) < 0.5 * _merit(seen):
+                break
+            fraction /= 2
+        if best is None or not np.isfinite(best[0]).all():
             raise NotIdentifiableError("the instruments do not determine the model: choose another estimator")
+        change, theta, seen = best[0] - theta, *best
         converged = bool(
-            np.max(np.abs(step) / np.maximum(sd, 1e-300)) < 1e-5
-            or np.max(np.abs(step) / (np.abs(theta) + 1e-300)) < tolerance
+            np.max(np.abs(change) / np.maximum(sd, 1e-300)) < 1e-5
+            or np.max(np.abs(change) / (np.abs(theta) + 1e-300)) < tolerance
         )
-    return theta, covariance, variance, iterations, converged
+    _, normal, power, cost = seen
+    variance = cost / max(instruments.count - problem.size, 1)
+    inverse = _inverse(normal)
+    return theta, variance * inverse @ power @ inverse.T, variance, iterations, converged
+
+
+def _merit(equations: tuple[Array, Array, Array, float]) -> float:
+    """e'Z (Z'Z)^-1 Z'e: what of the error the instruments still explain."""
+    right, _, power, _ = equations
+    return float(right @ solve_normal(power, right)) if np.isfinite(power).all() else np.inf
 
 
 def _inverse(matrix: Array) -> Array:

@@ -109,7 +109,7 @@ def grey(k: Array) -> Array:
     return np.array([k[1], 1 + (k[0] + k[1]) * X, k[1] * (1 + k[0] * X)])
 
 
-def quotient(function, theta: Array, relative: float = 1e-5) -> Array:  # type: ignore[no-untyped-def]
+def quotient(function, theta: Array, relative: float = 1e-5) -> Array:
     """Central difference quotients (m, size)."""
     columns = []
     for index, value in enumerate(theta):

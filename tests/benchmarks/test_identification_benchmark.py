@@ -60,7 +60,7 @@ def scipy_fits(shoe: cases.Shoe, seeds: Sequence[int], reading_noise: float) -> 
 ASKED_SD = {"a1": 0.378, "b0": 0.0099, "b1": 0.379, "k1": 0.0106, "k2": 0.194}  # %
 
 
-def add_shoe_rows(table, label, names, found, true, bound, peer):  # type: ignore[no-untyped-def]
+def add_shoe_rows(table, label, names, found, true, bound, peer):
     """Standard deviation, bias and coverage of each parameter; what fell short."""
     bias, error, sd = percent(found[:, :, 0], true)
     covered = ((found[:, :, 2] <= true) & (true <= found[:, :, 3])).mean(axis=0) * 100

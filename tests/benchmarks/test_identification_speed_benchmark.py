@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import time
+import timeit
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -24,21 +25,21 @@ from smartshoe.kernels.first_order import COLUMNS, inner_products
 from smartshoe.recording import Recording
 
 pytestmark = pytest.mark.benchmark
+TURN_S = 0.05
 PEER = Path(__file__).with_name("jax_sysid_peer.py")
 
 
-def quickest_s(rivals: Mapping[str, Callable[[], Any]], rounds: int, inner: int = 1) -> dict[str, float]:
-    """Seconds of the quickest of ``rounds``, in which the rivals take turns so that a busy machine slows all alike."""
-    best = dict.fromkeys(rivals, np.inf)
-    for run in rivals.values():
-        run()
-    for _ in range(rounds):
-        for name, run in rivals.items():
-            started = time.perf_counter()
-            for _ in range(inner):
-                run()
-            best[name] = min(best[name], (time.perf_counter() - started) / inner)
-    return best
+def quickest_s(rivals: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
+    """Seconds a call of the quickest of ``rounds``, in which the rivals take turns of equal length.
+
+    In turns, so that a busy machine slows all alike; of equal length, so that each finds its own data in the cache.
+    """
+    timers, calls = {name: timeit.Timer(run) for name, run in rivals.items()}, {}
+    for name, timer in timers.items():
+        timer.timeit(1)
+        calls[name] = max(round(TURN_S / timer.timeit(1)), 1)
+    turns = [{name: timer.timeit(calls[name]) / calls[name] for name, timer in timers.items()} for _ in range(rounds)]
+    return {name: min(turn[name] for turn in turns) for name in rivals}
 
 
 def signals() -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +90,7 @@ def test_speed_of_one_fit(table, tmp_path, request):
         "dict": lambda: smartshoe.identify(one).to_dict(),
     }
     with threadpool_limits(1):
-        took = quickest_s(rivals, 10, inner=5)
+        took = quickest_s(rivals, 10)
         ends = scipy_fit(u, y)
     mine = fit_coefficients(u, y, sample_time_s=cases.SAMPLE_TIME_S)
     label = "speed, 19,401 samples, one thread (peer: scipy least_squares over lfilter, trf, from 1, 1, 1)"
@@ -131,7 +132,7 @@ def test_speed_of_one_pass(table):
         "three": lambda: inner_products(u, none, y, every, step, row, a1, b0, b1 / a1, 0.0, 0.0, three, out),
         "six": lambda: inner_products(u, slope, y, every, step, row, a1, b0, b1 / a1, 0.0, 0.0, six, out),
     }
-    took = quickest_s(rivals, 100, inner=5)
+    took = quickest_s(rivals, 30)
     label = "one pass for error, gradient and normal matrix, 19,401 samples (peer: one lfilter pass)"
     for name, figure in (("three", "three coefficients"), ("six", "all six columns: delay, offset, start too")):
         ratio = took[name] / took["scipy"]
@@ -147,7 +148,7 @@ def test_speed_of_a_thousand_fits(table):
     label = "1000 fits of the three coefficients, 19,401 samples each"
     one_worker_s = 0.0
     with threadpool_limits(1):
-        took = quickest_s({"scipy": lambda: [scipy_fit(u, row) for row in y[:10]]}, 2)["scipy"] / 10
+        took = quickest_s({"scipy": lambda: scipy_fit(u, y[0])}, 10)["scipy"]
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     for workers in (1, 2, 4):
         if workers > cores:

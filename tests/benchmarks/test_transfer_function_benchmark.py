@@ -32,11 +32,12 @@ def found_coefficients(estimate: Any) -> np.ndarray:
 def transfer_functions(
     case: cases.Linear, seeds: Sequence[int], ratio: float, options: Mapping[str, Any]
 ) -> np.ndarray:
-    """(runs, 4 + coefficients) iterations, converged, rmse, delay, coefficients."""
+    """(runs, 4 + coefficients) iterations (SRIVC's before another method too), converged, rmse, delay, coefficients."""
     found = []
     for seed in seeds:
         one = fitted(case, ratio, seed, **options)
-        row = [one.iterations, one.converged, one.rmse, one.delay_s, *found_coefficients(one)]
+        steps = one.iterations + (one.start_iterations if one.method != "srivc" else 0)
+        row = [steps, one.converged, one.rmse, one.delay_s, *found_coefficients(one)]
         found.append(row)
     return np.array(found, dtype=float)
 
