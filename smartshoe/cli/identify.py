@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from smartshoe.cli.inputs import column_options, read_all
 from smartshoe.errors import UsageError
+
+if TYPE_CHECKING:
+    from smartshoe.identification import Identification
+    from smartshoe.recording import Recording
 
 
 @click.command(
@@ -56,6 +60,11 @@ from smartshoe.errors import UsageError
 )
 @click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Grey box: fix k1, k2, c or x_over_nrt.")
 @click.option("--bound", "bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Grey box: keep a parameter within.")
+@click.option(
+    "--checks",
+    is_flag=True,
+    help="Also fit without each loading rate, and test what repeats over cycles for lack of fit.",
+)
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 @click.option("--calibration", "calibration_path", metavar="OUT.json", help="Write a calibration for compensate.")
 @column_options
@@ -71,6 +80,7 @@ def command(
     delay: str | None,
     fixed: tuple[str, ...],
     bounds: tuple[str, ...],
+    checks: bool,
     **choices: Any,
 ) -> None:
     """Identify one unit from one or more experiments (one FILE each)."""
@@ -79,20 +89,24 @@ def command(
     from smartshoe.report.tables import print_identification
 
     recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
-    found = identify(
-        recordings,
-        offset="estimate" if offset is None else _number("--offset", offset),
-        delay="estimate" if delay is None else _number("--delay", delay),
-        fixed=dict(_named("--fix", text) for text in fixed) or None,
-        bounds={name: _range("--bound", name, limits) for name, limits in (_split("--bound", text) for text in bounds)},
+    options: dict[str, Any] = {
+        "offset": "estimate" if offset is None else _number("--offset", offset),
+        "delay": "estimate" if delay is None else _number("--delay", delay),
+        "fixed": dict(_named("--fix", text) for text in fixed) or None,
+        "bounds": {
+            name: _range("--bound", name, limits) for name, limits in (_split("--bound", text) for text in bounds)
+        },
         **choices,
-    )
+    }
+    found = identify(recordings, **options)
     if calibration_path is not None:
         import datetime
 
         today = datetime.datetime.now(datetime.UTC).date().isoformat()
         found.calibration(created=today).save(calibration_path)
     result = found.to_dict()
+    if checks:
+        result |= _checks(found, recordings, options)
     if not emit_json(result, json_path):
         print_identification(result)
         if calibration_path is not None:
@@ -126,3 +140,21 @@ def _range(option: str, name: str, text: str) -> tuple[float, float]:
         _number(f"{option} {name}", low or "-inf"),
         _number(f"{option} {name}", high or "inf"),
     )
+
+
+def _checks(found: Identification, recordings: list[Recording], options: dict[str, Any]) -> dict[str, Any]:
+    """Lack of fit and leave-one-rate-out as JSON objects; where the data cannot tell, the reason."""
+    from smartshoe.errors import NotIdentifiableError
+    from smartshoe.identification.lack_of_fit import lack_of_fit
+    from smartshoe.identification.leave_out import leave_one_rate_out
+
+    result: dict[str, Any] = {}
+    for name, check in (
+        ("lack_of_fit", lambda: lack_of_fit(found, recordings)),
+        ("leave_one_rate_out", lambda: leave_one_rate_out(recordings, **options)),
+    ):
+        try:
+            result[name] = check().to_dict()
+        except NotIdentifiableError as reason:
+            result[name] = {"says": f"not tested: {reason}"}
+    return result

@@ -95,11 +95,12 @@ def _unique_names(recordings: Sequence[Recording]) -> list[str]:
 
 
 def prepare(
-    recordings: Sequence[Recording], counted: Mapping[str, Mask] | None = None
+    recordings: Sequence[Recording], counted: Mapping[str, Mask] | None = None, *, on_one_step: bool = True
 ) -> tuple[list[Experiment], Unit]:
     """The experiments and their common reading unit (the first recording's).
 
     ``counted`` gives, by recording name, the samples (n,) whose error counts; all of them where a name is not given.
+    ``on_one_step`` puts rows that a logger skipped back as samples that do not count.
     Raises `UnitError` where a reading is of another quantity, `MissingChannelError` without load or reading,
     `NotIdentifiableError` where the signals cannot hold the answer, naming what is missing.
     """
@@ -132,7 +133,7 @@ def prepare(
             int(np.count_nonzero(~present)),
             None if command_n is None else np.array(command_n, dtype=float),
         )
-        experiments.append(_on_one_step(experiment))
+        experiments.append(_on_one_step(experiment) if on_one_step else experiment)
     _require_identifiable(experiments, recordings)
     return experiments, reading_unit
 

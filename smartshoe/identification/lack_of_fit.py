@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.identification.cycles import CycleGroup, repeated_cycles
 from smartshoe.identification.experiment import Array
 from smartshoe.identification.identification import Identification
+from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Recording
 
 FEWEST_BLOCKS = 16  # of the shortest cycle
@@ -30,6 +32,17 @@ class LackOfFit:
     repeatable_percent: float
     n_cycles: int
     says: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return {
+            "statistic": finite_or_none(self.statistic),
+            "p_value": finite_or_none(self.p_value),
+            "degrees": list(self.degrees),
+            "repeatable_percent": finite_or_none(self.repeatable_percent),
+            "n_cycles": self.n_cycles,
+            "says": self.says,
+        }
 
 
 def lack_of_fit(

@@ -14,6 +14,7 @@ from smartshoe.identification.experiment import Array, Experiment, Mask, prepare
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.identifier import identify
 from smartshoe.models.first_order import lag, shifted
+from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Channel, Recording
 
 MOVED_SD = 5.0
@@ -56,6 +57,28 @@ class LeaveOneRateOut:
     everything: Identification
     says: str
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON, None where one is not finite."""
+        return {
+            "folds": [
+                {
+                    "rate_n_per_s": finite_or_none(fold.rate_n_per_s),
+                    "cycles": fold.cycles,
+                    "rmse_left_out_n": finite_or_none(fold.rmse_left_out_n),
+                    "max_left_out_n": finite_or_none(fold.max_left_out_n),
+                    "rmse_fitted_n": finite_or_none(fold.rmse_fitted_n),
+                    "max_fitted_n": finite_or_none(fold.max_fitted_n),
+                    "refused": fold.refused,
+                }
+                for fold in self.folds
+            ],
+            "movements": {
+                name: {key: finite_or_none(getattr(moved, key)) for key in ("value", "lowest", "highest", "moved_sd")}
+                for name, moved in self.movements.items()
+            },
+            "says": self.says,
+        }
+
 
 def leave_one_rate_out(recordings: Recording | Sequence[Recording], **options: Any) -> LeaveOneRateOut:
     """Identify once without each loading rate (rates within 10 % are one); ``options`` are those of `identify`.
@@ -69,7 +92,7 @@ def leave_one_rate_out(recordings: Recording | Sequence[Recording], **options: A
     several = _in_one_unit([recordings] if isinstance(recordings, Recording) else list(recordings))
     counted: Mapping[str, Mask] = dict(options.pop("counted", None) or {})
     everything = identify(several, counted=counted, **options)
-    experiments, _ = prepare(several, counted)
+    experiments, _ = prepare(several, counted, on_one_step=False)
     cycles = [loading.cycles(one.time_s, one.load_n) for one in experiments]
     rates = loading.by_rate([cycle for found in cycles for cycle in found])
     if len(rates) < 2:

@@ -49,6 +49,18 @@ def print_identification(result: Mapping[str, Any]) -> None:
     )
     if result.get("consistency"):
         console.print(f"c = 1, the paper's form: {result['consistency']['says']}", soft_wrap=True)
+    for check in ("lack_of_fit", "leave_one_rate_out"):
+        if check in result:
+            console.print(f"{check.replace('_', ' ')}: {result[check]['says']}", soft_wrap=True)
+    for fold in result.get("leave_one_rate_out", {}).get("folds", ()):
+        console.print(
+            f"  without {plain(fold['rate_n_per_s'])} N/s: "
+            + (
+                fold["refused"]
+                or f"{plain(fold['rmse_left_out_n'])} N there, {plain(fold['rmse_fitted_n'])} N elsewhere"
+            ),
+            soft_wrap=True,
+        )
     for note in result.get("notes", ()):
         console.print(f"note: {note}", soft_wrap=True)
 

@@ -191,3 +191,44 @@ def test_recording_of_the_contract_reads_back(tmp_path: Path) -> None:
     again = smartshoe.read(tmp_path / "n.csv")
     assert again.unit == "left_toe"
     assert again.name == "n"
+
+
+def test_checks_say_what_repeats_and_what_each_rate_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from smartshoe.devices import open_machine
+    from smartshoe.logs import write
+    from smartshoe.protocol import dynamic_protocol
+
+    with open_machine("sim:instron", unit="left_toe", seed=5) as machine:
+        write(machine.run(dynamic_protocol((200.0, 800.0), repeats=3)), tmp_path / "both.csv")
+        write(machine.run(dynamic_protocol((400.0,))), tmp_path / "one.csv")
+    assert (
+        run_command(["identify", str(tmp_path / "both.csv"), "--checks", "--json", str(tmp_path / "found.json")]) == 0
+    )
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found["lack_of_fit"]["n_cycles"] == 6
+    assert [round(fold["rate_n_per_s"] / 100) for fold in found["leave_one_rate_out"]["folds"]] == [2, 8]
+    capsys.readouterr()
+    assert run_command(["identify", str(tmp_path / "one.csv"), "--checks"]) == 0
+    assert "not tested" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--fix", "c"], "NAME=VALUE"),
+        (["--structure", "grey_box", "--bound", "k1=3"], "NAME=LOW:HIGH"),
+        (["--offset", "none"], "--offset"),
+        (["--fix", "c=1"], "grey box"),
+    ],
+)
+def test_wrong_choices_of_the_fit_are_named(
+    words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from smartshoe.devices import open_machine
+    from smartshoe.logs import write
+    from smartshoe.protocol import dynamic_protocol
+
+    with open_machine("sim:instron", unit="left_toe", seed=5) as machine:
+        write(machine.run(dynamic_protocol((800.0,))), tmp_path / "one.csv")
+    assert run_command(["identify", str(tmp_path / "one.csv"), *words]) == 2
+    assert says in capsys.readouterr().err.splitlines()[-1]
