@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -174,6 +174,11 @@ class Recording:
                 raise UnitError(f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar")
             channels[channel_name] = Channel.from_values(channel_name, values, unit_, _role_of(channel_name, unit_))
         return cls(np.asarray(time_s, dtype=float), channels, name, unit, dict(metadata or {}))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Recordings travel between processes, though a mapping proxy does not."""
+        plain = (self.time_s, dict(self.channels), self.name, self.unit, dict(self.metadata), self.source, self.notes)
+        return type(self), plain
 
     # -- what it is ------------------------------------------------------------------------------------------
     @property

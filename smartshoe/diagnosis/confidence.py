@@ -1,0 +1,25 @@
+"""How sure a name is: what the data cannot separate, and a probability calibrated on a simulated bank."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, log
+
+from smartshoe.diagnosis.result import Rival
+
+SEPARATED = 6.0  # difference of -2 log likelihood under which another effect does as well
+
+# Logistic regression of "the name was right" on the log of the margin and of the fall: docs/diagnosis.md says on what.
+INTERCEPT, PER_LOG_MARGIN, PER_LOG_FALL = -1.0, 0.8, 0.3
+
+
+def inseparable(rivals: Sequence[Rival]) -> tuple[str, ...]:
+    """The effects that this data cannot tell from the one that was named."""
+    return tuple(rival.effect for rival in rivals if rival.margin < SEPARATED)
+
+
+def confidence(rivals: Sequence[Rival], fall: float, size: float) -> float:
+    """Probability that the name is right."""
+    margin = min((rival.margin for rival in rivals), default=fall)
+    score = INTERCEPT + PER_LOG_MARGIN * log(max(margin, 1.0)) + PER_LOG_FALL * log(max(fall, 1.0))
+    return 1.0 / (1.0 + exp(-score))

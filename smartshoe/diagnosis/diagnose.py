@@ -1,0 +1,260 @@
+"""From recordings to a diagnosis: integrity, baseline, selection, what is left, what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.blas import on_one_thread
+from smartshoe.diagnosis.baseline import global_baseline
+from smartshoe.diagnosis.confidence import confidence, inseparable
+from smartshoe.diagnosis.force import force_rmse_n
+from smartshoe.diagnosis.integrity import Integrity, examine
+from smartshoe.diagnosis.judgement import Errors, errors, gain
+from smartshoe.diagnosis.leftover import Leftover, leftover_of
+from smartshoe.diagnosis.next_experiment import next_experiment
+from smartshoe.diagnosis.parameters import parameters_of
+from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
+from smartshoe.diagnosis.selection import MATERIAL, Choice, choose, penalty
+from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis.traits import Traits, traits_of
+from smartshoe.errors import UsageError
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
+NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
+LEFT_OF_EXPLAINED = 0.15  # of the structure that was there: less than this left over is a matter of equations' shape
+
+
+def _silent(_: str) -> None:
+    return None
+
+
+def diagnose(
+    recordings: Sequence[Recording] | Recording,
+    hold_out: Sequence[Recording] = (),
+    *,
+    material: float = MATERIAL,
+    progress: Progress = _silent,
+) -> Diagnosis:
+    """What the baseline simulation of ``recordings`` gets wrong, why, and what mending it gains.
+
+    Each recording is a session of its own: the unit rested and zeroed before, unless its metadata ``continues`` names
+    another. ``hold_out`` recordings are judged on and never fitted; without them every third load cycle is kept for
+    that. ``material`` is the share of the full-scale reading below which nothing counts.
+
+    Raises `MissingChannelError` without a load or reading; a diagnosis that the data cannot support comes back with
+    the verdict "refused" and the reason in ``limits``.
+    """
+    fitted = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if not fitted:
+        raise UsageError("diagnose was given no recording: give one at least")
+    everything = [*fitted, *hold_out]
+    integrity = examine(everything)
+    if integrity.refusals:
+        return _refused(everything, integrity)
+    return _diagnosed(everything, len(fitted), integrity, material, progress)
+
+
+def _refused(recordings: Sequence[Recording], integrity: Integrity) -> Diagnosis:
+    sensors = recordings[0].sensors
+    unit = sensors[0].unit.symbol if sensors else ""
+    return Diagnosis(
+        "refused",
+        f"no diagnosis: {integrity.refusals[0]}",
+        unit,
+        0.0,
+        0.0,
+        data_faults=integrity.faults,
+        limits=tuple(integrity.refusals),
+    )
+
+
+@on_one_thread
+def _diagnosed(
+    recordings: Sequence[Recording], count: int, integrity: Integrity, material: float, progress: Progress
+) -> Diagnosis:
+    usable = integrity.usable
+    scale = full_scale(recordings[:count], usable[:count])
+    held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
+    sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
+    traits = traits_of(sessions)
+    start = global_baseline(sessions, scale)
+    choice = choose(start, sessions, rest_loads(sessions), material, progress)
+    before = leftover_of(sessions, choice.evidence.residuals(choice.baseline.model))
+    after = leftover_of(sessions, choice.evidence.residuals(choice.fit.model))
+    names, verdict = _judged(choice, before, after, material)
+    progress("judging on held-out data")
+    fine = at_full_rate(sessions, usable, scale)
+    baseline, extended = choice.baseline.model, choice.fit.model
+    if verdict == "unexplained":
+        extended = baseline
+    all_before, all_after = errors(fine, baseline), errors(fine, extended)
+    causes = [
+        _cause(name, choice, fine, scale, traits) for name in names
+    ]
+    rivals = causes[0].rivals if causes else _candidates(choice)
+    total_before = all_before.rmse**2
+    structure = max(before.rms**2 - 0.0, 0.0)
+    explainable = 100.0 * min(structure / max(total_before, 1e-300), 1.0)
+    explained = 100.0 * max(0.0, 1.0 - all_after.rmse**2 / max(total_before, 1e-300))
+    return Diagnosis(
+        verdict,
+        _sentence(verdict, causes, before, after),
+        scale.unit.symbol,
+        scale.load_n,
+        scale.reading,
+        causes=tuple(causes),
+        minor=tuple(name for name in choice.fit.model.names if name not in names) if verdict != "unexplained" else (),
+        data_faults=integrity.faults,
+        baseline=_standing(all_before, baseline, before, fine, scale),
+        extended=_standing(all_after, extended, after if verdict != "unexplained" else before, fine, scale),
+        gain=gain(all_before, all_after, scale),
+        explainable_percent=max(explainable, explained) if verdict != "adequate" else explainable,
+        explained_percent=explained,
+        rivals=tuple(rivals),
+        next_experiment=next_experiment(choice, causes, traits, sessions),
+        limits=tuple(traits.limits()),
+        leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
+        screening=tuple((one.candidate.effect.name, float(one.fall)) for one in choice.screening.ranked),
+        likeness=choice.screening.likeness,
+        model=extended,
+        baseline_model=baseline,
+        traces=tuple(_trace(session, baseline, extended, scale) for session in fine),
+    )
+
+
+def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
+    """Mean measured load of each session's rests, shares of full scale, and how well it should be zero."""
+    means = []
+    for session in sessions:
+        command = session.recording.command_n
+        resting = session.resting & ~session.held_out
+        if command is not None and resting.any():
+            full = float(np.max(np.abs(command))) or 1.0
+            resting &= np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
+        if resting.sum() > 10:
+            means.append(float(np.mean(session.conditions.load[resting])))
+    return np.array(means), REST_SD
+
+
+def _judged(choice: Choice, before: Leftover, after: Leftover, material: float) -> tuple[list[str], Verdict]:
+    """Which of the chosen effects keep their names, and the verdict."""
+    names = list(choice.causes)
+    left = after.rms if after.significant and after.rms > material else 0.0
+    if left <= LEFT_OF_EXPLAINED * before.rms:
+        left = 0.0
+    kept = [name for name in names if choice.sizes[name] >= NAMED_OVER_LEFT * left]
+    if kept:
+        return kept, "partly_explained" if left else "explained"
+    if left or (before.significant and before.rms > material):
+        return [], "unexplained"
+    return [], "adequate"
+
+
+def _sentence(verdict: Verdict, causes: Sequence[Cause], before: Leftover, after: Leftover) -> str:
+    named = " and ".join(cause.name.replace("_", " ") for cause in causes)
+    percent = f"{100 * before.rms:.2g} % of full scale"
+    if verdict == "adequate":
+        return "the baseline simulation leaves nothing that repeats and matters"
+    if verdict == "explained":
+        return f"the baseline simulation is wrong by {percent}: {named} accounts for it"
+    if verdict == "partly_explained":
+        return (
+            f"the baseline simulation is wrong by {percent}: {named} accounts for part of it, and"
+            f" {100 * after.rms:.2g} % of full scale is still unexplained"
+        )
+    return f"the baseline simulation is wrong by {percent}, and no effect of the catalogue accounts for it"
+
+
+def _candidates(choice: Choice) -> tuple[Rival, ...]:
+    ranked = choice.screening.ranked[:4]
+    if not ranked:
+        return ()
+    return tuple(Rival(one.candidate.effect.name, float(ranked[0].fall - one.fall)) for one in ranked)
+
+
+def _cause(
+    name: str, choice: Choice, fine: Sequence[Session], scale: Scale, traits: Traits
+) -> Cause:
+    less = choice.without[name]
+    won = gain(errors(fine, less.model), errors(fine, choice.fit.model), scale)
+    rivals = tuple(Rival(one.effect, one.margin) for one in choice.rivals[name])
+    equivalents = inseparable(rivals)
+    sure = confidence(rivals, choice.falls[name], choice.sizes[name])
+    one = effect(name)
+    fall, size = choice.falls[name], choice.sizes[name]
+    evidence = [
+        Statement(
+            "fall of -2 log likelihood",
+            fall,
+            penalty(name),
+            f"without it, and everything else fitted anew, the fit is worse by {fall:.4g} where {penalty(name):.0f} would do",
+        ),
+        Statement(
+            "size in percent of full scale",
+            100 * size,
+            100 * MATERIAL,
+            f"it moves the reading by {100 * size:.3g} % of full scale (rms)",
+        ),
+        Statement(
+            "gain on held-out data in percent",
+            won.gain_percent,
+            0.0,
+            f"on load cycles that were not fitted the error falls from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+        ),
+    ]
+    if rivals:
+        nearest = rivals[0]
+        evidence.append(
+            Statement(
+                "margin to the nearest rival",
+                nearest.margin,
+                6.0,
+                f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:.4g}",
+            )
+        )
+    lacking = one.exposed_by - traits.present
+    if lacking:
+        evidence.append(
+            Statement(
+                "what would show it best is missing",
+                float(len(lacking)),
+                0.0,
+                f"the data holds no {', no '.join(sorted(word.replace('_', ' ') for word in lacking))}",
+            )
+        )
+    return Cause(one, sure, equivalents, parameters_of(choice.fit, name, scale), tuple(evidence), won, size, rivals)
+
+
+def _standing(
+    found: Errors, model: ExtendedModel, left: Leftover, fine: Sequence[Session], scale: Scale
+) -> Standing:
+    return Standing(
+        found.rmse * scale.reading,
+        scale.unit.symbol,
+        found.fit_percent,
+        force_rmse_n(fine, model),
+        left.rms * scale.reading,
+    )
+
+
+def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, scale: Scale) -> Trace:
+    return Trace(
+        session.recording.name,
+        session.conditions.time_s,
+        session.conditions.load * scale.load_n,
+        session.reading * scale.reading,
+        baseline.simulate(session.conditions) * scale.reading,
+        extended.simulate(session.conditions) * scale.reading,
+        session.usable,
+        session.held_out,
+        session.cycle,
+    )

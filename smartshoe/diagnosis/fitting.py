@@ -1,0 +1,189 @@
+"""Output-error fits of an extended model to several sessions at once, with whitened noise and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.noise import NoiseModel
+from smartshoe.diagnosis.session import Session
+from smartshoe.models.effects import EffectParameter
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 12
+SETTLED = 1e-3  # fall of -2 log likelihood that ends a fit
+LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
+LARGEST_LOG_STEP = 1.0
+DISPLACEMENT_COUNTS = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """``cost`` is -2 log likelihood but for a constant, over the fitted samples; ``covariance`` (p, p) of theta."""
+
+    model: ExtendedModel
+    cost: float
+    covariance: Array
+    rows: int
+
+    def sd(self, k: int) -> float:
+        """Standard deviation of parameter k."""
+        return float(np.sqrt(max(self.covariance[k, k], 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What fits are judged by: sessions, the noise, and the loads seen in rests.
+
+    A unit that carries nothing must be told no load: in rests the measured load plus a tare is zero within
+    ``rest_sd``. That row tells a load cell's tare from a sensor's zero, which the waveform cannot.
+    """
+
+    sessions: Sequence[Session]
+    noise: NoiseModel
+    rest_load: Array
+    rest_sd: float
+
+    def residuals(self, model: ExtendedModel) -> list[Array]:
+        """Reading less simulation, a session each, in shares of full scale."""
+        return [session.reading - model.simulate(session.conditions) for session in self.sessions]
+
+    def cost(self, model: ExtendedModel) -> float:
+        """Sum of whitened squares over what is fitted."""
+        total = 0.0
+        for session, residual in zip(self.sessions, self.residuals(model), strict=True):
+            white = self.noise.whitened(residual)[self.noise.counted(session.fitted)]
+            total += float(white @ white)
+        rest = self._rest(model)
+        return total + float(rest @ rest)
+
+    def displacement_cost(self, model: ExtendedModel) -> float:
+        """What the crosshead's displacement says against a model, on the scale of -2 log likelihood.
+
+        The displacement is a straight line of the wall's deformation and of the load (the frame's own compliance).
+        It tells a curve of the wall from one of the sensor. Its noise is far below the model's errors, so that only
+        the ratio of errors counts, as if it had `DISPLACEMENT_COUNTS` independent samples.
+        """
+        total, error = 0.0, 0.0
+        for session in self.sessions:
+            if session.displacement is None:
+                return 0.0
+            kept = session.fitted
+            if kept.sum() < 10:
+                continue
+            conditions = session.conditions
+            columns = np.column_stack([np.ones(conditions.load.size), model.deformation(conditions), conditions.load])
+            target = session.displacement[kept]
+            found, *_ = np.linalg.lstsq(columns[kept], target, rcond=None)
+            left = target - columns[kept] @ found
+            error += float(left @ left)
+            total += float(np.sum((target - target.mean()) ** 2))
+        return DISPLACEMENT_COUNTS * float(np.log(max(error, 1e-12 * total) / total)) if total > 0 else 0.0
+
+    def _rest(self, model: ExtendedModel) -> Array:
+        return (self.rest_load + tare_of(model)) / self.rest_sd
+
+    def rows(self, model: ExtendedModel) -> tuple[Array, Array]:
+        """Whitened residual (m,) and sensitivities (m, p) over what is fitted."""
+        found, slopes = [], []
+        for session in self.sessions:
+            reading, sensitivities = model.sensitivities(session.conditions)
+            counted = self.noise.counted(session.fitted)
+            both = np.column_stack([session.reading - reading, sensitivities])
+            white = self.noise.whitened(both)[counted]
+            found.append(white[:, 0])
+            slopes.append(white[:, 1:])
+        rest = self._rest(model)
+        column = np.zeros((rest.size, slopes[0].shape[1]))
+        for k, (owner, _) in enumerate(model.parameters):
+            if owner == TARE:
+                column[:, k] = -1.0 / self.rest_sd
+        return np.concatenate([*found, rest]), np.concatenate([*slopes, column])
+
+
+TARE = "load_cell_tare"
+
+
+def tare_of(model: ExtendedModel) -> float:
+    """Load in shares of full scale that the model adds to the measured one."""
+    return next((float(part.values[0]) for part in model.parts if part.name == TARE), 0.0)
+
+
+def fit(evidence: Evidence, start: ExtendedModel, steps: int = MOST_STEPS, settled: float = SETTLED) -> Fit:
+    """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm."""
+    parameters = [parameter for _, parameter in start.parameters]
+    logarithmic = np.array([_is_logarithmic(p) for p in parameters])
+    low, high = np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
+    model = start.at(np.clip(start.theta, low, high))
+    residual, slopes = evidence.rows(model)
+    cost = float(residual @ residual)
+    damping = 1e-4
+    scale = np.ones(len(parameters))
+    for _ in range(steps):
+        theta = model.theta
+        scale = np.where(logarithmic, theta, 1.0)
+        J = slopes * scale
+        normal, right = J.T @ J, J.T @ residual
+        best: tuple[float, ExtendedModel] | None = None
+        for _ in range(6):
+            step = _bounded_step(normal, right, damping, theta, low, high, logarithmic)
+            moved = np.clip(np.where(logarithmic, theta * np.exp(step), theta + step), low, high)
+            trial = model.at(moved)
+            trial_cost = evidence.cost(trial)
+            if np.isfinite(trial_cost) and trial_cost < cost:
+                best = trial_cost, trial
+                damping = max(damping * 0.1, 1e-7)
+                break
+            damping = max(damping * 10.0, 1e-4)
+        if best is None:
+            break
+        fell = cost - best[0]
+        cost, model = best
+        residual, slopes = evidence.rows(model)
+        if fell < settled:
+            break
+    return Fit(model, cost, _covariance(slopes), residual.size)
+
+
+def _is_logarithmic(parameter: EffectParameter) -> bool:
+    return parameter.null is None and parameter.lower > 0 and parameter.upper / parameter.lower >= LOG_RANGE
+
+
+def _bounded_step(
+    normal: Array, right: Array, damping: float, theta: Array, low: Array, high: Array, logarithmic: NDArray[np.bool_]
+) -> Array:
+    """The damped step over the parameters that are not pushed against a bound or without any influence."""
+    diagonal = np.diag(normal)
+    free = diagonal > 1e-12 * max(float(diagonal.max()), 1e-300)
+    step = np.zeros(theta.size)
+    for _ in range(theta.size):
+        index = np.flatnonzero(free)
+        if not index.size:
+            break
+        part = normal[np.ix_(index, index)] + damping * np.diag(diagonal[index])
+        root = np.sqrt(np.diag(part))
+        step[:] = 0.0
+        step[index] = np.linalg.lstsq(part / np.outer(root, root), right[index] / root, rcond=1e-12)[0] / root
+        step = np.where(logarithmic, np.clip(step, -LARGEST_LOG_STEP, LARGEST_LOG_STEP), step)
+        outward = ((theta <= low) & (step < 0)) | ((theta >= high) & (step > 0))
+        if not (outward & free).any():
+            break
+        free &= ~outward
+    return step
+
+
+def _covariance(slopes: Array) -> Array:
+    scale = np.sqrt(np.sum(slopes**2, axis=0))
+    seen = scale > 0
+    out = np.full((scale.size, scale.size), 0.0)
+    index = np.flatnonzero(seen)
+    if index.size:
+        part = slopes[:, index] / scale[index]
+        inverse = np.linalg.pinv(part.T @ part, rcond=1e-12, hermitian=True)
+        out[np.ix_(index, index)] = inverse / np.outer(scale[index], scale[index])
+    return out

@@ -1,0 +1,77 @@
+"""`DataFault` and `Integrity`: what is wrong with the data itself, before any model is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Severity = Literal["minor", "material", "fatal"]
+
+
+@dataclass(frozen=True, slots=True)
+class DataFault:
+    """One fault of one recording.
+
+    ``kind`` is an identifier of the catalogue of effects where it has one (``held_samples``, ``spikes``, ``hum``),
+    else a word of its own (``gaps``, ``two_clocks``). ``recording`` is the index of the recording, ``label`` what it
+    is called, ``start_s`` to ``stop_s`` the time from the first sample at fault to the last, ``share`` the fraction
+    of samples at fault. ``severity``: *minor* asks for nothing, *material* would show in a fit that ignores it,
+    *fatal* leaves this recording without use.
+    """
+
+    kind: str
+    recording: int
+    label: str
+    start_s: float
+    stop_s: float
+    share: float
+    says: str
+    severity: Severity = "material"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``diagnose --json`` lists under ``data_faults``."""
+        where = f"{self.label}, {self.start_s:.6g}-{self.stop_s:.6g} s"
+        return {"kind": self.kind, "where": where, "share": self.share, "says": self.says}
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What a detector hands back: ``at`` (n,) marks the samples at fault, over all samples of the recording.
+
+    Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
+    """
+
+    kind: str
+    at: Mask
+    says: str
+    severity: Severity = "material"
+    masks: bool = False
+    refuses: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Integrity:
+    """What `examine` found: one entry a recording in ``usable``, ``clock_offset_s`` and ``clock_rate``.
+
+    ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
+    held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
+    recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``refusals`` says in a sentence
+    each why no diagnosis is possible; it is empty as long as one recording is of use.
+    """
+
+    faults: tuple[DataFault, ...]
+    usable: tuple[Mask, ...]
+    clock_offset_s: tuple[float, ...]
+    clock_rate: tuple[float, ...]
+    refusals: tuple[str, ...]
+
+
+def runs_of(mask: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First samples and one-past-last samples of the runs of True in ``mask`` (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges[0::2], edges[1::2]

@@ -1,0 +1,76 @@
+"""What is left over, in a sentence: how large, whether it is more than noise, and where it sits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.remainder import Look, repeating, slow
+from smartshoe.diagnosis.session import Session
+
+Array = NDArray[np.float64]
+
+BLOCK_S = 3.0
+SIGNIFICANT_Z = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Leftover:
+    """``rms`` of the structure in a residual (shares of full scale), by two looks; ``says`` where it is largest."""
+
+    repeating: Look
+    slow: Look
+    says: str
+
+    @property
+    def rms(self) -> float:
+        """The larger of the two looks that stand out of the noise."""
+        return max((one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z), default=0.0)
+
+    @property
+    def significant(self) -> bool:
+        """Whether either look stands out of the noise."""
+        return max(self.repeating.z, self.slow.z) > SIGNIFICANT_Z
+
+
+def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Leftover:
+    """Both looks at the residuals, and the place of the largest part."""
+    return Leftover(repeating(sessions, residuals), slow(sessions, residuals, BLOCK_S), where(sessions, residuals))
+
+
+def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:
+    """The bin of load and direction, and the stretch of time, that hold most of the residual's slow part."""
+    load, rate, time_share, error, names = [], [], [], [], []
+    for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
+        width = max(1, round(0.5 / session.conditions.step_s))
+        smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
+        load.append(session.conditions.load)
+        rate.append(session.conditions.rate_per_s)
+        time_share.append(session.conditions.time_s)
+        error.append(smooth)
+        names += [index] * residual.size
+    loads, rates, times, errors = (np.concatenate(x) for x in (load, rate, time_share, error))
+    power = errors**2
+    total = float(power.sum()) or 1.0
+    level = np.clip((loads * 4).astype(int), 0, 3)
+    direction = np.where(np.abs(rates) < 0.004, 0, np.where(rates > 0, 1, 2))
+    table = np.zeros((3, 4))
+    share = np.zeros((3, 4))
+    np.add.at(table, (direction, level), power)
+    np.add.at(share, (direction, level), 1.0 / power.size)
+    d, k = np.unravel_index(int(np.argmax(table)), table.shape)
+    doing = ("while the load is held", "while loading", "while unloading")[int(d)]
+    numbers = np.array(names)
+    worst = max(range(len(sessions)), key=lambda i: float(power[numbers == i].mean()))
+    own = power[numbers == worst]
+    tenth = np.array_split(own, 10)
+    at = int(np.argmax([float(part.mean()) for part in tenth]))
+    duration = sessions[worst].conditions.time_s[-1]
+    return (
+        f"{100 * table[d, k] / total:.0f} % of it sits at {25 * k}-{25 * (k + 1)} % of the load {doing}"
+        f" ({100 * share[d, k]:.0f} % of the samples); it is largest in {sessions[worst].recording.name},"
+        f" {at * duration / 10:.0f}-{(at + 1) * duration / 10:.0f} s"
+    )

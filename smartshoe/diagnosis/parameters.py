@@ -1,0 +1,40 @@
+"""An effect's parameters as a person reads them: in SI and the reading's own unit, with their intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smartshoe.diagnosis.fitting import Fit
+from smartshoe.diagnosis.session import Scale
+from smartshoe.models.parameter import Parameter
+
+NORMAL_95 = 1.959963984540054
+
+
+def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
+    """The effect's parameters by name; an interval stays within the parameter's bounds."""
+    theta = fit.model.theta
+    found = {}
+    for k, (owner, parameter) in enumerate(fit.model.parameters):
+        if owner != name:
+            continue
+        factor, unit = _scaled(parameter.unit, scale)
+        sd = fit.sd(k)
+        low = max(theta[k] - NORMAL_95 * sd, parameter.lower)
+        high = min(theta[k] + NORMAL_95 * sd, parameter.upper)
+        found[parameter.name] = Parameter(
+            float(theta[k] * factor), float(sd * factor), (float(low * factor), float(high * factor)), unit
+        )
+    return found
+
+
+def _scaled(unit: str, scale: Scale) -> tuple[float, str]:
+    """Factor and unit in which a share of full scale is told."""
+    factor = 1.0
+    if "FS_reading" in unit:
+        factor, unit = factor * scale.reading, unit.replace("FS_reading", scale.unit.symbol)
+    if "FS_load" in unit:
+        inverse = "/FS_load" in unit
+        factor = factor / scale.load_n if inverse else factor * scale.load_n
+        unit = unit.replace("FS_load", "N")
+    return (factor if np.isfinite(factor) else 1.0), unit

@@ -1,0 +1,213 @@
+"""The screen: what each effect could explain of a residual, in milliseconds, and which effects the data cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.noise import NoiseModel, autoregression
+from smartshoe.diagnosis.session import Session
+from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+NOTHING = 1e-10  # of a column's squared norm: it lies within the others' span
+RIDGE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect at one point of its shapes; ``columns`` are where its strengths' sensitivities stand in the dictionary."""
+
+    effect: Effect
+    shape: Mapping[str, float]
+    columns: slice
+
+    def start(self, strengths: Array) -> Array:
+        """Parameter values with the linear estimate of the strengths, within bounds."""
+        values = self.effect.start(self.shape)
+        k = 0
+        for j, parameter in enumerate(self.effect.parameters):
+            if parameter.null is not None:
+                values[j] = min(max(parameter.null + strengths[k], parameter.lower), parameter.upper)
+                k += 1
+        return values
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Sensitivities of everything, a session each: residual (n,), the model's own (n, p), the candidates' (n, q)."""
+
+    model: ExtendedModel
+    sessions: Sequence[Session]
+    candidates: tuple[Candidate, ...]
+    residuals: tuple[Array, ...]
+    own: tuple[Array, ...]
+    others: tuple[Array, ...]
+
+
+# Found by tests of their own before any model is asked.
+NOT_BY_WAVEFORM = frozenset({"noise", "data", "saturation"})
+
+
+def available(sessions: Sequence[Session]) -> list[Effect]:
+    """Physical effects whose channels were logged."""
+    has = {
+        name
+        for name, attribute in (("temperature", "temperature_k"), ("neighbour", "neighbour"))
+        if all(getattr(session.conditions, attribute) is not None for session in sessions)
+    }
+    return [e for e in catalogue().values() if e.family not in NOT_BY_WAVEFORM and e.needs <= has]
+
+
+def dictionary(model: ExtendedModel, sessions: Sequence[Session]) -> Dictionary:
+    """Every available effect that is not in the model yet, at every point of its shapes."""
+    effects = [e for e in available(sessions) if e.name not in model.names]
+    candidates: list[Candidate] = []
+    place = 0
+    for effect in effects:
+        strengths = sum(parameter.null is not None for parameter in effect.parameters)
+        for shape in effect.shapes:
+            candidates.append(Candidate(effect, shape, slice(place, place + strengths)))
+            place += strengths
+    residuals, own, others = [], [], []
+    for session in sessions:
+        reading, slopes = model.sensitivities(session.conditions)
+        trace = model.trace(session.conditions)
+        blocks = [
+            model.column_of(c.effect, c.effect.start(c.shape), session.conditions, trace) for c in candidates
+        ]
+        residuals.append(session.reading - reading)
+        own.append(slopes)
+        others.append(np.concatenate(blocks, axis=1) if blocks else np.zeros((reading.size, 0)))
+    return Dictionary(model, sessions, tuple(candidates), tuple(residuals), tuple(own), tuple(others))
+
+
+def unreachable(words: Dictionary) -> list[Array]:
+    """The residuals, a session each, less all that any sensitivity of the dictionary can explain: noise, and the unknown."""
+    rows = [
+        np.column_stack([o, d])[s.fitted] for o, d, s in zip(words.own, words.others, words.sessions, strict=True)
+    ]
+    everything = np.concatenate(rows)
+    target = np.concatenate([r[s.fitted] for r, s in zip(words.residuals, words.sessions, strict=True)])
+    norm = np.sqrt(np.sum(everything**2, axis=0))
+    norm[norm == 0] = 1.0
+    scaled = everything / norm
+    gram = scaled.T @ scaled + RIDGE * np.eye(norm.size)
+    found = np.linalg.solve(gram, scaled.T @ target) / norm
+    return [
+        r - np.column_stack([o, d]) @ found for r, o, d in zip(words.residuals, words.own, words.others, strict=True)
+    ]
+
+
+def noise_of(words: Dictionary) -> NoiseModel:
+    """The noise's autoregression from what the dictionary cannot reach."""
+    return autoregression(unreachable(words), [s.fitted for s in words.sessions])
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A candidate's linear estimate: ``strengths`` (k,), what it takes off the cost, whitened and raw (shares)."""
+
+    candidate: Candidate
+    strengths: Array
+    fall: float
+    raw_share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """The best shape of each effect, by fall of the whitened cost; ``likeness`` (effects, effects) in that order.
+
+    Likeness is the largest canonical correlation of two effects' sensitivities after the model's own parameters are
+    projected out: near one, this data cannot tell them apart (to first order).
+    """
+
+    ranked: tuple[Screened, ...]
+    likeness: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects, best first."""
+        return tuple(one.candidate.effect.name for one in self.ranked)
+
+
+def screen(words: Dictionary, noise: NoiseModel) -> Screening:
+    """Project the residual on each effect's sensitivities, the model's own projected out."""
+    whitened, raw = [], []
+    for residual, own, others, session in zip(words.residuals, words.own, words.others, words.sessions, strict=True):
+        rows = np.column_stack([residual, own, others])
+        whitened.append(noise.whitened(rows)[noise.counted(session.fitted)])
+        raw.append(rows[session.fitted])
+    own_count = words.own[0].shape[1]
+    white_gram, white_fit = _projected(np.concatenate(whitened), own_count)
+    raw_gram, raw_fit = _projected(np.concatenate(raw), own_count)
+    best: dict[str, Screened] = {}
+    for candidate in words.candidates:
+        strengths, fall = _explained(candidate, white_gram, white_fit)
+        _, raw_fall = _explained(candidate, raw_gram, raw_fit)
+        one = Screened(candidate, strengths, fall, raw_fall / max(raw_fit[1], 1e-300))
+        name = candidate.effect.name
+        if name not in best or max(one.fall, 0.0) > best[name].fall:
+            best[name] = one
+    ranked = tuple(sorted(best.values(), key=lambda one: -one.fall))
+    return Screening(ranked, _likeness(ranked, white_gram))
+
+
+def _projected(rows: Array, own_count: int) -> tuple[Array, tuple[Array, float]]:
+    """Gram matrix (q, q) of the candidates' columns with the own ones projected out; their products with the residual."""
+    target, own, others = rows[:, 0], rows[:, 1 : 1 + own_count], rows[:, 1 + own_count :]
+    basis = np.linalg.qr(own / np.maximum(np.sqrt(np.sum(own**2, axis=0)), 1e-300))[0]
+    others = others - basis @ (basis.T @ others)
+    target = target - basis @ (basis.T @ target)
+    norm = np.sum(rows[:, 1 + own_count :] ** 2, axis=0)
+    gram = others.T @ others
+    gone = np.diag(gram) <= NOTHING * norm
+    gram[gone], gram[:, gone] = 0.0, 0.0
+    product = np.where(gone, 0.0, others.T @ target)
+    return gram, (product, float(target @ target))
+
+
+def _explained(candidate: Candidate, gram: Array, fit: tuple[Array, float]) -> tuple[Array, float]:
+    """Strengths (k,) within their signs, and the fall of the squared error."""
+    part, product = gram[candidate.columns, candidate.columns], fit[0][candidate.columns]
+    signs = [
+        (p.lower >= p.null, p.upper <= p.null) for p in candidate.effect.parameters if p.null is not None
+    ]
+    free = np.diag(part) > 0
+    found = np.zeros(product.size)
+    for _ in range(product.size + 1):
+        found[:] = 0.0
+        index = np.flatnonzero(free)
+        if not index.size:
+            break
+        scale = np.sqrt(np.diag(part)[index])
+        inner = part[np.ix_(index, index)] / np.outer(scale, scale)
+        found[index] = np.linalg.lstsq(inner, product[index] / scale, rcond=1e-9)[0] / scale
+        wrong = np.array([(up and v < 0) or (down and v > 0) for (up, down), v in zip(signs, found, strict=True)])
+        if not wrong.any():
+            break
+        free &= ~wrong
+    return found, float(2 * found @ product - found @ part @ found)
+
+
+def _likeness(ranked: Sequence[Screened], gram: Array) -> Array:
+    out = np.eye(len(ranked))
+    roots = []
+    for one in ranked:
+        part = gram[one.candidate.columns, one.candidate.columns]
+        values, vectors = np.linalg.eigh(part)
+        good = values > 1e-9 * max(float(values.max(initial=0.0)), 1e-300)
+        roots.append(vectors[:, good] / np.sqrt(values[good]) if good.any() and values.max() > 0 else None)
+    for i, a in enumerate(ranked):
+        for j in range(i):
+            left, right = roots[i], roots[j]
+            if left is None or right is None:
+                continue
+            cross = left.T @ gram[a.candidate.columns, ranked[j].candidate.columns] @ right
+            out[i, j] = out[j, i] = min(float(np.linalg.norm(cross, 2)), 1.0)
+    return out

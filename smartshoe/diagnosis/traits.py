@@ -1,0 +1,126 @@
+"""What an experiment can show at all: rates, holds, rests, repeats; and what must not be claimed where they lack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.session import CYCLE_SHARE, Session
+from smartshoe.loading import turning_points
+
+Array = NDArray[np.float64]
+
+SAME_RATE = 0.25
+SAME_PEAK = 0.10
+STEP_S = 0.15  # a ramp within this time is a step
+IDLE_S = 60.0
+FLAT_PER_S = 0.004  # of full scale: slower is a hold
+HOLD_S = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Traits:
+    """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles; times of the longest hold and rest.
+
+    ``present`` holds the words of `Effect.exposed_by` that apply.
+    """
+
+    rates_per_s: tuple[float, ...]
+    peaks: tuple[float, ...]
+    longest_hold_s: float
+    longest_rest_s: float
+    repeats: int
+    present: frozenset[str]
+
+    def limits(self) -> list[str]:
+        """A sentence for each thing of which this data says nothing."""
+        said = []
+        if len(self.rates_per_s) <= 1:
+            said.append("one loading rate only: nothing can be said of rate dependence, nor can viscous be told from Coulomb friction")
+        if "holds" not in self.present:
+            said.append(
+                f"no hold longer than {HOLD_S:g} s under load: little can be said of a leak, and nothing of slow creep"
+            )
+        if "rests" not in self.present:
+            said.append("the unit is never seen unloaded: zero, tare and what lies near zero load cannot be judged")
+        if "repeats" not in self.present:
+            said.append("no load cycle is repeated: what repeats cannot be told from noise without a model")
+        if len(self.peaks) <= 1 and len(self.rates_per_s) >= 1:
+            said.append("one peak load only: the curve of reading against load and softening are seen along one path")
+        return said
+
+
+def traits_of(sessions: Sequence[Session]) -> Traits:
+    """What all sessions together hold."""
+    rates: list[float] = []
+    peaks: list[float] = []
+    hold_s = rest_s = 0.0
+    pauses: list[float] = []
+    minor = False
+    kinds: dict[tuple[int, int], int] = {}
+    for session in sessions:
+        load, step_s = session.conditions.load, session.conditions.step_s
+        points = turning_points(load, CYCLE_SHARE)
+        for first, last in zip(points[:-1], points[1:], strict=True):
+            rise = float(load[last] - load[first])
+            if abs(rise) < CYCLE_SHARE:
+                continue
+            part = (load[first : last + 1] - load[first]) / rise
+            begin, end = int(np.argmax(part >= 0.2)), int(np.argmax(part >= 0.8))
+            rate = 0.6 * rise / max((end - begin) * step_s, 0.5 * step_s)
+            if rise > 0:
+                rates.append(rate)
+                peaks.append(float(load[last]))
+                kind = (round(10 * np.log2(rate)), round(20 * peaks[-1]))
+                kinds[kind] = kinds.get(kind, 0) + 1
+                if load[first] > 0.15:
+                    minor = True
+        flat = np.abs(session.conditions.rate_per_s) < FLAT_PER_S
+        hold_s = max(hold_s, _longest(flat & ~session.resting & (load > 0.1)) * step_s)
+        lengths = _runs(session.resting)
+        rest_s = max([rest_s, *(n * step_s for n in lengths)])
+        pauses += [n * step_s for n in lengths[1:-1]]
+    present = set()
+    few_rates, few_peaks = _distinct(rates, SAME_RATE), _distinct(peaks, SAME_PEAK)
+    if len(few_rates) > 1:
+        present.add("rates")
+    if len(few_peaks) > 1:
+        present.add("peaks")
+    if any(rate * STEP_S > CYCLE_SHARE * 4 for rate in rates):
+        present.add("steps")
+    if hold_s >= HOLD_S:
+        present.add("holds")
+    if rest_s >= 1.0:
+        present.add("rests")
+    if rest_s >= IDLE_S:
+        present.add("idle")
+    if pauses and max(pauses) > 3 * max(min(pauses), 0.5):
+        present.add("pauses")
+    if kinds and max(kinds.values()) >= 2:
+        present.add("repeats")
+    if minor:
+        present.add("minor_loops")
+    if few_peaks and min(few_peaks) < 0.2:
+        present.add("low_loads")
+    repeats = max(kinds.values(), default=0)
+    return Traits(tuple(few_rates), tuple(few_peaks), hold_s, rest_s, repeats, frozenset(present))
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[int]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [int(n) for n in edges[1::2] - edges[0::2]]
+
+
+def _longest(mask: NDArray[np.bool_]) -> int:
+    return max(_runs(mask), default=0)
+
+
+def _distinct(values: Sequence[float], alike: float) -> list[float]:
+    found: list[float] = []
+    for value in sorted(values):
+        if not found or value > found[-1] * (1.0 + alike):
+            found.append(value)
+    return found

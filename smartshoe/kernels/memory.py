@@ -1,0 +1,407 @@
+"""Operators with memory of a load's past: plays, Bouc-Wen, largest so far, cycles done, air lost through an orifice.
+
+Rate-independent ones see a sequence of loads only, so that they do not care for the sampling as long as every turning
+point is a sample. The states are arrays that a call changes in place: pushing block by block gives the same numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+_LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
+_BISECTIONS = 50
+NO_LOAD = 1e30  # stands for a load before the first one
+CYCLE_ENDS = 0.02  # of the cycle's height
+
+
+@njit(cache=True)
+def backlash(load, half_width, state, out):  # type: ignore[no-untyped-def]
+    """Play operator: out (n,) stays within ``half_width`` of ``load`` (n,) and moves only where it must.
+
+    ``state`` (1,) is the last output, NO_LOAD before the first sample (which it then takes over).
+    """
+    if load.size == 0:
+        return
+    place = state[0]
+    if place >= NO_LOAD:
+        place = load[0]
+    for k in range(load.size):
+        place = min(max(place, load[k] - half_width), load[k] + half_width)
+        out[k] = place
+    state[0] = place
+
+
+@njit(cache=True, fastmath=_LAX)
+def _loop_at(load, half_widths, closed, open_, levelling, state):  # type: ignore[no-untyped-def]
+    """The loop at ``load``, to which ``state`` moves; see `relays`."""
+    bent = 2.0 / 3.0 * levelling
+    total = 0.0
+    above = load * load * (1.0 - bent * load)
+    for i in range(half_widths.size):
+        reach = load - 2.0 * half_widths[i]
+        place = min(max(state[i], reach), load)
+        state[i] = place
+        low, up = max(reach, 0.0), max(place, 0.0)
+        mean = 0.5 * (above + low * low * (1.0 - bent * low))
+        total += closed[i] * (mean - up * up * (1.0 - bent * up)) + open_[i] * (load - half_widths[i] - place)
+    return total
+
+
+@njit(cache=True, fastmath=_LAX)
+def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ignore[no-untyped-def]
+    """out (n,): loop of a bank of relays about its mean curve, positive while loading.
+
+    ``closed`` (m,) weighs relays whose down thresholds b >= 0 have the density 2 b (1 - levelling b), so that all are
+    down without load; ``open_`` (m,) stop operators, in the middle before the first loading. ``state`` (m,) is the
+    play's place less its half width, -half_widths in the beginning.
+    """
+    for k in range(load.size):
+        out[k] = _loop_at(max(load[k], 0.0), half_widths, closed, open_, levelling, state)
+
+
+@njit(cache=True)
+def relays_undone(signal, strength, half_widths, closed, open_, levelling, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out - strength relays(out) = ``signal`` (n,), by bisection; ``state`` moves on."""
+    trial = np.empty(half_widths.size)
+    for k in range(signal.size):
+        y = signal[k]
+        low, high = y - 2.0 * strength, y + 2.0 * strength
+        for _ in range(_BISECTIONS):
+            f = 0.5 * (low + high)
+            trial[:] = state
+            if f - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, trial) < y:
+                low = f
+            else:
+                high = f
+        f = 0.5 * (low + high)
+        _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, state)
+        out[k] = f
+
+
+@njit(cache=True)
+def _bend(z, exponent, turn):  # type: ignore[no-untyped-def]
+    if z >= 0.0:
+        return 1.0 - min(z, 1.0) ** exponent
+    return 1.0 + turn * (-z) ** exponent
+
+
+@njit(cache=True)
+def bouc_wen_branch(exponent, turn, spacing, z, slope):  # type: ignore[no-untyped-def]
+    """The rising branch from z = -1: ``z`` and ``slope`` times spacing (m,), ``spacing`` widths apart.
+
+    dz/dx = 1 - z^exponent, or 1 + turn |z|^exponent below zero, by fourth-order Runge-Kutta.
+    """
+    last = -1.0
+    for k in range(z.size):
+        z[k] = last
+        one = _bend(last, exponent, turn)
+        slope[k] = spacing * one
+        two = _bend(last + 0.5 * spacing * one, exponent, turn)
+        three = _bend(last + 0.5 * spacing * two, exponent, turn)
+        four = _bend(last + spacing * three, exponent, turn)
+        last = min(last + spacing * (one + 2.0 * two + 2.0 * three + four) / 6.0, 1.0)
+
+
+@njit(cache=True)
+def _along(place, z, slope):  # type: ignore[no-untyped-def]
+    """The branch at ``place`` spacings from its beginning (cubic Hermite), the last value beyond its end."""
+    if place >= z.size - 1:
+        return z[z.size - 1]
+    i = int(place)
+    t = place - i
+    u = 1.0 - t
+    return u * u * ((1.0 + 2.0 * t) * z[i] + t * slope[i]) + t * t * ((1.0 + 2.0 * u) * z[i + 1] - u * slope[i + 1])
+
+
+@njit(cache=True)
+def _place_of(value, z, slope):  # type: ignore[no-untyped-def]
+    """Where the rising branch has ``value``, in spacings, by bisection."""
+    low, high = 0.0, z.size - 1.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if _along(middle, z, slope) < value:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@njit(cache=True)
+def _slide(move, value, direction, place, per_load, z, slope):  # type: ignore[no-untyped-def]
+    """Friction, direction and place on the branch after a ``move`` of the load."""
+    if move != 0.0:
+        turned = 1.0 if move > 0.0 else -1.0
+        if turned != direction:
+            direction = turned
+            place = _place_of(direction * value, z, slope)
+        place += abs(move) * per_load
+        value = direction * _along(place, z, slope)
+    return value, direction, place
+
+
+@njit(cache=True)
+def bouc_wen(load, per_load, z, slope, state, out):  # type: ignore[no-untyped-def]
+    """out (n,): friction in [-1, 1] along ``load`` (n,), on the branch ``z``, ``slope`` of `bouc_wen_branch`.
+
+    ``per_load`` is spacings of the branch per load. ``state`` (4,): last load (NO_LOAD before the first), friction,
+    direction (0 before the first move), place on the branch.
+    """
+    last, value, direction, place = state
+    for k in range(load.size):
+        move = load[k] - last if last < NO_LOAD else 0.0
+        value, direction, place = _slide(move, value, direction, place, per_load, z, slope)
+        last = load[k]
+        out[k] = value
+    state[0], state[1], state[2], state[3] = last, value, direction, place
+
+
+@njit(cache=True)
+def bouc_wen_undone(signal, strength, per_load, z, slope, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out - strength friction = ``signal`` (n,), friction along the backlash of out.
+
+    ``state`` (4,) as in `bouc_wen`.
+    """
+    last, value, direction, place = state
+    for k in range(signal.size):
+        y = signal[k]
+        if last >= NO_LOAD:
+            last = y
+            out[k] = y
+            continue
+        f = y + strength * value
+        if abs(f - last) > dead_zone:  # else the load has not moved, as far as friction knows
+            sense = 1.0 if f > last else -1.0
+            on = place if sense == direction else _place_of(sense * value, z, slope)
+            low, high = (last, y + strength) if sense > 0.0 else (y - strength, last)
+            for _ in range(_BISECTIONS):
+                f = 0.5 * (low + high)
+                move = max(sense * (f - last) - dead_zone, 0.0)
+                if f - strength * sense * _along(on + move * per_load, z, slope) < y:
+                    low = f
+                else:
+                    high = f
+            f = 0.5 * (low + high)
+            move = max(sense * (f - last) - dead_zone, 0.0)
+            if move > 0.0:
+                direction, place = sense, on + move * per_load
+                value = sense * _along(place, z, slope)
+                last += sense * move
+        out[k] = f
+    state[0], state[1], state[2], state[3] = last, value, direction, place
+
+
+@njit(cache=True)
+def sense_of_motion(load, width, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) in [-1, 1]: s with ds = (sgn(df) - s) |df|/width along ``load`` (n,).
+
+    ``state`` (2,): last load (NO_LOAD before the first sample), last sense.
+    """
+    last, sense = state
+    for k in range(load.size):
+        move = load[k] - last if last < NO_LOAD else 0.0
+        if move > 0.0:
+            sense = 1.0 + (sense - 1.0) * math.exp(-move / width)
+        elif move < 0.0:
+            sense = -1.0 + (sense + 1.0) * math.exp(move / width)
+        last = load[k]
+        out[k] = sense
+    state[0], state[1] = last, sense
+
+
+@njit(cache=True)
+def sense_undone(signal, strength, width, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the sense of the backlash of out.
+
+    ``state`` (2,) as in `sense_of_motion`.
+    """
+    last, sense = state
+    for k in range(signal.size):
+        y = signal[k]
+        low, high = min(y, y / (1.0 - strength)), max(y, y / (1.0 - strength))
+        now, cleaned = sense, last
+        for _ in range(_BISECTIONS):
+            f = 0.5 * (low + high)
+            cleaned = f if last >= NO_LOAD else min(max(last, f - dead_zone), f + dead_zone)
+            move = 0.0 if last >= NO_LOAD else cleaned - last
+            if move > 0.0:
+                now = 1.0 + (sense - 1.0) * math.exp(-move / width)
+            elif move < 0.0:
+                now = -1.0 + (sense + 1.0) * math.exp(move / width)
+            else:
+                now = sense
+            if f * (1.0 - 0.5 * strength * (1.0 - now)) < y:
+                low = f
+            else:
+                high = f
+        last, sense = cleaned, now
+        out[k] = 0.5 * (low + high)
+    state[0], state[1] = last, sense
+
+
+@njit(cache=True)
+def _cycle_step(f, least, trough, peak):  # type: ignore[no-untyped-def]
+    """Whether a cycle ends at ``f``, and the new trough and peak."""
+    if trough >= NO_LOAD:
+        return False, f, f
+    if peak - trough < least:
+        if f < trough:
+            return False, f, f
+        return False, trough, max(peak, f)
+    peak = max(peak, f)
+    if f <= trough + CYCLE_ENDS * (peak - trough):
+        return True, f, f
+    return False, trough, peak
+
+
+@njit(cache=True)
+def cycles_done(load, least, state, out):  # type: ignore[no-untyped-def]
+    """out (n,): load cycles completed: the load rose by ``least`` and came back but for 2 % of the rise.
+
+    ``state`` (3,): lowest load since the last cycle, highest since then (NO_LOAD before the first sample), count.
+    """
+    trough, peak, count = state
+    for k in range(load.size):
+        ended, trough, peak = _cycle_step(load[k], least, trough, peak)
+        if ended:
+            count += 1.0
+        out[k] = count
+    state[0], state[1], state[2] = trough, peak, count
+
+
+@njit(cache=True)
+def conditioned_undone(signal, strength, per_cycle, least, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out (1 + strength (1 - exp(-n per_cycle))) = ``signal`` (n,), n the cycles of out.
+
+    ``state`` (3,) as in `cycles_done`.
+    """
+    trough, peak, count = state
+    for k in range(signal.size):
+        f = signal[k] / (1.0 - strength * math.expm1(-count * per_cycle))
+        ended, trough, peak = _cycle_step(f, least, trough, peak)
+        if ended:
+            count += 1.0
+            f = signal[k] / (1.0 - strength * math.expm1(-count * per_cycle))
+        out[k] = f
+    state[0], state[1], state[2] = trough, peak, count
+
+
+@njit(cache=True)
+def rate_undone(signal, strength, exponent, softness, dead_zone, step_s, keep, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out (1 + strength r^exponent) = ``signal`` (n,), r the smoothed rate of what came out before.
+
+    r^exponent is (r^2 + softness^2)^(exponent/2) - softness^exponent, r a first-order mean with ``keep`` a step.
+    ``state`` (2,): last cleaned out (NO_LOAD before the first sample), r.
+    """
+    last, rate = state
+    for k in range(signal.size):
+        size = (rate * rate + softness * softness) ** (0.5 * exponent) - softness**exponent
+        f = signal[k] / (1.0 + strength * size)
+        cleaned = f if last >= NO_LOAD else min(max(last, f - dead_zone), f + dead_zone)
+        moved = 0.0 if last >= NO_LOAD else abs(cleaned - last)
+        rate = keep * rate + (1.0 - keep) * moved / step_s
+        last = cleaned
+        out[k] = f
+    state[0], state[1] = last, rate
+
+
+@njit(cache=True)
+def _orifice(p, laminar):  # type: ignore[no-untyped-def]
+    return p / math.sqrt(math.sqrt(p * p + laminar * laminar))
+
+
+@njit(cache=True)
+def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) = ``pressure`` (n,) - w, with w' = rate p/sqrt(|p|) of what is left, by the implicit trapezoid.
+
+    ``step_rate`` is rate times step; below ``laminar`` the flow is in proportion. ``state`` (2,): w, last flow over
+    rate.
+    """
+    w, flow = state
+    half = 0.5 * step_rate
+    p, before = 0.0, 0.0
+    for k in range(pressure.size):
+        known = pressure[k] - w - half * flow
+        # p + half flow(p) = known rises with p: Newton from the last output moved along, kept in a bracket.
+        low, high = min(known, 0.0), max(known, 0.0)
+        p = min(max(p + known - before, low), high)
+        before = known
+        for _ in range(30):
+            root2 = math.sqrt(p * p + laminar * laminar)
+            per_pressure = 1.0 / math.sqrt(root2)
+            off = p + half * p * per_pressure - known
+            if off > 0.0:
+                high = p
+            else:
+                low = p
+            slope = 1.0 + half * per_pressure * (1.0 - 0.5 * (p / root2) * (p / root2))
+            trial = p - off / slope
+            if not low <= trial <= high:
+                trial = 0.5 * (low + high)
+            moved = abs(trial - p)
+            p = trial
+            if moved <= 1e-8:  # it converges quadratically
+                break
+        flow = _orifice(p, laminar)
+        w = pressure[k] - p
+        out[k] = p
+    state[0], state[1] = w, flow
+
+
+@njit(cache=True)
+def softened_undone(signal, strength, width, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out (1 + strength tanh((M^2 - out^2)/width)) = ``signal`` (n,), M the largest out so far.
+
+    ``state`` (1,): that largest, less ``dead_zone``.
+    """
+    largest = state[0]
+    for k in range(signal.size):
+        y = signal[k]
+        f = y
+        if 0.0 < y < largest * (1.0 + strength):
+            low, high = y / (1.0 + strength), y
+            for _ in range(_BISECTIONS):
+                f = 0.5 * (low + high)
+                bend = math.tanh(max(largest * largest - f * f, 0.0) / width)
+                if f * (1.0 + strength * bend) < y:
+                    low = f
+                else:
+                    high = f
+            f = 0.5 * (low + high)
+        largest = max(largest, f - dead_zone)
+        out[k] = f
+    state[0] = largest
+
+
+@njit(cache=True)
+def orifice_undone(signal, step_rate, laminar, state, out):  # type: ignore[no-untyped-def]
+    """out (n,): pressure before `orifice`, from what is left (n,). ``state`` (2,): w, last flow over rate."""
+    lost, last = state
+    for k in range(signal.size):
+        flow = _orifice(signal[k], laminar)
+        lost += 0.5 * step_rate * (flow + last)
+        last = flow
+        out[k] = signal[k] + lost
+    state[0], state[1] = lost, last
+
+
+@njit(cache=True)
+def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out + set = ``signal`` (n,), set += half (out^m + last out^m) a step, out^m = 0 below zero.
+
+    ``state`` (2,): set, last out^m (negative before the first sample).
+    """
+    total, last = state
+    for k in range(signal.size):
+        p = signal[k]
+        if last >= 0.0:
+            known = p - total - half * last
+            p = known
+            for _ in range(12):  # a contraction: half is far below 1
+                p = known - half * max(p, 0.0) ** exponent
+            total = signal[k] - p
+        last = max(p, 0.0) ** exponent
+        out[k] = p
+    state[0], state[1] = total, last

@@ -1,0 +1,36 @@
+"""What a sensor and a logger do to a signal, where each sample needs weights of its own."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
+    """out[k] = u at the place k - late[k], in samples; beyond the ends the end values hold.
+
+    ``u``, ``late``, ``out`` (n,); ``weights`` (m + 1, 16) of the neighbours -7 ... 8 of a place at the fractions 0,
+    1/m, ... 1 past a sample, interpolated between two fractions. ``out`` is overwritten.
+    """
+    n, fractions = u.size, weights.shape[0] - 1
+    for k in range(n):
+        place = k - late[k]
+        whole = math.floor(place)
+        fine = (place - whole) * fractions
+        row = min(int(fine), fractions - 1)
+        share = fine - row
+        first = int(whole) - 7
+        total = 0.0
+        if first >= 0 and first + 16 <= n:
+            near, far = 0.0, 0.0
+            for j in range(16):
+                near += weights[row, j] * u[first + j]
+                far += weights[row + 1, j] * u[first + j]
+            total = near + share * (far - near)
+        else:
+            for j in range(16):
+                weight = weights[row, j] + share * (weights[row + 1, j] - weights[row, j])
+                total += weight * u[min(max(first + j, 0), n - 1)]
+        out[k] = total

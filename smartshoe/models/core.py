@@ -1,0 +1,122 @@
+"""Wall and gas as one linear network: relaxing arms, heat of compression and a leak, exact between samples.
+
+Shares of full scale throughout: u is the wall's deformation scaled so that it equals the load f at rest, p the
+pressure scaled alike. With N = 1 + k1 x0^2/(nRT) (all the spring of wall and gas over the gas's alone), arms of share
+kappa_i and rate a_i, heat of share Gamma and rate b, and omega what has leaked, from the balance of Chinimilli 2016,
+eq. (2):
+
+    (1 + sum kappa + Gamma/N) u = f + sum kappa q + (Gamma/N) r + omega/N
+    q' = a (u - q),   r' = b (u - r),   omega' = lambda p,   p = u - omega + Gamma (u - r)
+
+One arm alone is the paper's model: p/f = (s + a)/((1 + kappa) s + a).
+A network of springs and dampers has real poles, so that it runs as a sum of first-order recursions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.models.effects.effect import Arm, Element, Heat, Leak
+
+Array = NDArray[np.float64]
+
+USUAL_WALL_RATIO = 1.6  # N of the paper's four units: 1.51 to 1.78 (Table 1)
+
+
+class Core:
+    """The network of ``elements``; ``wall_ratio`` is N."""
+
+    def __init__(self, elements: Sequence[Element], wall_ratio: float = USUAL_WALL_RATIO) -> None:
+        arms = [e for e in elements if isinstance(e, Arm) and e.share != 0.0]
+        heats = [e for e in elements if isinstance(e, Heat) and e.share != 0.0]
+        leak = sum(e.rate_per_s for e in elements if isinstance(e, Leak))
+        inner = [*((e.share, e.rate_per_s) for e in arms), *((e.share / wall_ratio, e.rate_per_s) for e in heats)]
+        gain = np.array([share for share, _ in inner] + ([1.0 / wall_ratio] if leak else []))
+        # Equal rates would make the modes indistinguishable.
+        rate = np.array([value * (1.0 + 1e-7 * k) for k, (_, value) in enumerate(inner)])
+        heat = np.array([0.0] * len(arms) + [e.share for e in heats] + ([1.0] if leak else []))
+        stiffness = 1.0 + sum(share for share, _ in inner)
+        heated = 1.0 + sum(e.share for e in heats)
+        to_u = gain / stiffness
+        n = gain.size
+        matrix, drive = np.zeros((n, n)), np.zeros(n)
+        for k, value in enumerate(rate):
+            matrix[k] = value * to_u
+            matrix[k, k] -= value
+            drive[k] = value / stiffness
+        read = heated * to_u - heat
+        direct = heated / stiffness
+        if leak:
+            matrix[-1] = leak * read
+            drive[-1] = leak * direct
+        self.matrix, self.drive, self.read, self.direct = matrix, drive, read, float(direct)
+        self._to_deformation, self._stiffness = to_u, stiffness
+        self._memory = len(inner)
+
+    def steady_state(self, load: float) -> Array:
+        """States of arms and heat under a load that has lasted for ever; nothing has leaked."""
+        state = np.zeros(self.drive.size)
+        state[: self._memory] = load
+        return state
+
+    def _modes(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
+        """decay, before, after (p,), the matrix from modes to states and that from states to modes."""
+        values, vectors = np.linalg.eig(self.matrix)
+        values, vectors = np.real(values), np.real(vectors)
+        inverse = np.linalg.inv(vectors)
+        z = -values * step_s
+        decay = np.exp(-z)
+        small = np.abs(z) < 1e-4
+        safe = np.where(small, 1.0, z)
+        mean = -np.expm1(-safe) / safe
+        after = np.where(small, 0.5 - z / 6.0 + z * z / 24.0, (1.0 - mean) / safe)
+        before = np.where(small, 0.5 - z / 3.0 + z * z / 8.0, (mean - np.exp(-safe)) / safe)
+        scale = step_s * (inverse @ self.drive)
+        return decay, scale * before, scale * after, vectors, inverse
+
+    def simulate(self, load: Array, step_s: float) -> Array:
+        """Pressure (n,) for ``load`` (n,), shares of full scale, every ``step_s``; the first load lasted for ever."""
+        return self._response(load, step_s, self.read, self.direct)
+
+    def deformation(self, load: Array, step_s: float) -> Array:
+        """The wall's deformation u (n,) for the same: f at rest."""
+        return self._response(load, step_s, self._to_deformation, 1.0 / self._stiffness)
+
+    def _response(self, load: Array, step_s: float, read: Array, direct: float) -> Array:
+        if not self.drive.size:
+            return direct * load
+        from smartshoe.kernels.modal import respond
+
+        decay, before, after, vectors, inverse = self._modes(step_s)
+        out = np.empty(load.size)
+        state = inverse @ self.steady_state(float(load[0]))
+        respond(np.ascontiguousarray(load), decay, before, after, read @ vectors, direct, state, out)
+        return out
+
+    def recursion(self, step_s: float) -> tuple[Array, Array, Array]:
+        """A (n, n), b (n,), c (n,) of z_k = A z_(k-1) + b f_(k-1) + c f_k, straight lines between samples."""
+        from scipy.linalg import expm
+
+        n = self.drive.size
+        block = np.zeros((n + 2, n + 2))
+        block[:n, :n] = self.matrix * step_s
+        block[:n, n] = self.drive * step_s
+        block[n, n + 1] = 1.0
+        whole = expm(block)
+        ramp = whole[:n, n + 1]  # of a slope of one a step; from the hold it takes what the old sample keeps
+        return whole[:n, :n], whole[:n, n] - ramp, ramp
+
+
+def plain(core: Core, load: Array, step_s: float) -> Array:
+    """`Core.simulate` sample by sample, from the matrix exponential: the slow twin."""
+    a, b, c = core.recursion(step_s)
+    state = core.steady_state(float(load[0]))
+    out = np.empty(load.size)
+    for k in range(load.size):
+        if k:
+            state = a @ state + b * load[k - 1] + c * load[k]
+        out[k] = core.direct * load[k] + core.read @ state
+    return out

@@ -1,0 +1,166 @@
+"""What a statistical test on a residual found, and the arithmetic that such tests share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import Any, ClassVar
+
+import numpy as np
+
+from smartshoe.models.effects.effect import Array, Conditions, EffectParameter
+
+FALSE_ALARMS = 1e-3
+"""Rate at which each test finds something in white Gaussian noise."""
+ONE_SIDED = 3.0902  # normal quantile of 1 - FALSE_ALARMS
+LEAST_SAMPLES = 600
+RHYTHM_LAGS = range(3, 13)
+LEAST_RHYTHM = 0.1  # sum of squared correlations, above what chance gives
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A test that came out: ``value`` of its ``statistic`` above ``threshold``, said in one sentence.
+
+    ``strength`` is the standard deviation of what was found, where it is largest, as a share of full scale.
+    """
+
+    statistic: str
+    value: float
+    threshold: float
+    says: str
+    strength: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's object."""
+        return {
+            "statistic": self.statistic, "value": self.value, "threshold": self.threshold, "says": self.says,
+        }  # fmt: skip
+
+
+class Waveformless:
+    """What an effect has that is noise: nothing to add to a prediction."""
+
+    parameters: ClassVar[tuple[EffectParameter, ...]] = ()
+    is_physical: ClassVar[bool] = False
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The signal as it is: noise has no waveform that could be predicted."""
+        return signal.copy()
+
+
+@dataclass(frozen=True, eq=False)
+class LocalVariance:
+    """Variance of the residual's fast part in blocks (m,), and what it may follow: squares of pressure and slope."""
+
+    variance: Array
+    pressure_squared: Array
+    slope_squared: Array
+
+
+TRIPLETS = 4  # a block's triplets: its log variance has the variance psi'(2), and blocks stay short
+LOG_SD = sqrt(pi**2 / 6.0 - 1.0)
+PRESSURE, SLOPE = 1, 2
+
+
+def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> LocalVariance | None:
+    """`LocalVariance` from second differences of separate triplets of samples, so that neither a smooth misfit nor
+    coloured noise counts; None where too little is there, or where the lattice of the readings is coarser than noise.
+
+    Triplets at a corner of the prediction are left out: a late model leaves its corners in the residual.
+    """
+    if residual.size < LEAST_SAMPLES:
+        return None
+    n = residual.size // 3 * 3
+    fast = _second_difference(residual[:n].reshape(-1, 3))
+    spread = float(np.median(np.abs(fast))) / 0.6745
+    readings = np.unique((prediction + residual).round(12))
+    lattice = float(np.min(np.diff(readings))) if readings.size > 1 else 0.0
+    if spread <= 0.0 or (readings.size < residual.size // 4 and lattice > 1.5 * spread):
+        return None
+    slope = np.gradient(prediction, sample_time_s)[1:n:3]
+    corner = np.abs(_second_difference(prediction[:n].reshape(-1, 3)))
+    smooth = corner < 0.5 * spread
+    whole = int(np.count_nonzero(smooth)) // TRIPLETS * TRIPLETS
+    if whole < LEAST_SAMPLES // 6:
+        return None
+
+    def means(values: Array) -> Array:
+        return np.asarray(values[smooth][:whole].reshape(-1, TRIPLETS).mean(axis=1))
+
+    return LocalVariance(means(fast**2), means(prediction[1:n:3] ** 2), means(slope**2))
+
+
+def keeps_rhythm(residual: Array, weight: Array) -> bool:
+    """Whether what the fast part of the residual (n,) has more of where ``weight`` (n,) is large is a tone, no noise.
+
+    Ringing after corners (a resonance) is strongest on steep ramps as jitter is; but it repeats itself. What is there
+    all the time (hum) is not counted.
+    """
+    fast = residual[1:-1] - 0.5 * (residual[:-2] + residual[2:])
+    share = (weight[1:-1] / max(float(np.max(np.abs(weight))), 1e-300)) ** 2
+    loud, quiet = (
+        fast * np.sqrt(share / share.sum()),
+        fast * np.sqrt((1.0 - share) / max(float(np.sum(1.0 - share)), 1.0)),
+    )
+
+    def more(lag: int) -> float:
+        n = fast.size
+        return float(np.sum(loud[lag:] * loud[: n - lag]) - np.sum(quiet[lag:] * quiet[: n - lag]))
+
+    power = more(0)
+    if power <= 0.0:
+        return False
+    by_chance = len(RHYTHM_LAGS) * float(np.sum(loud**4) + np.sum(quiet**4)) / power**2
+    # White noise has no correlation left at these lags of its second differences.
+    return sum((more(lag) / power) ** 2 for lag in RHYTHM_LAGS) > LEAST_RHYTHM + 3.0 * by_chance
+
+
+def _second_difference(triplets: Array) -> Array:
+    # Scaled so that white noise keeps its variance.
+    return (triplets[:, 1] - 0.5 * (triplets[:, 0] + triplets[:, 2])) * sqrt(2.0 / 3.0)
+
+
+def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
+    """Score statistic (standard normal without the effect) and coefficient of the ``asked`` part of the variance.
+
+    The variance is a constant, and a part with the pressure's square (`PRESSURE`) and one with the slope's (`SLOPE`).
+    The other part is fitted first, so that one does not stand in for the other. The score looks at logarithms: few
+    blocks are steep, and squares of theirs are too skewed for a normal law at one in a thousand.
+    """
+    columns = np.stack([np.ones(local.variance.size), local.pressure_squared, local.slope_squared], axis=1)
+    columns = columns / np.maximum(columns.max(axis=0), 1e-300)
+    other = [0, SLOPE if asked == PRESSURE else PRESSURE]
+    without = columns @ _variances(columns, local.variance, other)
+    scores = columns / without[:, None]
+    standard = np.log(np.maximum(local.variance, 1e-9 * without) / without)
+    standard = standard - standard.mean()  # its mean is psi(2) - log(2) and not 0
+    direction = scores[:, asked]
+    kept = np.column_stack([scores[:, other], np.ones(direction.size)])
+    direction = direction - kept @ np.linalg.lstsq(kept, direction, rcond=None)[0]
+    length = float(np.sqrt(direction @ direction))
+    if length <= 1e-9 * float(np.sqrt(scores[:, asked] @ scores[:, asked])):
+        return 0.0, 0.0
+    spread = max(float(np.std(standard)), LOG_SD)
+    found = _variances(columns, local.variance, [0, 1, 2])
+    return float(direction @ standard) / (spread * length), float(found[asked])
+
+
+def _variances(columns: Array, variance: Array, used: list[int]) -> Array:
+    """Coefficients (3,) not below zero, weighted as variances of squares ask for (their spread is their mean)."""
+    coefficients = np.zeros(columns.shape[1])
+    coefficients[0] = float(variance.mean())
+    for _ in range(8):
+        weight = 1.0 / np.maximum(columns @ coefficients, 1e-3 * float(variance.mean()))
+        active = list(used)
+        while True:
+            left = columns[:, active] * weight[:, None]
+            solution = np.linalg.lstsq(left, variance * weight, rcond=None)[0]
+            negative = [column for column, value in zip(active, solution, strict=True) if value < 0.0 and column]
+            if not negative:
+                break
+            active = [column for column in active if column not in negative]
+        coefficients[:] = 0.0
+        coefficients[active] = solution
+        coefficients[0] = max(coefficients[0], 1e-3 * float(variance.mean()))
+    return coefficients

@@ -1,0 +1,69 @@
+"""What the effects of wall and contact share: a load cleaned of noise, and inverses that run in a kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.models.effects.effect import Array, Conditions, CStep, Inverse
+
+LEAST_DEAD_ZONE = 1e-3  # of full scale
+SIGMAS = 4.0
+NO_LOAD = 1e30  # as in `smartshoe.kernels.memory`: before the first sample
+
+
+def dead_zone(conditions: Conditions) -> float:
+    """Half the swing of load that memory must not take for a reversal, a share of full scale."""
+    return max(LEAST_DEAD_ZONE, SIGMAS * conditions.load_noise)
+
+
+def cleaned(load: Array, half_width: float) -> Array:
+    """The load (n,) through a play: reversals smaller than twice ``half_width`` are gone."""
+    from smartshoe.kernels.memory import backlash
+
+    out = np.empty(load.size)
+    backlash(np.ascontiguousarray(load), half_width, np.array([NO_LOAD]), out)
+    return out
+
+
+def cleaned_load(conditions: Conditions) -> Array:
+    """The measured load (n,) through a play of the noise's width; computed once."""
+    found = conditions.kept.get("cleaned_load")
+    if found is None:
+        found = conditions.kept["cleaned_load"] = cleaned(conditions.load, dead_zone(conditions))
+    return found
+
+
+@dataclass(eq=False)
+class Undone(Inverse):
+    """An inverse with memory: ``kernel(signal, *constants, state, out)`` fills ``out`` and moves ``state`` on.
+
+    ``body`` turns a name for identifiers into the same in C; ``members`` names the states in the order of ``start``.
+    """
+
+    kernel: Callable[..., None]
+    constants: tuple[object, ...]
+    start: Array
+    members: tuple[str, ...]
+    body: Callable[[Mapping[str, str]], str]
+
+    def __post_init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the session's beginning."""
+        self.state = self.start.copy()
+
+    def push(self, signal: Array, time_s: Array) -> Array:
+        """What went into the block (n,); the state carries on."""
+        out = np.empty(signal.size)
+        self.kernel(np.ascontiguousarray(signal, dtype=float), *self.constants, self.state, out)
+        return out
+
+    def c_step(self, name: str) -> CStep:
+        """The kernel's step, its bisection included."""
+        names = {member: f"f->{name}_{member}" for member in self.members}
+        states = {f"{name}_{member}": float(value) for member, value in zip(self.members, self.start, strict=True)}
+        return CStep(states, self.body(names))

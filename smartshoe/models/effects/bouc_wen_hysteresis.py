@@ -1,0 +1,150 @@
+"""Friction that does not depend on rate, with one smooth state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_inverse import c_number
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned, dead_zone
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+
+WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
+
+
+class BoucWenHysteresis(Effect):
+    """f - h z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width with gamma + beta = 1 (Wen 1976), z in [-1, 1].
+
+    z begins at 0. ``turn`` is beta - gamma: 0 unloads in a straight line, 1 with n = 1 is Dahl's friction.
+    """
+
+    name, family, stage, place = "bouc_wen_hysteresis", "hysteresis", "wall", "wall"
+    says = "the reading lies lower while loading than while unloading, at any rate, and friction is there at any load"
+    parameters = (
+        EffectParameter("half_height", "FS_load", "friction of a long slide", 0.0, 0.0, 0.4, 0.01),
+        EffectParameter("width", "FS_load", "load over which friction turns over", None, 0.005, 1.0, 0.1),
+        EffectParameter("exponent", "1", "n: how abruptly friction comes to its end value", None, 0.6, 5.0, 0.5),
+        EffectParameter("turn", "1", "how much faster friction falls after a reversal", None, 0.0, 2.0, 0.5),
+    )
+    shapes = tuple({"width": width, "exponent": 1.5, "turn": 0.5} for width in (0.03, 0.1, 0.3))
+    exposed_by = frozenset({"rates", "peaks", "minor_loops"})
+    separated_by = {
+        "play_hysteresis": "minor_loops",
+        "load_unload_asymmetry": "minor_loops",
+        "second_relaxation": "rates",
+        "power_law_creep": "rates",
+    }
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The load less friction."""
+        if values[0] == 0.0:
+            return signal.copy()
+        from smartshoe.kernels.memory import bouc_wen
+
+        load = cleaned(signal, dead_zone(conditions))
+        out = np.empty(load.size)
+        bouc_wen(load, *_branch(values), np.array(START), out)
+        return signal - float(values[0]) * out
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """The load whose friction gives the output, by bisection; exact for a load without noise.
+
+        There is one such load where friction turns over less fast than load: half_height (1 + turn) < width.
+        """
+        from smartshoe.kernels.memory import bouc_wen_undone
+
+        strength = float(values[0])
+        per_load, z, slope = _branch(values)
+
+        def body(of: Mapping[str, str]) -> str:
+            return _C_BODY.format(
+                **of, points=z.size, z=_row(z), slope=_row(slope), last_point=z.size - 1, no_load=NO_LOAD,
+                strength=c_number(strength), zone=c_number(LEAST_DEAD_ZONE), per_load=c_number(per_load),
+            )  # fmt: skip
+
+        constants = (strength, per_load, z, slope, LEAST_DEAD_ZONE)
+        return Undone(bouc_wen_undone, constants, np.array(START), ("last", "value", "direction", "place"), body)
+
+
+START = (NO_LOAD, 0.0, 0.0, 0.0)
+
+
+def _branch(values: Array) -> tuple[float, Array, Array]:
+    """Spacings per load, and the rising branch."""
+    from smartshoe.kernels.memory import bouc_wen_branch
+
+    _, width, exponent, turn = (float(value) for value in values)
+    z, slope = np.empty(SPACINGS + 1), np.empty(SPACINGS + 1)
+    bouc_wen_branch(exponent, turn, WIDTHS / SPACINGS, z, slope)
+    return SPACINGS / (WIDTHS * width), z, slope
+
+
+def _row(values: Array) -> str:
+    return ", ".join(c_number(value) for value in values)
+
+
+_AT = """{{
+                const double at = {place};
+                const int i = at >= {last_point}.0 ? {last_point} - 1 : (int)at;
+                const double t = at >= {last_point}.0 ? 1.0 : at - (double)i;
+                const double u = 1.0 - t;
+                {target} = u * u * ((1.0 + 2.0 * t) * z[i] + t * slope[i])
+                    + t * t * ((1.0 + 2.0 * u) * z[i + 1] - u * slope[i + 1]);
+            }}"""
+
+
+def _at(place: str, target: str) -> str:
+    """C that reads the branch at ``place``, with what `str.format` fills in later left standing."""
+    return _AT.replace("{place}", place).replace("{target}", target)
+
+
+_C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
+    {{last}} = x;
+}}}} else {{{{
+    static const double z[{{points}}] = {{{{{{z}}}}}};
+    static const double slope[{{points}}] = {{{{{{slope}}}}}};
+    const double y = x;
+    x = y + {{strength}} * {{value}};
+    if (fabs(x - {{last}}) > {{zone}}) {{{{
+        const double sense = x > {{last}} ? 1.0 : -1.0;
+        double on = {{place}}, low, high, move = 0.0, now;
+        int k;
+        if (sense * {{direction}} <= 0.0) {{{{
+            low = 0.0;
+            high = {{last_point}}.0;
+            for (k = 0; k < 50; k++) {{{{
+                on = 0.5 * (low + high);
+                {_at("on", "now")}
+                if (now < sense * {{value}}) {{{{
+                    low = on;
+                }}}} else {{{{
+                    high = on;
+                }}}}
+            }}}}
+            on = 0.5 * (low + high);
+        }}}}
+        low = sense > 0.0 ? {{last}} : y - {{strength}};
+        high = sense > 0.0 ? y + {{strength}} : {{last}};
+        for (k = 0; k <= 50; k++) {{{{
+            x = 0.5 * (low + high);
+            move = sense * (x - {{last}}) - {{zone}};
+            move = move > 0.0 ? move : 0.0;
+            {_at("on + move * {per_load}", "now")}
+            if (k == 50) {{{{
+                break;
+            }}}}
+            if (x - {{strength}} * sense * now < y) {{{{
+                low = x;
+            }}}} else {{{{
+                high = x;
+            }}}}
+        }}}}
+        if (move > 0.0) {{{{
+            {{direction}} = sense;
+            {{place}} = on + move * {{per_load}};
+            {{value}} = sense * now;
+            {{last}} += sense * move;
+        }}}}
+    }}}}
+}}}}"""

@@ -1,0 +1,35 @@
+"""Every effect, found from the modules of this folder: to add one is to add its file."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
+
+from smartshoe.errors import UsageError
+from smartshoe.models import effects
+from smartshoe.models.effects.effect import Effect
+
+
+def _concrete(kind: type[Effect]) -> list[type[Effect]]:
+    below = [leaf for child in kind.__subclasses__() for leaf in _concrete(child)]
+    return below if getattr(kind, "__abstractmethods__", None) else [kind, *below]
+
+
+@cache
+def catalogue() -> Mapping[str, Effect]:
+    """Effects by name, in the order of the names."""
+    for module in pkgutil.iter_modules(effects.__path__):
+        importlib.import_module(f"{effects.__name__}.{module.name}")
+    own = [kind for kind in _concrete(Effect) if kind.__module__.startswith(effects.__name__)]
+    return MappingProxyType({made.name: made for made in sorted((kind() for kind in own), key=lambda one: one.name)})
+
+
+def effect(name: str) -> Effect:
+    """The effect called ``name``; raises `UsageError` with the names there are."""
+    found = catalogue().get(name)
+    if found is None:
+        raise UsageError(f"there is no effect {name!r}: use one of {', '.join(catalogue())}")
+    return found

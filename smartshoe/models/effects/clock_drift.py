@@ -1,0 +1,42 @@
+"""Two clocks of different rates: the reading's delay grows with time."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_clock import running_time_s
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+
+FRACTIONS = 512  # of a sample; between two of them the weights are interpolated, 2e-6 of a signal's highest tones off
+
+
+@cache
+def _weights() -> Array:
+    from smartshoe.models.first_order import interpolation_taps
+
+    return np.array([interpolation_taps(k / FRACTIONS)[0] for k in range(FRACTIONS + 1)])
+
+
+class ClockDrift(Effect):
+    """y(t - epsilon t): epsilon > 0 where the reading falls behind the load; band-limited as `delay` is."""
+
+    name, family, stage, place = "clock_drift", "timing", "logger", "logger"
+    says = "the reading falls behind the load more and more, or runs ahead of it: two clocks of different rates"
+    parameters = (
+        EffectParameter("clock_rate_error", "1", "seconds lost by the reading's log a second", 0.0, -0.01, 0.01, 1e-4),
+    )
+    exposed_by = frozenset({"rates", "repeats"})
+    separated_by = {"delay": "sync pulse at both ends", "sensor_lag": "sync pulse at both ends"}
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The signal against the other clock."""
+        from smartshoe.kernels.sensing import at_places
+
+        if values[0] == 0.0:
+            return signal.copy()
+        late_samples = float(values[0]) / conditions.step_s * running_time_s(conditions)
+        moved = np.empty(signal.size)
+        at_places(np.array(signal), late_samples, _weights(), moved)
+        return moved

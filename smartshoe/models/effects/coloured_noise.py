@@ -1,0 +1,122 @@
+"""Noise that remembers: first-order noise above a white floor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_evidence import Evidence, Waveformless
+from smartshoe.models.effects.effect import Array, Conditions, Effect
+
+MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each
+QUANTILE = 3.588  # normal, of one false alarm in 1000 over the number of memories
+LEAST_INDEPENDENT = 40  # stretches of one memory's length, below which that memory is left out
+SAME_PEAK = 0.05
+CORNER = 0.1  # of the noise: a prediction that bends more from one sample to the next
+
+
+class ColouredNoise(Waveformless, Effect):
+    """Noise of a correlation time: the sensor's own, or whatever has no place in the catalogue and never repeats."""
+
+    name, family, stage, place = "coloured_noise", "noise", "sensor", "sensor"
+    says = "slow noise that differs from one equal load cycle to the next"
+    exposed_by = frozenset({"repeats"})
+    separated_by = {"gain_drift": "three repeats", "zero_drift": "three repeats", "quantisation": "lattice"}
+
+
+def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:
+    """Whether what differs between equal load cycles is correlated in time; None without, or without repeats.
+
+    ``residual`` and ``prediction`` (n,) in shares of full scale, ``sample_time_s`` apart. Differences between cycles
+    hold neither the model's misfit, which repeats, nor (by regression) drifts of zero, gain and clock. In them, a
+    score test of white noise against first-order noise of several memories, at one false alarm in 1000.
+    """
+    covariance, pairs, lengths = np.zeros(0), np.zeros(0), []
+    for series, bias, counted in _differences(residual, conditions, prediction):
+        n = series.size
+        own = _autocovariance(series) + bias
+        size = max(n, covariance.size)
+        covariance = np.pad(covariance, (0, size - covariance.size)) + np.pad(own, (0, size - n))
+        pairs = np.pad(pairs, (0, size - pairs.size)) + np.pad(counted, (0, size - n))
+        lengths.append(n)
+    total = round(float(pairs[0])) if lengths else 0
+    if total < LEAST_INDEPENDENT * 4 or covariance[0] <= 0.0:
+        return None
+    variance = covariance[0] / total
+    best: tuple[float, float, float, float] | None = None
+    for memory in MEMORIES:
+        if total < LEAST_INDEPENDENT * memory or max(lengths) < 2 * memory:
+            continue
+        lags = np.arange(1, min(int(6 * memory) + 2, covariance.size))
+        weight = np.exp(-lags / memory)
+        value = float(weight @ covariance[lags]) / (variance * math.sqrt(float(weight**2 @ pairs[lags])))
+        threshold = QUANTILE + _skewness(memory, total) * (QUANTILE**2 - 1.0) / 6.0
+        if best is None or value - threshold > best[0] - best[1]:
+            power = float(weight @ covariance[lags]) / float(weight**2 @ pairs[lags])
+            best = value, threshold, memory, power
+    if best is None or best[0] <= best[1]:
+        return None
+    value, threshold, memory, power = best
+    strength, tau_s = math.sqrt(power), memory * sample_time_s
+    says = (
+        f"what differs between equal load cycles is correlated over about {tau_s:.2g} s: "
+        f"coloured noise of {100 * strength:.2g} % of full scale"
+    )
+    return Evidence("first_order_noise_score", value, threshold, says, strength)
+
+
+def _skewness(memory: float, total: int) -> float:
+    # The score is a sum of exponential periodogram values, weighted by the spectrum of the lags' weights.
+    decay = math.exp(-1.0 / memory)
+    turn = decay * np.exp(1j * np.pi * (np.arange(8192) + 0.5) / 8192)
+    weight = 2.0 * (turn / (1.0 - turn)).real
+    return float(2.0 * np.mean(weight**3) / np.mean(weight**2) ** 1.5 / math.sqrt(total / 2.0))
+
+
+def _differences(residual: Array, conditions: Conditions, prediction: Array) -> Iterator[tuple[Array, Array, Array]]:
+    """Orthonormal contrasts (n,) of equal cycles, what the regression took from their autocovariance (n,), pairs (n,).
+
+    Corners of the prediction count as zero: cycles are aligned to a sample, which is too coarse for them.
+    """
+    from smartshoe.loading import by_rate, cycles
+
+    load = conditions.load
+    for group in by_rate(cycles(conditions.time_s, load)).values():
+        peaks = np.array([float(load[cycle.start : cycle.stop].max()) for cycle in group])
+        equal = [
+            cycle
+            for cycle, peak in zip(group, peaks, strict=True)
+            if abs(peak - np.median(peaks)) <= SAME_PEAK * np.median(peaks)
+        ]
+        if len(equal) < 2:
+            continue
+        n = min(cycle.stop - cycle.start for cycle in equal)
+        if n < 30:
+            continue
+        aligned = np.stack([residual[cycle.start : cycle.start + n] for cycle in equal])
+        shape = np.mean([prediction[cycle.start : cycle.start + n] for cycle in equal], axis=0)
+        spread = max(float(np.median(np.abs(np.diff(aligned, axis=1)))), 1e-12)
+        corner = np.abs(np.diff(shape, 2, prepend=shape[0], append=shape[-1])) > CORNER * spread
+        counted = 1.0 - np.minimum(np.convolve(corner, np.ones(7), mode="same"), 1.0)
+        if np.count_nonzero(counted) < 30:
+            continue
+        regressors = np.stack([np.ones(n), shape, np.gradient(shape)], axis=1) * counted[:, None]
+        basis = np.linalg.qr(regressors)[0]
+        taken = np.sum([_autocovariance(column) for column in basis.T], axis=0)
+        pairs = _autocovariance(counted)
+        repeats = len(equal)
+        # Helmert's contrasts: as many independent series as repeats less one, each as noisy as a repeat.
+        for row in range(1, repeats):
+            contrast = np.zeros(repeats)
+            contrast[:row], contrast[row] = 1.0, -float(row)
+            series = counted * (contrast @ aligned) / math.sqrt(row * (row + 1.0))
+            series = series - basis @ (basis.T @ series)
+            yield series, taken * float(series @ series) / (pairs[0] - basis.shape[1]), pairs
+
+
+def _autocovariance(series: Array) -> Array:
+    """Sums (n,) of products at the lags 0 ... n - 1."""
+    n = series.size
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(series, 2 * n)) ** 2, 2 * n)[:n])

@@ -1,0 +1,70 @@
+"""A contact that grows with the load."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+
+NEWTON_STEPS = 12
+
+
+class ContactArea(Effect):
+    """f exp(b (1 - f^q)/q): f^(1 - b) for q near 0, f (1 + b)/(1 + b f) in the first order for q = 1.
+
+    Zero and full scale stay where they are; loads below zero pass unchanged.
+    """
+
+    name, family, stage, place = "contact_area", "static_curve", "contact", "contact"
+    says = "the contact grows with the load: the reading against load is bent, steepest at low loads"
+    parameters = (
+        EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.2, 0.01),
+        EffectParameter("curvature", "1", "q: 0 bends most near zero load, 1 evenly", None, 0.1, 1.5, 0.5),
+    )
+    shapes = ({"curvature": 1.0}, {"curvature": 0.4})
+    exposed_by = frozenset({"peaks", "low_loads"})
+    separated_by = {
+        "gas_compression": "sign; displacement",
+        "wall_hardening": "displacement",
+        "sensor_nonlinearity": "displacement, or pressure applied to the sensor",
+    }
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The load that reaches the tube."""
+        if values[0] == 0.0:
+            return signal.copy()
+        b, q = self._bend(values)
+        size = np.maximum(signal, 1e-300)
+        return np.where(signal > 0.0, size * np.exp((b / q) * (1.0 - np.exp(q * np.log(size)))), signal)
+
+    @staticmethod
+    def _bend(values: Array) -> tuple[float, float]:
+        bow, q = (float(value) for value in values)
+        return math.log1p(2.0 * bow) * q / (1.0 - 0.5**q), q
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """Newton in ln f."""
+        b, q = self._bend(values)
+
+        def undo(signal: Array, time_s: Array) -> Array:
+            target = np.log(np.maximum(signal, 1e-300))
+            v = target.copy()
+            for _ in range(NEWTON_STEPS):
+                bent = b * np.exp(q * v)
+                v -= (v + (b - bent) / q - target) / (1.0 - bent)
+            return np.where(signal > 0.0, np.exp(v), signal)
+
+        body = f"""if (x > 0.0) {{
+    const double target = log(x);
+    double v = target;
+    int k;
+    for (k = 0; k < {NEWTON_STEPS}; k++) {{
+        const double bent = {c_number(b)} * exp({c_number(q)} * v);
+        v -= (v + ({c_number(b)} - bent) / {c_number(q)} - target) / (1.0 - bent);
+    }}
+    x = exp(v);
+}}"""
+        return Memoryless(undo, body)

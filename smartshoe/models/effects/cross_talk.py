@@ -1,0 +1,26 @@
+"""A neighbouring unit's pressure in this unit's reading."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+
+
+class CrossTalk(Effect):
+    """+ chi times the neighbour's pressure, a share of its largest; inert where no neighbour was logged.
+
+    It has no streaming inverse: a unit's filter does not see its neighbour.
+    """
+
+    name, family, stage, place = "cross_talk", "cross_talk", "sensor", "sensor"
+    says = "the reading follows a neighbouring unit's pressure, also while its own load rests"
+    parameters = (
+        EffectParameter("coupling", "FS_reading", "reading at the neighbour's largest pressure", 0.0, -0.5, 0.5, 0.01),
+    )
+    needs = frozenset({"neighbour"})
+    separated_by = {"zero_drift": "load one unit alone", "contact_area": "load one unit alone"}
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The signal and the neighbour's share."""
+        if conditions.neighbour is None:
+            return signal.copy()
+        return signal + float(values[0]) * conditions.neighbour

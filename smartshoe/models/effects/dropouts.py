@@ -1,0 +1,18 @@
+"""Readings that are gone for a while."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._sensor_evidence import Waveformless
+from smartshoe.models.effects.effect import Effect
+
+
+class Dropouts(Waveformless, Effect):
+    """A lost contact or packet.
+
+    Runs that return to the value of the unloaded unit show them, with edges of one sample.
+    """
+
+    name, family, stage, place = "dropouts", "data", "logger", "logger"
+    says = "the reading falls to its unloaded value, or to nothing, while the load stays"
+    exposed_by = frozenset({"repeats"})
+    separated_by = {"spikes": "length: a spike is one or two samples", "dead_band": "repeats"}

@@ -1,0 +1,188 @@
+"""The shape of an effect: a block at one place of the measurement chain, with parameters that have a null value.
+
+*The chain's units.* Loads are shares of the full-scale load (f = 1 at full scale). Pressures are the same shares: the
+linear core has static gain 1, so that a held load f gives the pressure f, and the sensor's gain (reading per share)
+stands at the chain's end. So every strength is a share of full scale.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.errors import UsageError
+
+Array = NDArray[np.float64]
+Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
+PLACES: tuple[Place, ...] = ("machine", "contact", "wall", "core", "gas", "sensor", "logger")
+"""Order of the chain. "wall" blocks turn the load that acts on the tube, "core" ones add states to the linear network
+of wall and gas, "gas" ones turn the pressure in the tube, "sensor" ones what the sensor makes of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    """One number of an effect.
+
+    ``unit``: SI, or with the words FS_load and FS_reading for a share of the full-scale load or reading
+    ("FS_reading/s"), which a report turns into newtons and the reading's own unit.
+    ``null``: the value at which the effect is the identity; None for a parameter of shape (a time constant, an
+    exponent), which means nothing while the strength is null. ``lower`` and ``upper`` are bounds, a physical sign
+    among them. ``size``: a typical value, or change from null; the step of derivatives is a small part of it.
+    """
+
+    name: str
+    unit: str
+    says: str
+    null: float | None
+    lower: float
+    upper: float
+    size: float
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """What a block may know beside its signal: one session (the unit at rest and zeroed before) on an even grid.
+
+    ``time_s`` (n,) from the session's start, step ``step_s``; ``load`` (n,) the measured load as a share of full
+    scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
+    load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
+    ``neighbour`` (n,) another unit's pressure as a share of its largest, are None where they were not logged.
+    """
+
+    time_s: Array
+    load: Array
+    step_s: float
+    load_noise: float = 0.0
+    temperature_k: Array | None = None
+    neighbour: Array | None = None
+    before: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def rate_per_s(self) -> Array:
+        """(n,) the load's slope in full scales a second, central differences."""
+        return np.gradient(self.load, self.step_s) if self.load.size > 1 else np.zeros(self.load.size)
+
+    @cached_property
+    def kept(self) -> dict[str, Array]:
+        """A place for what blocks derive from the load alone (largest so far, cycles done), by name."""
+        return {}
+
+
+class Inverse(ABC):
+    """A block's inverse, run on a stream: the same numbers for any chunking."""
+
+    @abstractmethod
+    def push(self, signal: Array, time_s: Array) -> Array:
+        """What went into the block (n,) from what came out of it (n,), at ``time_s`` (n,) since the session began."""
+
+    def reset(self) -> None:
+        """Forget the past; a block without memory has none."""
+        return None
+
+    @abstractmethod
+    def c_step(self, name: str) -> CStep:
+        """The same as C99, for the export; ``name`` is unique in the chain and goes before every identifier."""
+
+
+@dataclass(frozen=True, slots=True)
+class CStep:
+    """C99 that turns the double ``x`` in place at the double time ``t`` in s (``f`` is the filter's struct).
+
+    ``states``: members of the struct (doubles) with their initial values, read and written as ``f->member``;
+    ``body``: statements, constants written with 17 digits.
+    """
+
+    states: Mapping[str, float]
+    body: str
+
+
+class Effect(ABC):
+    """One effect of the catalogue; a subclass a file, one instance a class.
+
+    ``shapes``: points of a grid over the parameters without a null value, where the screen takes sensitivities.
+    ``needs``: channels without which it cannot be seen ("temperature", "neighbour").
+    ``exposed_by``: what a protocol must hold: "holds", "rests", "rates", "repeats", "peaks", "pauses", "idle",
+    "steps", "minor_loops", "low_loads".
+    ``separated_by``: neighbour's name to the experiment or channel that tells it from this one.
+    ``is_physical``: False for noise and faults of the data, which are never a cause by their waveform.
+    """
+
+    name: ClassVar[str]
+    family: ClassVar[str]
+    stage: ClassVar[str]
+    place: ClassVar[Place]
+    says: ClassVar[str]
+    parameters: ClassVar[tuple[EffectParameter, ...]]
+    shapes: ClassVar[tuple[Mapping[str, float], ...]] = ({},)
+    needs: ClassVar[frozenset[str]] = frozenset()
+    exposed_by: ClassVar[frozenset[str]] = frozenset()
+    separated_by: ClassVar[Mapping[str, str]] = {}
+    is_physical: ClassVar[bool] = True
+
+    @abstractmethod
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The block's output (n,) for its input (n,); ``values`` in the order of ``parameters``. Never in place."""
+
+    def inverse(self, values: Array, step_s: float) -> Inverse | None:
+        """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""
+        return None
+
+    def start(self, shape: Mapping[str, float] | None = None) -> Array:
+        """Null strengths with the shape parameters at ``shape``, or at the first of ``shapes``."""
+        at = {**self.shapes[0], **(shape or {})}
+        missing = [p.name for p in self.parameters if p.null is None and p.name not in at]
+        if missing:
+            raise UsageError(f"effect {self.name}: shape parameter {missing[0]} has no value")
+        return np.array([at[p.name] if p.null is None else p.null for p in self.parameters], dtype=float)
+
+    def is_null(self, values: Array) -> bool:
+        """Whether every strength is at its null value."""
+        return all(p.null is None or value == p.null for p, value in zip(self.parameters, values, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A Maxwell arm of the wall: stiffness ``share`` of (gas + k1), relaxing at ``rate_per_s``."""
+
+    share: float
+    rate_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Heat:
+    """Heat of compression: ``share`` of the isothermal pressure rise, leaving at ``rate_per_s``."""
+
+    share: float
+    rate_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Leak:
+    """Air lost at ``rate_per_s`` times the pressure."""
+
+    rate_per_s: float
+
+
+Element = Arm | Heat | Leak
+
+
+class CoreEffect(Effect):
+    """An effect that adds states to the linear network of wall and gas (`smartshoe.models.core`)."""
+
+    place: ClassVar[Place] = "core"
+
+    @abstractmethod
+    def elements(self, values: Array) -> tuple[Element, ...]:
+        """What it adds to the network."""
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The network with these elements alone: no relaxation of the baseline, unit static gain."""
+        from smartshoe.models.core import Core
+
+        return Core(self.elements(values)).simulate(signal, conditions.step_s)

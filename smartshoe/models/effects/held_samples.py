@@ -1,0 +1,18 @@
+"""Readings that stand still while the load moves."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._sensor_evidence import Waveformless
+from smartshoe.models.effects.effect import Effect
+
+
+class HeldSamples(Waveformless, Effect):
+    """A logger that repeats its last value when it misses a sample.
+
+    Exact repeats with a moving load show them, jumps follow; a coarse lattice repeats on slow ramps only.
+    """
+
+    name, family, stage, place = "held_samples", "data", "logger", "logger"
+    says = "a reading repeats exactly while the load moves"
+    exposed_by = frozenset({"rates"})
+    separated_by = {"quantisation": "rates", "dropouts": "value: a held one is that before"}

@@ -1,0 +1,216 @@
+"""The mains, or another steady tone, in the reading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, Evidence
+from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+
+LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect
+MAINS_HZ = (50.0, 60.0)
+HARMONICS = 7
+MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
+NEIGHBOURS = 60  # bins on either side that give the floor
+HANN_CORRELATION = 1.944  # neighbouring bins behind a Hann window are worth half as many independent ones
+STEADY = 0.4  # least median over mean of a tone's power in time: noise has 0.69, ringing after corners far less
+
+
+@dataclass(frozen=True)
+class HumEvidence(Evidence):
+    """With the line's ``frequency_hz`` as logged, its amplitude's parts (shares of full scale) and its ``sources``.
+
+    ``sources``: mains harmonics in Hz that this sampling rate puts there. The tone is cosine cos(2 pi f t) + sine
+    sin(2 pi f t), t from the first sample: the effect's parameters.
+    """
+
+    frequency_hz: float
+    cosine: float
+    sine: float
+    sources: tuple[float, ...]
+
+
+class Hum(Effect):
+    """+ a sinusoid. 50 Hz sits at the Nyquist frequency of a 100 Hz log; 60 Hz comes out at 40 Hz there."""
+
+    name, family, stage, place = "hum", "noise", "logger", "logger"
+    says = "a steady tone runs through the record, loaded or not: a sharp line in the spectrum"
+    parameters = (
+        EffectParameter("cosine", "FS_reading", "the tone's part in phase with a cosine", 0.0, -0.2, 0.2, 1e-3),
+        EffectParameter("sine", "FS_reading", "the tone's part in phase with a sine", 0.0, -0.2, 0.2, 1e-3),
+        EffectParameter("frequency", "Hz", "the tone's frequency, before the sampling", None, LOWEST_HZ, 1000.0, 0.01),
+    )
+    shapes = tuple({"frequency": frequency} for frequency in MAINS_HZ)
+    exposed_by = frozenset({"rests"})
+    separated_by = {"coloured_noise": "another sampling rate", "spikes": "repeats"}
+    is_physical = False
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The signal and the tone."""
+        return signal + _tone(conditions.time_s, *(float(value) for value in values))
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """Subtract it; exact."""
+        cosine, sine, frequency = (float(value) for value in values)
+        angle = f"{c_number(2.0 * math.pi * frequency)} * t"
+        return Memoryless(
+            lambda signal, time_s: signal - _tone(time_s, cosine, sine, frequency),
+            f"x -= {c_number(cosine)} * cos({angle}) + {c_number(sine)} * sin({angle});",
+        )
+
+
+def _tone(time_s: Array, cosine: float, sine: float, frequency: float) -> Array:
+    if cosine == 0.0 and sine == 0.0:
+        return np.zeros_like(time_s)
+    angle = 2.0 * math.pi * frequency * time_s
+    return cosine * np.cos(angle) + sine * np.sin(angle)
+
+
+def alias_hz(frequency_hz: float, sample_time_s: float) -> float:
+    """Where a tone comes out in a log with that sample time: 0 to the Nyquist frequency."""
+    turns = frequency_hz * sample_time_s
+    return abs(turns - round(turns)) / sample_time_s
+
+
+def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> HumEvidence | None:
+    """The strongest line in the spectrum of ``residual`` (n,), `HumEvidence`; None where no line stands out.
+
+    Each bin of the periodogram over the mean of its neighbours, which has an F distribution where the noise is
+    locally flat (Fisher's test with a local floor), at one false alarm in 1000 for the whole spectrum; on the whole
+    record and on averages over stretches of it, since the mains wander. A line that the ``prediction`` (n,) has as
+    well is the load's, and one that comes and goes is ringing.
+    """
+    best: tuple[float, float, float, float] | None = None
+    for length in sorted({residual.size, min(residual.size, 2048)}):
+        if length < LEAST_SAMPLES:
+            continue
+        found = _line(residual, prediction, length, sample_time_s)
+        if found is not None and (best is None or found[0] < best[0]):
+            best = found
+    if best is None:
+        return None
+    _, ratio, threshold, near_hz = best
+    frequency = _refined(residual, near_hz, sample_time_s)
+    cosine, sine = _amplitudes(residual, frequency, sample_time_s)
+    sources = tuple(
+        mains * harmonic
+        for mains in MAINS_HZ
+        for harmonic in range(1, HARMONICS + 1)
+        if abs(alias_hz(mains * harmonic, sample_time_s) - frequency)
+        <= MAINS_TOLERANCE * mains * harmonic + 1.0 / (residual.size * sample_time_s)
+    )
+    strength = math.sqrt(0.5 * (cosine**2 + sine**2))
+    origin = f", where {' or '.join(f'{source:g}' for source in sources)} Hz of the mains come out" if sources else ""
+    says = f"a tone of {100 * math.hypot(cosine, sine):.2g} % of full scale at {frequency:.4g} Hz{origin}"
+    return HumEvidence("line_over_floor", ratio, threshold, says, strength, frequency, cosine, sine, sources)
+
+
+def _powers(signal: Array, length: int) -> Array:
+    """Periodograms (stretches, bins) behind a Hann window, stretches overlapping not at all."""
+    count = signal.size // length
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
+    parts = signal[: count * length].reshape(count, length)
+    return np.asarray(np.abs(np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * window, axis=1)) ** 2)
+
+
+def _over_floor(power: Array, half: int, apart: int) -> tuple[Array, Array]:
+    """Each bin over the mean of its neighbours (those ``apart`` bins or nearer left out), and how many these are."""
+    bins = power.size
+    running = np.concatenate([[0.0], np.cumsum(power)])
+    k = np.arange(bins)
+
+    def within(width: int) -> tuple[Array, Array]:
+        low, high = np.maximum(k - width, 0), np.minimum(k + width + 1, bins)
+        return running[high] - running[low], (high - low).astype(float)
+
+    (wide, many), (near, few) = within(half), within(apart)
+    count = many - few
+    return power / np.maximum((wide - near) / count, 1e-300), count
+
+
+def _line(
+    residual: Array, prediction: Array, length: int, sample_time_s: float
+) -> tuple[float, float, float, float] | None:
+    from scipy.special import fdtrc, fdtri
+
+    powers = _powers(residual, length)
+    stretches, bins = powers.shape
+    half = NEIGHBOURS if stretches == 1 else NEIGHBOURS // 3
+    first = max(math.ceil(LOWEST_HZ * length * sample_time_s), 4)
+    if bins - first < 2 * half:
+        return None
+    ratio, count = _over_floor(powers.mean(axis=0), half, 3)
+    load_ratio, _ = _over_floor(_powers(prediction, length).mean(axis=0), half, 3)
+    freedom = np.full(bins, 2.0 * stretches)
+    if length % 2 == 0:
+        freedom[-1] = stretches  # a real number at the Nyquist frequency
+        freedom[-2] = 1.5 * stretches
+    rest = 2.0 * stretches * count / HANN_CORRELATION
+    chance = fdtrc(freedom, rest, ratio)
+    allowed = 0.5 * FALSE_ALARMS / (bins - first)
+    threshold = fdtri(freedom, rest, 1.0 - allowed)
+    found: tuple[float, float, float, float] | None = None
+    for k in np.argsort(chance[first:])[:20] + first:
+        if ratio[k] <= threshold[k]:
+            break
+        if load_ratio[k] > threshold[k] or not _is_steady(residual, k / (length * sample_time_s), sample_time_s):
+            continue
+        found = float(chance[k]), float(ratio[k]), float(threshold[k]), k / (length * sample_time_s)
+        break
+    return found
+
+
+def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bool:
+    """Whether the tone's power in stretches of a thirtieth of the record is much the same throughout."""
+    length = residual.size // 30
+    window = np.exp(-2j * np.pi * frequency_hz * sample_time_s * np.arange(length)) * np.hanning(length)
+    power = np.abs(residual[: 30 * length].reshape(30, length) @ window) ** 2
+    return bool(np.median(power) > STEADY * np.mean(power))
+
+
+def _refined(residual: Array, near_hz: float, sample_time_s: float) -> float:
+    """The frequency of the tone that explains most of the windowed record, within some bins of ``near_hz``."""
+    n, nyquist = residual.size, 0.5 / sample_time_s
+    turns = -2j * np.pi * sample_time_s * np.arange(n)
+    window = np.hanning(n)
+    # Turned down by the frequency that is known already, means over blocks hold all that is left to search.
+    block = max(n // 4096, 1)
+    whole = n // block * block
+
+    def blocks(values: Array) -> Array:
+        return np.asarray(values[:whole].reshape(-1, block).sum(axis=1))
+
+    slow, weight = blocks(np.exp(turns * near_hz) * window * (residual - residual.mean())), blocks(window)
+    turns = turns[:whole:block]
+    total = float(weight.sum())
+
+    def explained(offset_hz: float) -> float:
+        found = np.sum(np.exp(turns * offset_hz) * slow)
+        # Near the Nyquist frequency the tone's mirror image stands within the window's peak, and is fitted with it.
+        mirror = np.sum(np.exp(turns * 2.0 * (near_hz + offset_hz - nyquist)) * weight)
+        rest = total - float(abs(mirror)) ** 2 / total
+        if rest < 1e-3 * total:
+            return float(abs(found)) ** 2 / (2.0 * total)
+        return float(abs(found) ** 2 - (np.conj(mirror) * found**2).real / total) / rest
+
+    width, centre = 2.0 / (min(n, 2048) * sample_time_s), 0.0
+    while width > 0.02 / (n * sample_time_s):
+        # The peak behind the window is four bins wide: a grid of half of that cannot step over it.
+        count = max(9, 2 * math.ceil(width * n * sample_time_s) + 1)
+        grid = np.clip(np.linspace(centre - width, centre + width, count), -near_hz, nyquist - near_hz)
+        centre = float(grid[int(np.argmax([explained(offset) for offset in grid]))])
+        width = 2.0 * width / (count - 1)
+    return near_hz + centre
+
+
+def _amplitudes(residual: Array, frequency_hz: float, sample_time_s: float) -> tuple[float, float]:
+    """Least squares; at the Nyquist frequency, where the sine is zero, by the smallest pair."""
+    angle = 2.0 * np.pi * frequency_hz * sample_time_s * np.arange(residual.size)
+    c, s, r = np.cos(angle), np.sin(angle), residual - residual.mean()
+    normal = np.array([[np.sum(c * c), np.sum(c * s)], [np.sum(c * s), np.sum(s * s)]])
+    cosine, sine = np.linalg.pinv(normal, rcond=1e-9, hermitian=True) @ np.array([np.sum(c * r), np.sum(s * r)])
+    return float(cosine), float(sine)

@@ -1,0 +1,28 @@
+"""Air that leaves through a narrow passage: laminar, in proportion to the pressure."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter, Element, Leak
+
+
+class LinearLeak(CoreEffect):
+    """w' = lambda P, x = xd - w: the deformation x of the air is that of the wall less what left.
+
+    The wall yields to what left, so that in a hold the reading falls at (1 - 1/N) lambda, N = 1 + k1 x0^2/(nRT).
+    """
+
+    name, family, stage = "linear_leak", "leak", "gas"
+    says = "air leaves in proportion to the pressure: the reading falls in holds and lies below zero afterwards"
+    parameters = (
+        EffectParameter("leak_rate", "1/s", "share of the gauge pressure lost a second", 0.0, 0.0, 5.0, 1e-3),
+    )
+    exposed_by = frozenset({"holds", "rests"})
+    separated_by = {
+        "zero_drift": "idle and long_hold",
+        "orifice_leak": "holds at several loads",
+        "permanent_set": "sign",
+    }
+
+    def elements(self, values: Array) -> tuple[Element, ...]:
+        """One leak."""
+        return (Leak(float(values[0])),)

@@ -1,0 +1,129 @@
+"""Friction of wall and contact that does not depend on rate: a bank of plays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_inverse import c_number
+from smartshoe.models.effects._wall_memory import Undone, dead_zone
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+
+HALF_WIDTHS = np.geomspace(0.003, 0.5, 20)  # of full scale
+LEVELS = np.linspace(0.0, 1.0, 101)
+
+
+class PlayHysteresis(Effect):
+    """f - h z, z a generalised Prandtl-Ishlinskii operator: plays of half widths 0.3 to 50 % of full scale.
+
+    Their greatest forces have a lognormal density about ``width`` (``spread`` its standard deviation in ln r).
+    ``openness`` 1 weighs stop operators, which slide at any load and so keep a friction without load; 0 weighs relays
+    that are all down without load, friction growing with load b as b (1 - levelling b), so that the loop closes at
+    zero (Mayergoyz 2003, ch. 1; Brokate and Sprekels 1996, ch. 2).
+    h is half of the greatest height of the loop from zero to full scale and back.
+    """
+
+    name, family, stage, place = "play_hysteresis", "hysteresis", "wall", "wall"
+    says = "the reading lies lower while loading than while unloading, by the same amount at any rate"
+    parameters = (
+        EffectParameter("half_height", "FS_load", "half of the major loop's greatest height", 0.0, 0.0, 0.4, 0.01),
+        EffectParameter("width", "FS_load", "half width of the play that matters most", None, 0.015, 0.3, 0.05),
+        EffectParameter("spread", "1", "standard deviation of ln width over the plays", None, 0.3, 1.2, 0.5),
+        EffectParameter("levelling", "1", "how far friction stops growing towards full scale", None, 0.3, 0.9, 0.3),
+        EffectParameter("openness", "1", "share of friction that is there without load too", None, 0.0, 1.0, 0.3),
+    )
+    shapes = (
+        {"width": 0.05, "spread": 0.5, "levelling": 0.6, "openness": 0.1},
+        {"width": 0.15, "spread": 0.5, "levelling": 0.6, "openness": 0.1},
+        {"width": 0.05, "spread": 0.8, "levelling": 0.6, "openness": 0.9},
+    )
+    exposed_by = frozenset({"rates", "peaks", "minor_loops"})
+    separated_by = {
+        "bouc_wen_hysteresis": "minor_loops",
+        "load_unload_asymmetry": "minor_loops",
+        "second_relaxation": "rates",
+        "power_law_creep": "rates",
+    }
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The load less friction."""
+        if values[0] == 0.0:
+            return signal.copy()
+        from smartshoe.kernels.memory import relays
+
+        half_widths = np.maximum(HALF_WIDTHS, dead_zone(conditions))
+        closed, open_ = _weights(half_widths, values)
+        out = np.empty(signal.size)
+        relays(np.ascontiguousarray(signal), half_widths, closed, open_, float(values[3]), -half_widths, out)
+        return signal - float(values[0]) * out
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """The load whose loop gives the output, by bisection; exact."""
+        from smartshoe.kernels.memory import relays_undone
+
+        strength, levelling = float(values[0]), float(values[3])
+        closed, open_ = _weights(HALF_WIDTHS, values)
+        members = tuple(f"play{k}" for k in range(HALF_WIDTHS.size))
+
+        def body(of: Mapping[str, str]) -> str:
+            return _c_body([of[member] for member in members], strength, levelling, closed, open_)
+
+        return Undone(relays_undone, (strength, HALF_WIDTHS, closed, open_, levelling), -HALF_WIDTHS, members, body)
+
+
+def _weights(half_widths: Array, values: Array) -> tuple[Array, Array]:
+    """Weights (m,) of relays and of stops, for a loop of half height one."""
+    width, spread, levelling, openness = (float(value) for value in values[1:])
+    weight = np.exp(-0.5 * (np.log(HALF_WIDTHS / width) / spread) ** 2) / HALF_WIDTHS
+    low = np.maximum(LEVELS[:, None] - 2.0 * half_widths, 0.0)
+    up = np.maximum(np.minimum(LEVELS[:, None], 1.0 - 2.0 * half_widths), low)
+    bent = 2.0 / 3.0 * levelling
+    height = 0.5 * (up * up * (1.0 - bent * up) - low * low * (1.0 - bent * low)) @ weight
+    return weight * ((1.0 - openness) / height.max()), weight * (openness / (half_widths @ weight))
+
+
+def _c_body(states: list[str], strength: float, levelling: float, closed: Array, open_: Array) -> str:
+    count = len(states)
+
+    def row(values: Array) -> str:
+        return ", ".join(c_number(value) for value in values)
+
+    bent = c_number(2.0 / 3.0 * levelling)
+    load = "".join(f"    state[{k}] = {state};\n" for k, state in enumerate(states))
+    save = "".join(f"    {state} = moved[{k}];\n" for k, state in enumerate(states))
+    return f"""{{
+    static const double half[{count}] = {{{row(HALF_WIDTHS)}}};
+    static const double closed[{count}] = {{{row(closed)}}};
+    static const double open[{count}] = {{{row(open_)}}};
+    double state[{count}], moved[{count}];
+    double low = x - {c_number(2.0 * strength)}, high = x + {c_number(2.0 * strength)};
+    double v = x;
+    int i, k;
+{load}    for (k = 0; k <= 50; k++) {{
+        double z = 0.0, g, above;
+        v = 0.5 * (low + high);
+        g = v > 0.0 ? v : 0.0;
+        above = g * g * (1.0 - {bent} * g);
+        for (i = 0; i < {count}; i++) {{
+            const double reach = g - 2.0 * half[i];
+            double place = state[i] > reach ? state[i] : reach;
+            double down, up;
+            place = place < g ? place : g;
+            moved[i] = place;
+            down = reach > 0.0 ? reach : 0.0;
+            up = place > 0.0 ? place : 0.0;
+            z += closed[i] * (0.5 * (above + down * down * (1.0 - {bent} * down)) - up * up * (1.0 - {bent} * up));
+            z += open[i] * (g - half[i] - place);
+        }}
+        if (k == 50) {{
+            break;
+        }}
+        if (v - {c_number(strength)} * z < x) {{
+            low = v;
+        }} else {{
+            high = v;
+        }}
+    }}
+    x = v;
+{save}}}"""

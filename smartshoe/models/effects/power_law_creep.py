@@ -1,0 +1,32 @@
+"""Creep over many decades of time, as rubber shows it: a ladder of relaxing arms."""
+
+from __future__ import annotations
+
+import math
+
+from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element
+
+SHORTEST_S, LONGEST_S, ARMS = 0.02, 2000.0, 9
+SPACING = math.log10(LONGEST_S / SHORTEST_S) / (ARMS - 1)  # decades
+
+
+class PowerLawCreep(CoreEffect):
+    """Arms with the spectrum c (tau/1 s)^-alpha per decade: relaxation modulus ~ t^-alpha (Mainardi 2010, ch. 3)."""
+
+    name, family, stage = "power_law_creep", "relaxation", "wall"
+    says = "the wall creeps over all times alike: in holds the reading rises by the same amount in each decade of time"
+    parameters = (
+        EffectParameter(
+            "creep_per_decade", "1", "relative creep over the decade about 1 s, small creep", 0.0, 0.0, 0.3, 0.01
+        ),
+        EffectParameter("exponent", "1", "alpha: how much slower times weigh less, per decade", None, 0.02, 0.8, 0.2),
+    )
+    shapes = ({"exponent": 0.15}, {"exponent": 0.45})
+    exposed_by = frozenset({"holds", "rates", "rests"})
+    separated_by = {"second_relaxation": "step and long_hold", "gas_heat": "sign", "linear_leak": "sign"}
+
+    def elements(self, values: Array) -> tuple[Element, ...]:
+        """The ladder's arms."""
+        creep, exponent = (float(value) for value in values)
+        times = [SHORTEST_S * 10.0 ** (SPACING * k) for k in range(ARMS)]
+        return tuple(Arm(creep * SPACING * tau**-exponent, 1.0 / tau) for tau in times)

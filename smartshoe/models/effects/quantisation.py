@@ -1,0 +1,18 @@
+"""Readings on a lattice."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._sensor_evidence import Waveformless
+from smartshoe.models.effects.effect import Effect
+
+
+class Quantisation(Waveformless, Effect):
+    """A converter with few bits, or a file written with few digits.
+
+    Equal steps between the distinct values show it; below half a step of noise it is no longer random.
+    """
+
+    name, family, stage, place = "quantisation", "data", "logger", "logger"
+    says = "readings sit on a lattice of evenly spaced values"
+    exposed_by = frozenset({"holds"})
+    separated_by = {"coloured_noise": "lattice", "held_samples": "rates"}

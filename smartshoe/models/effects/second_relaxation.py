@@ -1,0 +1,27 @@
+"""A second relaxing arm of the wall."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element
+
+
+class SecondRelaxation(CoreEffect):
+    """k3 (u - q), q' = (u - q)/tau beside the arm of Chinimilli 2016, eq. (2)."""
+
+    name, family, stage = "second_relaxation", "relaxation", "wall"
+    says = "the wall relaxes with a second time constant: the reading creeps up in holds and back in rests"
+    parameters = (
+        EffectParameter("share", "1", "stiffness of the second arm over that of gas and k1", 0.0, 0.0, 2.0, 0.02),
+        EffectParameter("time_constant", "s", "its relaxation time", None, 0.05, 120.0, 5.0),
+    )
+    shapes = tuple({"time_constant": tau} for tau in (0.3, 1.2, 5.0, 20.0, 60.0))
+    exposed_by = frozenset({"holds", "rates", "rests"})
+    separated_by = {
+        "power_law_creep": "step and long_hold",
+        "gas_heat": "sign: heat makes the reading fall in holds",
+        "linear_leak": "sign: a leak makes the reading fall in holds",
+    }
+
+    def elements(self, values: Array) -> tuple[Element, ...]:
+        """One arm."""
+        return (Arm(float(values[0]), 1.0 / float(values[1])),)

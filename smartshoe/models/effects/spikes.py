@@ -1,0 +1,18 @@
+"""Readings that are far off for a sample or two."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._sensor_evidence import Waveformless
+from smartshoe.models.effects.effect import Effect
+
+
+class Spikes(Waveformless, Effect):
+    """A rare large error of one or two samples (interference, a bad frame).
+
+    A second difference that stands alone shows them; one poisons a reference of a single sample.
+    """
+
+    name, family, stage, place = "spikes", "noise", "logger", "logger"
+    says = "single readings far off their neighbours, rarely and at no fixed load"
+    exposed_by = frozenset()
+    separated_by = {"dropouts": "length: a dropout stays, and at one value"}

@@ -1,0 +1,44 @@
+"""Samples taken a little early or late, each by its own error."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from smartshoe.models.effects._sensor_evidence import (
+    ONE_SIDED,
+    SLOPE,
+    Evidence,
+    Waveformless,
+    keeps_rhythm,
+    local_variance,
+    variance_score,
+)
+from smartshoe.models.effects.effect import Array, Conditions, Effect
+
+
+class TimingJitter(Waveformless, Effect):
+    """A random error of each sample's time: noise of the size abs(P') times the jitter."""
+
+    name, family, stage, place = "timing_jitter", "noise", "logger", "logger"
+    says = "the noise grows with the pressure's slope: fast ramps are noisy, holds are not"
+    exposed_by = frozenset({"rates"})
+    separated_by = {"heteroscedastic_noise": "holds at several loads"}
+
+
+def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:
+    """Whether the variance of ``residual`` (n,) grows with the slope of ``prediction`` (n,), that with its size apart.
+
+    Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
+    """
+    local = local_variance(residual, prediction, sample_time_s)
+    if local is None:
+        return None
+    value, growth = variance_score(local, SLOPE)
+    if value <= ONE_SIDED or growth <= 0.0 or keeps_rhythm(residual, np.abs(np.gradient(prediction))):
+        return None
+    strength = sqrt(growth)
+    jitter_s = strength / sqrt(float(local.slope_squared.max()))
+    says = f"the noise grows with the slope of the pressure, as from {1e3 * jitter_s:.2g} ms of jitter in the sampling"
+    return Evidence("log_variance_on_slope", value, ONE_SIDED, says, strength)

@@ -1,0 +1,37 @@
+"""A zero that wanders with the clock or the temperature."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._sensor_clock import drift
+from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+
+
+class ZeroDrift(Effect):
+    """+ d t; with the temperature logged, + d t + b_T dT.
+
+    b_T is inert without a temperature that moves, d where the temperature is a straight line in time.
+    """
+
+    name, family, stage, place = "zero_drift", "zero", "sensor", "sensor"
+    says = "the reading's zero moves steadily with time (with the temperature, where it is logged), loaded or not"
+    parameters = (
+        EffectParameter("drift_rate", "FS_reading/s", "change of the zero a second", 0.0, -1e-2, 1e-2, 1e-5),
+        EffectParameter("temperature_coefficient", "FS_reading/K", "change of the zero a kelvin", 0.0, -0.1, 0.1, 1e-3),
+    )
+    exposed_by = frozenset({"rests", "idle", "pauses"})
+    separated_by = {
+        "linear_leak": "idle", "orifice_leak": "idle", "permanent_set": "pauses", "warm_up": "idle",
+        "gain_drift": "peaks",
+    }  # fmt: skip
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The signal and the drift since the session's start."""
+        return signal + drift(conditions, values)
+
+    def inverse(self, values: Array, step_s: float) -> Inverse | None:
+        """Subtract the drift; exact. None with a temperature coefficient: a stream carries no temperature."""
+        rate, coefficient = (float(value) for value in values)
+        if coefficient != 0.0:
+            return None
+        return Memoryless(lambda signal, time_s: signal - rate * time_s, f"x -= {c_number(rate)} * t;")

@@ -1,0 +1,25 @@
+"""A reading that is not zero without load."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+
+
+class ZeroOffset(Effect):
+    """+ b, whatever the load."""
+
+    name, family, stage, place = "zero_offset", "zero", "sensor", "sensor"
+    says = "the reading is shifted by a constant, with and without load"
+    parameters = (EffectParameter("offset", "FS_reading", "shift of the reading", 0.0, -0.5, 0.5, 0.01),)
+    exposed_by = frozenset({"rests"})
+    separated_by = {"load_cell_tare": "idle", "dead_band": "low_loads", "warm_up": "idle"}
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The signal, shifted."""
+        return signal + float(values[0])
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """Subtract it; exact."""
+        offset = float(values[0])
+        return Memoryless(lambda signal, time_s: signal - offset, f"x -= {c_number(offset)};")

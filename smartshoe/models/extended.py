@@ -1,0 +1,231 @@
+"""The standard linear solid with effects: the whole measurement chain, simulated forward."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.models.core import USUAL_WALL_RATIO, Core
+from smartshoe.models.effects.catalogue import effect
+from smartshoe.models.effects.effect import PLACES, Arm, Conditions, CoreEffect, Effect, EffectParameter, Element
+
+Array = NDArray[np.float64]
+
+BASELINE = (
+    EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),
+    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, 1e-5, 50.0, 0.1),
+    EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 1e-3, 50.0, 0.2),
+)
+DERIVATIVE_STEP = 1e-3  # of a parameter's size
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """An effect in a model, with the values of its parameters."""
+
+    effect: Effect
+    values: Array
+
+    @property
+    def name(self) -> str:
+        """The effect's."""
+        return self.effect.name
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedModel:
+    """Chinimilli 2016, eq. (2), with ``parts`` at their places of the chain.
+
+    ``gain`` is the reading of a held full-scale load as a share of ``full_scale_reading`` (in ``reading_unit``);
+    ``relaxing_share`` kappa and ``relaxation_rate_per_s`` a give p/f = (s + a)/((1 + kappa) s + a). ``wall_ratio`` is
+    N of `smartshoe.models.core`, which matters for leaks and heat only.
+    """
+
+    gain: float
+    relaxing_share: float
+    relaxation_rate_per_s: float
+    full_scale_load_n: float
+    full_scale_reading: float
+    reading_unit: str
+    parts: tuple[Part, ...] = ()
+    wall_ratio: float = USUAL_WALL_RATIO
+
+    # -- parameters as one vector ------------------------------------------------------------------------------
+    @cached_property
+    def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
+        """(effect's name or "baseline", parameter) in the order of `theta`."""
+        own = [("baseline", parameter) for parameter in BASELINE]
+        return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
+
+    @property
+    def theta(self) -> Array:
+        """Every parameter's value (p,)."""
+        baseline = [self.gain, self.relaxing_share, self.relaxation_rate_per_s]
+        return np.concatenate([baseline, *(part.values for part in self.parts)])
+
+    def at(self, theta: Array) -> ExtendedModel:
+        """The same chain with the parameters ``theta`` (p,)."""
+        parts, k = [], len(BASELINE)
+        for part in self.parts:
+            count = len(part.effect.parameters)
+            parts.append(Part(part.effect, np.array(theta[k : k + count], dtype=float)))
+            k += count
+        gain, share, rate = (float(value) for value in theta[: len(BASELINE)])
+        return replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
+
+    def with_part(self, added: Effect, values: Array | None = None) -> ExtendedModel:
+        """This model with one more effect, at null where ``values`` are not given."""
+        part = Part(added, added.start() if values is None else np.array(values, dtype=float))
+        return replace(self, parts=(*self.parts, part))
+
+    def without(self, name: str) -> ExtendedModel:
+        """This model without the effect ``name``."""
+        return replace(self, parts=tuple(part for part in self.parts if part.name != name))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The effects in it."""
+        return tuple(part.name for part in self.parts)
+
+    # -- the chain -----------------------------------------------------------------------------------------------
+    @cached_property
+    def core(self) -> Core:
+        """The linear network of wall and gas."""
+        elements: list[Element] = [Arm(self.relaxing_share, self.relaxation_rate_per_s)]
+        for part in self.parts:
+            if isinstance(part.effect, CoreEffect):
+                elements += part.effect.elements(part.values)
+        return Core(elements, self.wall_ratio)
+
+    @cached_property
+    def chain(self) -> tuple[Part | None, ...]:
+        """The blocks in the order in which the signal passes them; None stands for the core."""
+        outside = [part for part in self.parts if not isinstance(part.effect, CoreEffect)]
+        core = PLACES.index("core")
+        before = [part for part in outside if PLACES.index(part.effect.place) < core]
+        after = [part for part in outside if PLACES.index(part.effect.place) > core]
+
+        def order(part: Part) -> tuple[int, str]:
+            return PLACES.index(part.effect.place), part.name
+
+        return (*sorted(before, key=order), None, *sorted(after, key=order))
+
+    def _run(self, signal: Array, conditions: Conditions, first: int = 0, kept: list[Array] | None = None) -> Array:
+        for part in self.chain[first:]:
+            if kept is not None:
+                kept.append(signal)
+            if part is None:
+                signal = self.core.simulate(signal, conditions.step_s)
+            else:
+                signal = part.effect.apply(signal, conditions, part.values)
+        return self.gain * signal
+
+    def simulate(self, conditions: Conditions) -> Array:
+        """The reading (n,) as a share of ``full_scale_reading`` under ``conditions``."""
+        return self._run(conditions.load, conditions)
+
+    def reading(self, conditions: Conditions) -> Array:
+        """The reading (n,) in ``reading_unit``."""
+        return self.full_scale_reading * self.simulate(conditions)
+
+    def deformation(self, conditions: Conditions) -> Array:
+        """The wall's deformation (n,), scaled as the load: what a displacement channel follows.
+
+        A gas that stiffens beyond the linear one takes load off the wall.
+        """
+        kept: list[Array] = []
+        self._run(conditions.load, conditions, 0, kept)
+        core = self.chain.index(None)
+        load = kept[core]
+        for k, part in enumerate(self.chain):
+            if part is not None and part.effect.family == "static_curve" and part.effect.place == "gas":
+                pressure = kept[k]
+                load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / self.wall_ratio
+        return self.core.deformation(load, conditions.step_s)
+
+    def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:
+        """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
+
+        The chain is run anew only from the block that a parameter belongs to.
+        """
+        kept: list[Array] = []
+        reading = self._run(conditions.load, conditions, 0, kept)
+        theta = self.theta
+        out = np.empty((reading.size, theta.size), order="F")
+        out[:, 0] = reading / self.gain
+        place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
+        core = self.chain.index(None)
+        for j, (owner, parameter) in enumerate(self.parameters):
+            if j == 0:
+                continue
+            step = derivative_step(parameter, theta[j])
+            moved = theta.copy()
+            moved[j] += step
+            first = place_of.get(owner, core)
+            out[:, j] = (self.at(moved)._run(kept[first], conditions, first) - reading) / step
+        return reading, out
+
+    def trace(self, conditions: Conditions) -> tuple[Array, list[Array]]:
+        """The reading (n,), and what goes into each block of the chain, the chain's end last."""
+        kept: list[Array] = []
+        reading = self._run(conditions.load, conditions, 0, kept)
+        return reading, [*kept, reading / self.gain]
+
+    def column_of(self, added: Effect, start: Array, conditions: Conditions, trace: tuple[Array, list[Array]]) -> Array:
+        """Derivatives (n, k) of the reading with respect to the k strengths of an effect that is not in the model.
+
+        ``start`` holds null strengths and a shape; ``trace`` is this model's own.
+        """
+        reading, kept = trace
+        strengths = [j for j, parameter in enumerate(added.parameters) if parameter.null is not None]
+        out = np.empty((reading.size, len(strengths)), order="F")
+        for column, j in enumerate(strengths):
+            step = derivative_step(added.parameters[j], start[j])
+            moved = start.copy()
+            moved[j] += step
+            trial = self.with_part(added, moved)
+            names = [None if part is None else part.name for part in trial.chain]
+            first = names.index(None if isinstance(added, CoreEffect) else added.name)
+            out[:, column] = (trial._run(kept[first], conditions, first) - reading) / step
+        return out
+
+    # -- to and from a file ---------------------------------------------------------------------------------------
+    def to_dict(self) -> dict[str, Any]:
+        """The model for a calibration file."""
+        return {
+            "gain": self.gain,
+            "relaxing_share": self.relaxing_share,
+            "relaxation_rate_per_s": self.relaxation_rate_per_s,
+            "full_scale_load_n": self.full_scale_load_n,
+            "full_scale_reading": self.full_scale_reading,
+            "reading_unit": self.reading_unit,
+            "wall_ratio": self.wall_ratio,
+            "effects": {
+                part.name: {p.name: float(v) for p, v in zip(part.effect.parameters, part.values, strict=True)}
+                for part in self.parts
+            },
+        }
+
+    @classmethod
+    def from_dict(cls, given: Mapping[str, Any]) -> ExtendedModel:
+        """The model that `to_dict` described; raises `UsageError` for an effect that is not known, `KeyError`."""
+        parts = [(effect(name), values) for name, values in given["effects"].items()]
+        plain = {key: given[key] for key in given if key != "effects"}
+        return cls(
+            **plain,
+            parts=tuple(Part(one, np.array([values[p.name] for p in one.parameters])) for one, values in parts),
+        )
+
+
+def derivative_step(parameter: EffectParameter, value: float) -> float:
+    """A small step that stays within the parameter's bounds."""
+    if parameter.null is None:
+        step = DERIVATIVE_STEP * abs(value) or DERIVATIVE_STEP * parameter.size
+    else:
+        step = DERIVATIVE_STEP * max(parameter.size, abs(value - parameter.null))
+    return -step if value + step > parameter.upper else step
