@@ -18,6 +18,7 @@ _COMMANDS = {
     "identify": "identify one unit from one or more experiments",
     "compensate": "force from pressure, by a calibration",
     "validate": "judge a calibration on recordings, per loading rate",
+    "diagnose": "what a simulation gets wrong, why, and what mending it gains",
     "export": "a calibration's compensator for firmware (C) or other tools",
     "convert": "convert any readable format to any writable one",
 }

@@ -44,7 +44,14 @@ def global_baseline(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     _, fast, slow, pole = best
     share = slow / fast - 1.0
     return ExtendedModel(
-        slow, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), _wall_ratio(sessions, slow, scale)
+        slow,
+        share,
+        pole * (1.0 + share),
+        scale.load_n,
+        scale.reading,
+        scale.unit.symbol,
+        (),
+        _wall_ratio(sessions, slow, scale),
     )
 
 

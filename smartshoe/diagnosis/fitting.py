@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from smartshoe.models.extended import ExtendedModel
 Array = NDArray[np.float64]
 
 MOST_STEPS = 12
-SETTLED = 1e-3  # fall of -2 log likelihood that ends a fit
+SETTLED = 0.05  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 LARGEST_LOG_STEP = 1.0
 DISPLACEMENT_COUNTS = 60.0
@@ -49,6 +50,11 @@ class Evidence:
     rest_load: Array
     rest_sd: float
 
+    @cached_property
+    def fitted(self) -> tuple[Session, ...]:
+        """The sessions that a fit looks at."""
+        return tuple(session for session in self.sessions if session.fitted.any())
+
     def residuals(self, model: ExtendedModel) -> list[Array]:
         """Reading less simulation, a session each, in shares of full scale."""
         return [session.reading - model.simulate(session.conditions) for session in self.sessions]
@@ -56,7 +62,8 @@ class Evidence:
     def cost(self, model: ExtendedModel) -> float:
         """Sum of whitened squares over what is fitted."""
         total = 0.0
-        for session, residual in zip(self.sessions, self.residuals(model), strict=True):
+        for session in self.fitted:
+            residual = session.reading - model.simulate(session.conditions)
             white = self.noise.whitened(residual)[self.noise.counted(session.fitted)]
             total += float(white @ white)
         rest = self._rest(model)
@@ -70,7 +77,7 @@ class Evidence:
         the ratio of errors counts, as if it had `DISPLACEMENT_COUNTS` independent samples.
         """
         total, error = 0.0, 0.0
-        for session in self.sessions:
+        for session in self.fitted:
             if session.displacement is None:
                 return 0.0
             kept = session.fitted
@@ -91,7 +98,7 @@ class Evidence:
     def rows(self, model: ExtendedModel) -> tuple[Array, Array]:
         """Whitened residual (m,) and sensitivities (m, p) over what is fitted."""
         found, slopes = [], []
-        for session in self.sessions:
+        for session in self.fitted:
             reading, sensitivities = model.sensitivities(session.conditions)
             counted = self.noise.counted(session.fitted)
             both = np.column_stack([session.reading - reading, sensitivities])

@@ -50,8 +50,8 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
         readings.append(session.reading[judged])
     if not squares:
         return Errors(np.zeros(1), np.zeros(1), 0.0)
-    joined, number = np.concatenate(squares), np.concatenate(counts)
-    return Errors(joined[number > 0], number[number > 0], float(np.std(np.concatenate(readings))))
+    joined, samples = np.concatenate(squares), np.concatenate(counts)
+    return Errors(joined[samples > 0], samples[samples > 0], float(np.std(np.concatenate(readings))))
 
 
 @dataclass(frozen=True, slots=True)

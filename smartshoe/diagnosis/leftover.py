@@ -13,7 +13,7 @@ from smartshoe.diagnosis.session import Session
 
 Array = NDArray[np.float64]
 
-BLOCK_S = 3.0
+BLOCK_S = 5.0
 SIGNIFICANT_Z = 5.0
 
 
@@ -43,16 +43,15 @@ def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Left
 
 def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:
     """The bin of load and direction, and the stretch of time, that hold most of the residual's slow part."""
-    load, rate, time_share, error, names = [], [], [], [], []
+    load, rate, error, names = [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
         width = max(1, round(0.5 / session.conditions.step_s))
         smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
         load.append(session.conditions.load)
         rate.append(session.conditions.rate_per_s)
-        time_share.append(session.conditions.time_s)
         error.append(smooth)
         names += [index] * residual.size
-    loads, rates, times, errors = (np.concatenate(x) for x in (load, rate, time_share, error))
+    loads, rates, errors = (np.concatenate(x) for x in (load, rate, error))
     power = errors**2
     total = float(power.sum()) or 1.0
     level = np.clip((loads * 4).astype(int), 0, 3)

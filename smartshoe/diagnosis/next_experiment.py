@@ -33,20 +33,19 @@ def next_experiment(
 
     None where every cause is told from its rivals with ease.
     """
-    doubtful = [
-        (choice.rivals[cause.name][0].margin, cause)
-        for cause in causes
-        if choice.rivals[cause.name] and choice.rivals[cause.name][0].margin < DOUBTFUL
-    ]
+    near = {cause.name: [r for r in choice.rivals[cause.name] if r.fit and r.margin < DOUBTFUL] for cause in causes}
+    doubtful = [cause for cause in causes if near[cause.name]]
     if not doubtful:
         return None
     # The largest cause that is in doubt: what matters most comes first.
-    cause = max((one for _, one in doubtful), key=lambda one: one.size)
-    rivals = [rival for rival in choice.rivals[cause.name] if rival.margin < DOUBTFUL]
-    rival, margin = rivals[0].effect, rivals[0].margin
+    cause = max(doubtful, key=lambda one: one.size)
+    rivals = near[cause.name]
+    rival, margin, other = rivals[0].effect, rivals[0].margin, rivals[0].fit
+    if other is None:
+        return None
     peak_n = choice.fit.model.full_scale_load_n
     found = {
-        name: expected_margin(choice.fit, rivals[0].fit, made(peak_n), choice.evidence.noise, sessions[0])
+        name: expected_margin(choice.fit, other, made(peak_n), choice.evidence.noise, sessions[0])
         for name, made in EXPERIMENTS.items()
     }
     best = max(found, key=lambda name: found[name])
@@ -58,7 +57,7 @@ def next_experiment(
             names,
             None,
             channel,
-            f"no load history tells {told} apart well (the best, {best.replace('_', ' ')}, by {found[best]:.2g}):"
+            f"no load history tells {told} apart well (the best, {best.replace('_', ' ')}, by {found[best]:,.0f}):"
             f" log the {channel} too",
             found[best],
         )
@@ -74,8 +73,8 @@ def next_experiment(
         names,
         best,
         channel,
-        f"run {best.replace('_', ' ')}: it should tell {told} apart by {found[best]:.3g} of -2 log likelihood,"
-        f" where this data does by {max(margin, 0.0):.2g}",
+        f"run {best.replace('_', ' ')}: it should tell {told} apart by {found[best]:,.0f} of -2 log likelihood,"
+        f" where this data does by {max(margin, 0.0):,.0f}",
         found[best],
         EXPERIMENTS[best](peak_n),
     )

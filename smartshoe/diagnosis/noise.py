@@ -39,7 +39,9 @@ def white(sd: float) -> NoiseModel:
     return NoiseModel(np.zeros(1), sd)
 
 
-def autoregression(residuals: Sequence[Array], kept: Sequence[Mask], order: int = ORDER, floor: float = 1e-9) -> NoiseModel:
+def autoregression(
+    residuals: Sequence[Array], kept: Sequence[Mask], order: int = ORDER, floor: float = 1e-9
+) -> NoiseModel:
     """Yule-Walker over all sessions: ``residuals`` (n,) each, where ``kept``.
 
     Biased autocovariances of the masked signals keep the filter stable.

@@ -16,18 +16,25 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from smartshoe.diagnosis.session import Session
 
 Array = NDArray[np.float64]
 
+FEWEST_BLOCKS = 8
+COLOUR_S = (0.1, 0.2, 0.35, 0.6, 1.0)  # time constants of the noise's coloured part; slower ones count as structure
+NOISE_KNOWN_TO = 0.15
 PLACES = 64  # of a cycle, when repeats are laid over each other
 ALIKE = 0.1  # in height and duration
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """``rms`` of the structure in shares of full scale (0 where its variance is estimated negative), and its z score."""
+    """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
+
+    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks.
+    """
 
     rms: float
     z: float
@@ -38,9 +45,9 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> Look:
     """Structure that repeats from cycle to cycle."""
     products: list[float] = []
     spreads: list[float] = []
-    for rows in repeats(sessions, residuals):
+    found, share = repeats(sessions, residuals)
+    for rows in found:
         count = rows.shape[0]
-        rows = rows - 0.0
         gram = rows @ rows.T / rows.shape[1]
         upper = np.triu_indices(count, 1)
         products += list(gram[upper])
@@ -52,20 +59,27 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> Look:
             full = np.correlate(row, row, "full")[rows.shape[1] - 1 :]
             auto += full / rows.shape[1]
         auto *= scale / count
-        variance = (auto[0] ** 2 + 2 * np.sum((1 - np.arange(1, auto.size) / auto.size) * auto[1:] ** 2)) / rows.shape[1]
+        variance = (auto[0] ** 2 + 2 * np.sum((1 - np.arange(1, auto.size) / auto.size) * auto[1:] ** 2)) / rows.shape[
+            1
+        ]
         spreads += [variance] * upper[0].size
     if not products:
         return Look(0.0, 0.0, 0)
     mean = float(np.mean(products))
     sd = float(np.sqrt(np.sum(spreads))) / len(spreads)
-    return Look(float(np.sqrt(max(mean, 0.0))), mean / max(sd, 1e-300), len(products))
+    return Look(float(np.sqrt(max(share * mean, 0.0))), mean / max(sd, 1e-300), len(products))
 
 
-def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[Array]:
-    """The residual over each kind of load cycle: (repeats, PLACES) a kind, over the times at which all are loaded."""
+def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[list[Array], float]:
+    """The residual over each kind of load cycle: (repeats, PLACES) a kind, while the unit is loaded.
+
+    And the share of all samples that are within a load cycle: the rests are taken to hold no structure.
+    """
     found: list[tuple[float, float, Array]] = []
+    inside_cycles = total = 0
     for session, residual in zip(sessions, residuals, strict=True):
         load = session.conditions.load
+        total += load.size
         for number in range(int(session.cycle[-1]) + 1):
             index = np.flatnonzero(session.cycle == number)
             part = load[index]
@@ -77,6 +91,7 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[Arr
             span = slice(first, last + 1)
             if session.usable[span].mean() < 0.9:
                 continue
+            inside_cycles += last + 1 - first
             places = np.linspace(0, last - first, PLACES)
             row = np.interp(places, np.arange(last + 1 - first), residual[span])
             found.append((peak, (last - first) * session.conditions.step_s, row))
@@ -88,42 +103,55 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[Arr
                 break
         else:
             kinds.append([one])
-    return [np.stack([row for _, _, row in kind]) for kind in kinds if len(kind) > 1]
+    rows = [np.stack([row for _, _, row in kind]) for kind in kinds if len(kind) > 1]
+    return rows, inside_cycles / max(total, 1)
 
 
 def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float) -> Look:
-    """Structure in the means of blocks of ``block_s``, beyond what noise fitted to the faster part would leave there."""
+    """Structure in the means of blocks of ``block_s``, beyond what the noise of the faster part would leave there."""
     excess: list[float] = []
     spread = 0.0
     for session, residual in zip(sessions, residuals, strict=True):
-        width = max(2, round(block_s / session.conditions.step_s))
+        step_s = session.conditions.step_s
+        width = max(4, round(block_s / step_s))
         count = residual.size // width
-        if count < 6:
+        if count < FEWEST_BLOCKS:
             continue
         mask = session.usable[: count * width].reshape(count, width)
-        rows = np.where(mask, residual[: count * width].reshape(count, width), 0.0)
-        number = mask.sum(axis=1)
-        good = number > width // 2
-        means = rows[good].sum(axis=1) / number[good]
-        expected = _mean_variance(rows[good], mask[good])
+        rows = residual[: count * width].reshape(count, width)[mask.all(axis=1)]
+        if rows.shape[0] < FEWEST_BLOCKS:
+            continue
+        means = rows.mean(axis=1)
+        expected = _mean_variance(rows - means[:, None], step_s)
         excess += list(means**2 - expected)
-        spread += 2.0 * expected**2 * means.size
+        # The blocks' own scatter, and that the noise is known from them to some percent only.
+        spread += 2.0 * expected**2 * means.size + (NOISE_KNOWN_TO * expected * means.size) ** 2
     if not excess:
         return Look(0.0, 0.0, 0)
     mean = float(np.mean(excess))
-    return Look(float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(np.sqrt(spread), 1e-300), len(excess))
+    return Look(float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(float(np.sqrt(spread)), 1e-300), len(excess))
 
 
-def _mean_variance(rows: Array, mask: NDArray[np.bool_]) -> float:
-    """Variance of a block's mean from the covariances within blocks, white noise and one first-order part."""
-    width = rows.shape[1]
-    centred = np.where(mask, rows - rows.sum(axis=1, keepdims=True) / mask.sum(axis=1, keepdims=True), 0.0)
-    lags = np.arange(1, max(2, width // 3))
-    c0 = float(np.median(np.sum(centred**2, axis=1) / mask.sum(axis=1)))
-    auto = np.array([float(np.median(np.sum(centred[:, k:] * centred[:, :-k], axis=1))) / width for k in lags])
-    # Centring takes the mean's variance v out of every covariance: c_k = r_k - v. v = (1/n)(r_0 + 2 sum r_k).
-    v = 0.0
-    for _ in range(50):
-        total = c0 + v + 2 * float(np.sum(np.where(auto + v > 0, (1 - lags / width) * (auto + v), 0.0)))
-        v = 0.5 * v + 0.5 * total / width
-    return v
+def _mean_variance(centred: Array, step_s: float) -> float:
+    """Variance of a block's mean under noise, white and first-order, that fits the ``centred`` (blocks, width).
+
+    Taking a block's mean out changes every covariance; so the fit is to covariances that were changed in the same way.
+    """
+    width = centred.shape[1]
+    lags = np.arange(width // 2)
+    quiet = np.sum(centred**2, axis=1) <= np.quantile(np.sum(centred**2, axis=1), 0.9)
+    rows = centred[quiet]
+    found = np.array([float(np.mean(rows[:, k:] * rows[:, : width - k])) for k in lags])
+    place = np.arange(width)
+    centring = np.eye(width) - 1.0 / width
+    white = np.array([float(np.mean(np.diag(centring, int(k)))) for k in lags])
+    best: tuple[float, float] | None = None
+    for tau_s in COLOUR_S:
+        covariance = np.exp(-np.abs(place[:, None] - place) * (step_s / tau_s))
+        changed = centring @ covariance @ centring
+        coloured = np.array([float(np.mean(np.diag(changed, int(k)))) for k in lags])
+        (w, c), off = nnls(np.column_stack([white, coloured]), found)
+        variance = w / width + c * float(covariance.mean())
+        if best is None or off < best[0]:
+            best = off, variance
+    return best[1] if best else 0.0

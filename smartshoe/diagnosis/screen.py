@@ -1,4 +1,4 @@
-"""The screen: what each effect could explain of a residual, in milliseconds, and which effects the data cannot tell apart."""
+"""The screen: what each effect could explain of a residual, and which effects this data cannot tell apart."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect at one point of its shapes; ``columns`` are where its strengths' sensitivities stand in the dictionary."""
+    """An effect at one point of its shapes; ``columns``: where its strengths' sensitivities stand in the dictionary."""
 
     effect: Effect
     shape: Mapping[str, float]
@@ -78,9 +78,7 @@ def dictionary(model: ExtendedModel, sessions: Sequence[Session]) -> Dictionary:
     for session in sessions:
         reading, slopes = model.sensitivities(session.conditions)
         trace = model.trace(session.conditions)
-        blocks = [
-            model.column_of(c.effect, c.effect.start(c.shape), session.conditions, trace) for c in candidates
-        ]
+        blocks = [model.column_of(c.effect, c.effect.start(c.shape), session.conditions, trace) for c in candidates]
         residuals.append(session.reading - reading)
         own.append(slopes)
         others.append(np.concatenate(blocks, axis=1) if blocks else np.zeros((reading.size, 0)))
@@ -88,10 +86,8 @@ def dictionary(model: ExtendedModel, sessions: Sequence[Session]) -> Dictionary:
 
 
 def unreachable(words: Dictionary) -> list[Array]:
-    """The residuals, a session each, less all that any sensitivity of the dictionary can explain: noise, and the unknown."""
-    rows = [
-        np.column_stack([o, d])[s.fitted] for o, d, s in zip(words.own, words.others, words.sessions, strict=True)
-    ]
+    """The residuals, a session each, less all that the dictionary's sensitivities explain: noise, and the unknown."""
+    rows = [np.column_stack([o, d])[s.fitted] for o, d, s in zip(words.own, words.others, words.sessions, strict=True)]
     everything = np.concatenate(rows)
     target = np.concatenate([r[s.fitted] for r, s in zip(words.residuals, words.sessions, strict=True)])
     norm = np.sqrt(np.sum(everything**2, axis=0))
@@ -159,7 +155,7 @@ def screen(words: Dictionary, noise: NoiseModel) -> Screening:
 
 
 def _projected(rows: Array, own_count: int) -> tuple[Array, tuple[Array, float]]:
-    """Gram matrix (q, q) of the candidates' columns with the own ones projected out; their products with the residual."""
+    """Gram matrix (q, q) of the candidates' columns, the own ones projected out; their products with the residual."""
     target, own, others = rows[:, 0], rows[:, 1 : 1 + own_count], rows[:, 1 + own_count :]
     basis = np.linalg.qr(own / np.maximum(np.sqrt(np.sum(own**2, axis=0)), 1e-300))[0]
     others = others - basis @ (basis.T @ others)
@@ -175,9 +171,7 @@ def _projected(rows: Array, own_count: int) -> tuple[Array, tuple[Array, float]]
 def _explained(candidate: Candidate, gram: Array, fit: tuple[Array, float]) -> tuple[Array, float]:
     """Strengths (k,) within their signs, and the fall of the squared error."""
     part, product = gram[candidate.columns, candidate.columns], fit[0][candidate.columns]
-    signs = [
-        (p.lower >= p.null, p.upper <= p.null) for p in candidate.effect.parameters if p.null is not None
-    ]
+    signs = [(p.lower >= p.null, p.upper <= p.null) for p in candidate.effect.parameters if p.null is not None]
     free = np.diag(part) > 0
     found = np.zeros(product.size)
     for _ in range(product.size + 1):

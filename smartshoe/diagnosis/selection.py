@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.fitting import Evidence, Fit, fit
+from smartshoe.diagnosis.noise import white
 from smartshoe.diagnosis.screen import Screened, Screening, dictionary, noise_of, screen
 from smartshoe.diagnosis.session import Session
 from smartshoe.models.effects import catalogue, effect
@@ -25,19 +26,27 @@ BEST_WHITENED, BEST_RAW = 4, 1
 BEST_SWAPS = 3
 MOST_PARTS = 6
 QUICK_STEPS = 8
+FIRST_STEPS = 2
+CLOSE = 0.1  # of what the best candidate takes off the cost
+WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
-LEAST_OF_LARGEST = 0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
-BETTER = 10.0  # of -2 log likelihood, for a swap
+NAMED_OF_LARGEST = 0.03
+LEAST_OF_LARGEST = (
+    0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
+)
+SHAPE_ERROR = 0.05
+SEEN_CLEARLY = 10.0  # of -2 log likelihood
+BETTER = 6.0  # of -2 log likelihood, for a swap
 CANCELLING = 4.0  # times what an addition takes off the error: what it may move the reading by
 
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """Another effect in the place of a cause: ``margin`` is by how much -2 log likelihood is worse, penalty included."""
+    """Another effect in the place of a cause: ``margin`` is how much worse -2 log likelihood is, penalty included."""
 
     effect: str
     margin: float
-    fit: Fit
+    fit: Fit | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +91,13 @@ def held_out_cost(evidence: Evidence, model: ExtendedModel) -> float:
     return total
 
 
-def standing(evidence: Evidence, found: Fit) -> float:
-    """What models with as many effects are compared by: the fit, and what the displacement says."""
-    return found.cost + evidence.displacement_cost(found.model)
+def tempered(margin: float, fall: float) -> float:
+    """A difference of -2 log likelihood between two effects that take about ``fall`` off it, allowing for their shape.
+
+    No equation is exact. A truth that departs from its effect's equation by `SHAPE_ERROR` of the effect's own size
+    leaves SHAPE_ERROR^2 fall behind, so that differences of that order say little, however many samples say so.
+    """
+    return margin / (1.0 + SHAPE_ERROR**2 * max(fall, 0.0) / SEEN_CLEARLY)
 
 
 def held_out_square(evidence: Evidence, model: ExtendedModel) -> float:
@@ -106,14 +119,16 @@ def choose(
     start: ExtendedModel, sessions: Sequence[Session], rests: tuple[Array, float], material: float, progress: Progress
 ) -> Choice:
     """Forward selection, with drop and swap after each step, until nothing is left that an effect explains."""
-    words = dictionary(start, sessions)
-    evidence = Evidence(sessions, noise_of(words), *rests)
+    evidence = Evidence(sessions, white(1.0), *rests)
+    words = dictionary(start, evidence.fitted)
+    evidence = replace(evidence, noise=noise_of(words))
     current = fit(evidence, start)
     baseline = current.model
     screening: Screening | None = None
-    seen: set[frozenset[str]] = {frozenset()}
+    settled: Settled | None = None
+    seen: set[frozenset[str]] = set()
     while True:
-        words = dictionary(current.model, sessions)
+        words = dictionary(current.model, evidence.fitted)
         evidence = replace(evidence, noise=noise_of(words))
         current = fit(evidence, current.model)
         looked = screen(words, evidence.noise)
@@ -123,17 +138,36 @@ def choose(
         added = _added(evidence, current, looked, progress)
         if added is None:
             break
-        current = _settled(evidence, added, progress)
+        settled = _settled(evidence, added, seen, progress)
+        current = settled.fit
         names = frozenset(current.model.names)
         if names in seen:  # it goes in circles: what is here is as good as what was before
             break
         seen.add(names)
-    return _concluded(evidence, current, baseline, screening, material, progress)
+    settled = _settled(evidence, current, set(seen), progress)
+    return _concluded(evidence, settled, fit(evidence, baseline), screening, material)
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A fit of which no part is needless and none is better replaced; the fits without each part, and the rivals."""
+
+    fit: Fit
+    without: dict[str, Fit]
+    rivals: dict[str, tuple[Rival, ...]]
 
 
 def _added(evidence: Evidence, current: Fit, looked: Screening, progress: Progress) -> Fit | None:
-    tried = [_tried(evidence, current.model, one) for one in _worth_trying(looked)]
-    tried.sort(key=lambda one: standing(evidence, one) + penalty(one.model.names[-1]))
+    tried = _raced(evidence, current, _worth_trying(looked))
+    if not tried:
+        return None
+    best = min(one.cost for one in tried)
+
+    def worse(one: Fit) -> float:
+        margin = tempered(one.cost - best, current.cost - best)
+        return margin + penalty(one.model.names[-1]) + evidence.displacement_cost(one.model)
+
+    tried.sort(key=worse)
     for attempt in tried:
         name = attempt.model.names[-1]
         why = _refusal(evidence, current, attempt)
@@ -150,9 +184,18 @@ def _worth_trying(looked: Screening) -> list[Screened]:
     return [*white, *(one for one in raw if one not in white and one.raw_share > 0)]
 
 
-def _tried(evidence: Evidence, model: ExtendedModel, one: Screened) -> Fit:
-    added = one.candidate.effect
-    return fit(evidence, model.with_part(added, one.candidate.start(one.strengths)), QUICK_STEPS)
+def _raced(evidence: Evidence, current: Fit, candidates: Sequence[Screened]) -> list[Fit]:
+    """Fits with one more effect each: all begun, and the ones that may still win carried to their end."""
+    begun = []
+    for one in candidates:
+        added = one.candidate.effect
+        model = current.model.with_part(added, one.candidate.start(one.strengths))
+        begun.append(fit(evidence, model, FIRST_STEPS))
+    if not begun:
+        return []
+    best = min(one.cost for one in begun)
+    close = best + CLOSE * max(current.cost - best, 0.0) + LEAST_FALL
+    return [one if one.cost > close else fit(evidence, one.model, QUICK_STEPS) for one in begun]
 
 
 def _refusal(evidence: Evidence, current: Fit, attempt: Fit) -> str | None:
@@ -176,26 +219,34 @@ def _nulled(model: ExtendedModel, name: str) -> ExtendedModel:
     return model.without(name)
 
 
-def _settled(evidence: Evidence, current: Fit, progress: Progress) -> Fit:
-    """Drop what has become needless; swap what another effect does better."""
-    while len(current.model.parts) > 1:
+def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progress: Progress) -> Settled:
+    """Drop what has become needless; swap what another effect does better, for a set that was not ``seen`` before."""
+    tried = set(seen)
+    while True:
         without = {name: fit(evidence, current.model.without(name), QUICK_STEPS) for name in current.model.names}
         name = _needless(evidence, current, without)
-        if name is None:
-            break
-        progress(f"dropped {name}")
-        current = without[name]
-    if len(current.model.parts) > 1:
-        for name in current.model.names[:-1]:
-            better = _best_swap(evidence, current, fit(evidence, current.model.without(name), QUICK_STEPS), name)
-            if better and better[0][1] < -BETTER:
-                current = fit(evidence, better[0][0].model)
-                progress(f"swapped {name} for {current.model.names[-1]}")
-    return current
+        if name is not None:
+            progress(f"dropped {name}")
+            current = without[name]
+            continue
+        tried.add(frozenset(current.model.names))
+        rivals: dict[str, tuple[Rival, ...]] = {}
+        better: tuple[str, Rival] | None = None
+        for name in sorted(without, key=lambda one: without[one].cost):
+            found = _swaps(evidence, current, without[name], name)
+            rivals[name] = tuple(found)
+            new = [one for one in found if one.fit is not None and frozenset(one.fit.model.names) not in tried]
+            if new and new[0].margin < -BETTER:
+                better = name, new[0]
+                break
+        if better is None or better[1].fit is None:
+            return Settled(current, without, rivals)
+        progress(f"swapped {better[0]} for {better[1].effect}")
+        current = fit(evidence, better[1].fit.model)
 
 
 def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> str | None:
-    """The effect that is missed least, where it is not missed enough: by the likelihood, or by what the reading moves."""
+    """The effect that is missed least, if too little: by the likelihood, or by what the reading moves."""
     sizes = {name: visible(evidence, less.model, current.model) for name, less in without.items()}
     judged = held_out_square(evidence, current.model)
     missed = {
@@ -215,34 +266,28 @@ def _least_size(name: str, sizes: dict[str, float]) -> float:
     return max(HALF_MATERIAL, LEAST_OF_LARGEST * max(sizes.values()))
 
 
-def _best_swap(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[tuple[Fit, float]]:
-    """Fits with another effect in the place of ``name``, and how much worse each is, nearest first."""
-    looked = screen(dictionary(less.model, evidence.sessions), evidence.noise)
+def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival]:
+    """Other effects in the place of ``name`` and how much worse each is, nearest first; ``less``: the fit without."""
+    looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
     others = [one for one in looked.ranked if one.candidate.effect.name != name and one.fall > 0]
-    tried = [_tried(evidence, less.model, one) for one in others[:BEST_SWAPS]]
-    own = standing(evidence, current) + penalty(name)
-    margins = [standing(evidence, one) + penalty(one.model.names[-1]) - own for one in tried]
-    return sorted(zip(tried, margins, strict=True), key=lambda pair: pair[1])
+    whole = less.cost - current.cost
+    near = [one for one in others if one.fall >= WORTH_A_SWAP * whole][:BEST_SWAPS]
+    raced = _raced(evidence, less, near)
+    own = evidence.displacement_cost(current.model) + penalty(name)
+    rivals = []
+    for one in raced:
+        margin = tempered(one.cost - current.cost, less.cost - min(one.cost, current.cost))
+        margin += evidence.displacement_cost(one.model) + penalty(one.model.names[-1]) - own
+        rivals.append(Rival(one.model.names[-1], float(margin), one))
+    rivals.sort(key=lambda rival: rival.margin)
+    far = [one for one in others[:BEST_SWAPS] if one not in near]
+    return rivals + [Rival(one.candidate.effect.name, float(tempered(whole - one.fall, whole)), None) for one in far]
 
 
-def _concluded(
-    evidence: Evidence, current: Fit, baseline: ExtendedModel, screening: Screening, material: float, progress: Progress
-) -> Choice:
-    while True:
-        without = {name: fit(evidence, current.model.without(name)) for name in current.model.names}
-        sizes = {name: visible(evidence, less.model, current.model) for name, less in without.items()}
-        name = _needless(evidence, current, without)
-        if name is None:
-            break
-        progress(f"dropped {name}")
-        current = without[name]
-    rivals = {}
-    for name, less in without.items():
-        found = _best_swap(evidence, current, less, name)
-        if found and found[0][1] < -BETTER:
-            progress(f"swapped {name} for {found[0][0].model.names[-1]}")
-            return _concluded(evidence, fit(evidence, found[0][0].model), baseline, screening, material, progress)
-        rivals[name] = tuple(Rival(one.model.names[-1], float(margin), one) for one, margin in found)
-    named = {name: size for name, size in sizes.items() if size >= material}
-    falls = {name: less.cost - current.cost for name, less in without.items()}
-    return Choice(current, fit(evidence, baseline), evidence, screening, rivals, without, named, falls)
+def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:
+    current = settled.fit
+    sizes = {name: visible(evidence, less.model, current.model) for name, less in settled.without.items()}
+    alone = [visible(evidence, current.model.without(name), current.model) for name in current.model.names]
+    named = {name: size for name, size in sizes.items() if size >= max(material, NAMED_OF_LARGEST * max(alone))}
+    falls = {name: less.cost - current.cost for name, less in settled.without.items()}
+    return Choice(current, baseline, evidence, screening, settled.rivals, settled.without, named, falls)

@@ -25,6 +25,7 @@ Mask = NDArray[np.bool_]
 
 SAMPLES_A_RAMP = 12  # of the fastest ramp from 10 to 90 % of the load
 MOST_SAMPLES = 12_000
+MOST_COARSENED = 1.35  # times: for the sake of speed
 CYCLE_SHARE = 0.08  # of full scale that the load must fall and rise again between two cycles
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
@@ -104,7 +105,8 @@ def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
         ramp_s = 0.8 / fastest if fastest > 0 else recording.duration_s
         factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s)))
     total = sum(len(recording) for recording in recordings)
-    return max(min(factors), -(-total // MOST_SAMPLES))
+    shape = min(factors)
+    return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))
 
 
 def prepare(
@@ -263,14 +265,14 @@ def _noise(signal: Array) -> float:
     """White noise's standard deviation from third differences, which no ramp or bend reaches."""
     if signal.size < 10:
         return 0.0
-    return float(np.median(np.abs(np.diff(signal, 3)))) / 0.6745 / np.sqrt(20.0)
+    return float(np.median(np.abs(np.diff(signal, 3))) / (0.6745 * np.sqrt(20.0)))
 
 
 def _cycles(conditions: Conditions) -> NDArray[np.intp]:
     load = conditions.load
     points = turning_points(load, CYCLE_SHARE)
     # A cycle begins at the foot of a rise; the foot of a rest is its last sample at the low level.
-    feet = [p for p, q in zip(points[:-1], points[1:], strict=True) if load[q] - load[p] > CYCLE_SHARE]
+    feet = [p for p, q in pairwise(points) if load[q] - load[p] > CYCLE_SHARE]
     starts = []
     for foot in feet:
         level = load[foot] + 0.25 * CYCLE_SHARE
@@ -282,7 +284,7 @@ def _cycles(conditions: Conditions) -> NDArray[np.intp]:
         parts = np.arange(load.size) * (2 * FEWEST_CYCLES) // load.size
         return np.asarray(parts, dtype=np.intp)
     cycle = np.zeros(load.size, dtype=np.intp)
-    cycle[[s for s in starts[1:]]] = 1
+    cycle[starts[1:]] = 1
     return np.cumsum(cycle)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,10 @@ class Traits:
         """A sentence for each thing of which this data says nothing."""
         said = []
         if len(self.rates_per_s) <= 1:
-            said.append("one loading rate only: nothing can be said of rate dependence, nor can viscous be told from Coulomb friction")
+            said.append(
+                "one loading rate only: nothing can be said of rate dependence, nor can viscous friction be told from"
+                " Coulomb's"
+            )
         if "holds" not in self.present:
             said.append(
                 f"no hold longer than {HOLD_S:g} s under load: little can be said of a leak, and nothing of slow creep"
@@ -64,7 +68,7 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
     for session in sessions:
         load, step_s = session.conditions.load, session.conditions.step_s
         points = turning_points(load, CYCLE_SHARE)
-        for first, last in zip(points[:-1], points[1:], strict=True):
+        for first, last in pairwise(points):
             rise = float(load[last] - load[first])
             if abs(rise) < CYCLE_SHARE:
                 continue

@@ -55,6 +55,7 @@ class Core:
         self.matrix, self.drive, self.read, self.direct = matrix, drive, read, float(direct)
         self._to_deformation, self._stiffness = to_u, stiffness
         self._memory = len(inner)
+        self._kept: dict[float, tuple[Array, Array, Array, Array, Array]] = {}
 
     def steady_state(self, load: float) -> Array:
         """States of arms and heat under a load that has lasted for ever; nothing has leaked."""
@@ -63,10 +64,18 @@ class Core:
         return state
 
     def _modes(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
+        """`_modes_at`, kept: a chain is run many times with its core unchanged."""
+        if step_s not in self._kept:
+            self._kept[step_s] = self._modes_at(step_s)
+        return self._kept[step_s]
+
+    def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
         """decay, before, after (p,), the matrix from modes to states and that from states to modes."""
-        values, vectors = np.linalg.eig(self.matrix)
-        values, vectors = np.real(values), np.real(vectors)
-        inverse = np.linalg.inv(vectors)
+        if self.drive.size == 1:
+            values, vectors, inverse = self.matrix[0], np.ones((1, 1)), np.ones((1, 1))
+        else:
+            values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix))
+            inverse = np.linalg.inv(vectors)
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4

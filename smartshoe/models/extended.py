@@ -167,7 +167,10 @@ class ExtendedModel:
             moved = theta.copy()
             moved[j] += step
             first = place_of.get(owner, core)
-            out[:, j] = (self.at(moved)._run(kept[first], conditions, first) - reading) / step
+            trial = self.at(moved)
+            if first != core:
+                trial.__dict__["core"] = self.core  # not touched by this parameter
+            out[:, j] = (trial._run(kept[first], conditions, first) - reading) / step
         return reading, out
 
     def trace(self, conditions: Conditions) -> tuple[Array, list[Array]]:
@@ -189,6 +192,8 @@ class ExtendedModel:
             moved = start.copy()
             moved[j] += step
             trial = self.with_part(added, moved)
+            if not isinstance(added, CoreEffect):
+                trial.__dict__["core"] = self.core
             names = [None if part is None else part.name for part in trial.chain]
             first = names.index(None if isinstance(added, CoreEffect) else added.name)
             out[:, column] = (trial._run(kept[first], conditions, first) - reading) / step

@@ -2,83 +2,40 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from smartshoe.loading import by_rate, cycles
 from smartshoe.recording import Recording
+from smartshoe.report.drawing import STYLE, figure_of, svg, thin
 from smartshoe.validation import Trace
 
 Array = NDArray[np.float64]
 
 LOAD, READING, RAW, COMPENSATED = "#1f2937", "#2563eb", "#d97706", "#059669"
-FEWEST, MOST = 300, 900
-_STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "smartshoe",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e5e7eb",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.1,
-    "legend.frameon": False,
-}
-
-
-def _thin(x: Array, *signals: Array) -> tuple[Array, ...]:
-    """At most about `MOST` points that keep each stretch's extremes of the first signal."""
-    if x.size <= MOST:
-        return (x, *signals)
-    block = -(-x.size // (MOST // 2))
-    count = x.size // block
-    cut = signals[0][: count * block].reshape(count, block)
-    start = np.arange(count) * block
-    index = np.unique(np.concatenate([start + cut.argmin(axis=1), start + cut.argmax(axis=1), [0, x.size - 1]]))
-    return (x[index], *(signal[index] for signal in signals))
-
-
-def _svg(figure: Figure) -> str:
-    buffer = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
-    text = buffer.getvalue()
-    return text[text.index("<svg") :]
-
-
-def _figure(width: float, height: float, columns: int, rows: int = 1) -> tuple[Figure, list[Any]]:
-    figure = Figure(figsize=(width, height))
-    axes = figure.subplots(rows, columns, squeeze=False)
-    # Fixed margins (in inches over the size): a tight layout would draw every text twice.
-    figure.subplots_adjust(0.75 / width, 0.45 / height, 1 - 0.15 / width, 1 - 0.3 / height, 0.25, 0.3)
-    return figure, list(axes.ravel())
+FEWEST = 300
 
 
 def signals(recordings: Sequence[Recording]) -> str:
     """Load and reading against time, one column a recording."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         columns = len(recordings)
-        figure, axes = _figure(9.6, 3.6, columns, 2)
+        figure, axes = figure_of(9.6, 3.6, columns, 2)
         for column, recording in enumerate(recordings):
             sensor = recording.sensor
             for axis, values, colour, label in (
                 (axes[column], recording.force_n, LOAD, "load (N)"),
                 (axes[columns + column], sensor.values, READING, f"{sensor.name} ({sensor.unit.symbol})"),
             ):
-                axis.plot(*_thin(recording.time_s, values), color=colour)
+                axis.plot(*thin(recording.time_s, values), color=colour)
                 if column == 0:
                     axis.set_ylabel(label)
             axes[column].set_title(recording.name)
             axes[columns + column].set_xlabel("time (s)")
-        return _svg(figure)
+        return svg(figure)
 
 
 def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> str | None:
@@ -92,8 +49,8 @@ def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.
         return None
     owner = {id(cycle): trace for trace, cycle in found}
     chosen = sorted({min(groups, key=lambda rate: abs(rate - wanted)) for wanted in rates_n_per_s})
-    with mpl.rc_context(_STYLE):
-        figure, axes = _figure(9.6, 5.2, len(chosen), 2)
+    with mpl.rc_context(STYLE):
+        figure, axes = figure_of(9.6, 5.2, len(chosen), 2)
         # Below each loop its distance from the load: a loop of one percent is no more than a thick line above.
         for axis, distance, rate in zip(axes, axes[len(chosen) :], chosen, strict=False):
             cycle = groups[rate][-1]
@@ -104,16 +61,16 @@ def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.
                 (trace.static_n[span], RAW, "raw, best static line"),
                 (trace.compensated_n[span], COMPENSATED, "compensated"),
             ):
-                axis.plot(*_thin(np.arange(load_n.size, dtype=float), load_n, values)[1:], color=colour, label=label)
+                axis.plot(*thin(np.arange(load_n.size, dtype=float), load_n, values)[1:], color=colour, label=label)
                 distance.plot(
-                    *_thin(np.arange(load_n.size, dtype=float), load_n, values - load_n)[1:], color=colour, lw=0.8
+                    *thin(np.arange(load_n.size, dtype=float), load_n, values - load_n)[1:], color=colour, lw=0.8
                 )
             axis.set_title(f"{rate:g} N/s")
             distance.set_xlabel("load (N)")
         axes[0].set_ylabel("estimate (N)")
         axes[len(chosen)].set_ylabel("estimate − load (N)")
         axes[0].legend(loc="upper left")
-        return _svg(figure)
+        return svg(figure)
 
 
 def bode(
@@ -132,8 +89,8 @@ def bode(
             f"filter at {rate_hz:g} Hz",
         ),
     )
-    with mpl.rc_context(_STYLE):
-        figure, (gain, phase) = _figure(9.6, 2.8, 2)
+    with mpl.rc_context(STYLE):
+        figure, (gain, phase) = figure_of(9.6, 2.8, 2)
         for response, colour, line, label in shapes:
             gain.semilogx(frequency, np.abs(response) / (b1 / a1), line, color=colour, label=label)
             phase.semilogx(frequency, np.degrees(np.angle(response)), line, color=colour)
@@ -142,22 +99,22 @@ def bode(
             axis.set_xlabel("frequency (Hz)")
             axis.set_ylabel(label)
         gain.legend(loc="upper left", fontsize=8)
-        return _svg(figure)
+        return svg(figure)
 
 
 def residuals(traces: Sequence[Trace]) -> str:
     """Compensated force less load, against time and against load."""
-    with mpl.rc_context(_STYLE):
-        figure, (by_time, by_load) = _figure(9.6, 2.8, 2)
+    with mpl.rc_context(STYLE):
+        figure, (by_time, by_load) = figure_of(9.6, 2.8, 2)
         start = 0.0
         for trace in traces:
             error = (trace.compensated_n - trace.load_n)[trace.valid]
             time_s = trace.time_s[trace.valid]
-            by_time.plot(*_thin(start + time_s - time_s[0], error), color=COMPENSATED, lw=0.7)
+            by_time.plot(*thin(start + time_s - time_s[0], error), color=COMPENSATED, lw=0.7)
             start += float(time_s[-1] - time_s[0])
             step = max(1, error.size // FEWEST)
             by_load.plot(trace.load_n[trace.valid][::step], error[::step], ".", color=COMPENSATED, ms=2.0)
         by_time.set_xlabel("time, recordings one after the other (s)")
         by_time.set_ylabel("compensated − load (N)")
         by_load.set_xlabel("load (N)")
-        return _svg(figure)
+        return svg(figure)

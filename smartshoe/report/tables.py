@@ -11,13 +11,14 @@ from rich.table import Table
 from smartshoe.report.numbers import plain, with_sd
 
 
-def _console() -> Console:
+def new_console() -> Console:
+    """A console that cuts nothing where nobody looks at its width."""
     console = Console(highlight=False)
-    # Where nobody looks at the width (a pipe, a file) nothing may be cut.
     return console if console.is_terminal else Console(highlight=False, width=200)
 
 
-def _table(title: str, columns: Sequence[str]) -> Table:
+def table_of(title: str, columns: Sequence[str]) -> Table:
+    """An empty table with a title on the left, numbers right-aligned."""
     table = Table(title=title, title_justify="left", header_style="bold")
     for index, column in enumerate(columns):
         table.add_column(column, min_width=len(column), justify="left" if index == 0 else "right", no_wrap=True)
@@ -26,7 +27,7 @@ def _table(title: str, columns: Sequence[str]) -> Table:
 
 def print_identification(result: Mapping[str, Any]) -> None:
     """The parameters with error bars, the fit and its tests."""
-    table = _table(
+    table = table_of(
         f"{result.get('unit') or 'unit'}: {result['direction']} fit by {result['method']},"
         f" {result['estimator'].replace('_', ' ')}",
         ["parameter", "value ± sd", "95 % interval", "unit"],
@@ -38,7 +39,7 @@ def print_identification(result: Mapping[str, Any]) -> None:
     table.add_row("delay", with_sd(delay), "", delay["unit"])
     for name, offset in result["offsets"].items():
         table.add_row(f"offset ({name})", with_sd(offset), "", offset["unit"])
-    console = _console()
+    console = new_console()
     console.print(table)
     rmse, tests = result["rmse"], result["residual_tests"]
     console.print(
@@ -67,7 +68,7 @@ def print_identification(result: Mapping[str, Any]) -> None:
 
 def print_validation(result: Mapping[str, Any]) -> None:
     """Errors per loading rate."""
-    table = _table(
+    table = table_of(
         f"{result.get('unit') or 'unit'}: errors in N over {plain(result['full_scale_n'])} N; loops in % of it",
         ["rate (N/s)", "cycles", "raw", "static", "compensated", "P %", "vs static %", "loop raw", "loop comp.",
          "peak error", "delay (ms)"],
@@ -87,7 +88,7 @@ def print_validation(result: Mapping[str, Any]) -> None:
             plain(rate["peak_error_n"]),
             "–" if delay is None else f"{1e3 * delay:.1f}",
         )
-    console = _console()
+    console = new_console()
     console.print(table)
     console.print(
         "raw: the reading on the calibration's scale; static: the best gain and offset on this data;"
@@ -98,7 +99,7 @@ def print_validation(result: Mapping[str, Any]) -> None:
 
 def print_summary(units: Sequence[Mapping[str, Any]]) -> None:
     """One row a unit of a scenario's result."""
-    table = _table(
+    table = table_of(
         "units: parameters ± sd; errors in N on what was judged",
         ["unit", "k1", "k2", "c", "fit %", "static", "compensated", "gain %", "loop raw %", "loop comp. %"],
     )
@@ -114,4 +115,4 @@ def print_summary(units: Sequence[Mapping[str, Any]]) -> None:
             plain(overall["hysteresis_raw_percent"], 2),
             plain(overall["hysteresis_compensated_percent"], 2),
         )
-    _console().print(table)
+    new_console().print(table)

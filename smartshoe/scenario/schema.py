@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +22,7 @@ from smartshoe.protocol import (
     DYNAMIC_RATES_N_PER_S,
     STATIC_LOADS_N,
     Protocol,
+    Segment,
     dynamic_protocol,
     static_protocol,
 )
@@ -32,9 +34,13 @@ class _Table(BaseModel):
 
 
 class ProtocolTable(_Table):
-    """``[protocol.NAME]``: the paper's static or dynamic protocol, or a variation of it."""
+    """``[protocol.NAME]``: the paper's static or dynamic protocol, or a variation of it, or straight lines of load.
 
-    kind: Literal["static", "dynamic"]
+    ``corners`` of kind "segments" are [time in s, load in N] from [0, 0] on; "hold" and "rest" are lines that stay.
+    """
+
+    kind: Literal["static", "dynamic", "segments"]
+    corners: tuple[tuple[float, float], ...] = ()
     loads_n: tuple[PositiveFloat, ...] = STATIC_LOADS_N
     rates_n_per_s: tuple[PositiveFloat, ...] = DYNAMIC_RATES_N_PER_S
     peak_n: PositiveFloat = 800.0
@@ -47,16 +53,25 @@ class ProtocolTable(_Table):
 
     @model_validator(mode="after")
     def _keys_belong_to_the_kind(self) -> ProtocolTable:
-        foreign = {
-            "static": {"rates_n_per_s", "peak_n", "repeats"},
-            "dynamic": {"loads_n", "rate_n_per_s", "approach_n", "approach_s", "hold_s"},
-        }[self.kind] & self.model_fields_set
+        own = {
+            "static": {"loads_n", "rate_n_per_s", "approach_n", "approach_s", "hold_s", "rest_s"},
+            "dynamic": {"rates_n_per_s", "peak_n", "repeats", "rest_s"},
+            "segments": {"corners"},
+        }[self.kind]
+        foreign = self.model_fields_set - own - {"kind"}
         if foreign:
             raise ValueError(f"{', '.join(sorted(foreign))} means nothing in a {self.kind} protocol")
+        if self.kind == "segments":
+            if len(self.corners) < 2 or self.corners[0] != (0.0, 0.0):
+                raise ValueError("corners begin with [0, 0] and go on with one [time_s, load_n] at least")
+            if any(not (later[0] > earlier[0] and later[1] >= 0) for earlier, later in pairwise(self.corners)):
+                raise ValueError("corners must rise in time, with loads of 0 N or more")
         return self
 
     def build(self, name: str) -> Protocol:
         """The protocol, named as the table is."""
+        if self.kind == "segments":
+            return Protocol(name, tuple(_segment(before, after) for before, after in pairwise(self.corners)))
         if self.kind == "static":
             made = static_protocol(
                 self.loads_n,
@@ -69,6 +84,11 @@ class ProtocolTable(_Table):
         else:
             made = dynamic_protocol(self.rates_n_per_s, peak_n=self.peak_n, repeats=self.repeats, rest_s=self.rest_s)
         return Protocol(name, made.segments)
+
+
+def _segment(before: tuple[float, float], after: tuple[float, float]) -> Segment:
+    stays = before[1] == after[1]
+    return Segment(("rest" if after[1] == 0 else "hold") if stays else "ramp", after[1], after[0] - before[0])
 
 
 class MachineTable(BaseModel):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,18 +24,22 @@ from smartshoe.diagnosis.integrity.view import Signal, View
 LEAST_LAG_S = 0.1
 LEAST_LAG_SAMPLES = 5.0  # less is the delay of a logger, which a model holds
 LARGEST_LAG_S = 6.0
+LONG_LAG_S = 0.4  # no pressure sensor is so slow, and a unit that relaxes answers a corner at once
+UNANIMOUS = 4  # windows
 LEAST_CORRELATION = 0.3
 CLEAR = 0.7  # correlation
-AS_GOOD = 0.97  # of the best correlation
+MIRRORED = 0.5  # of the best correlation, negative at the opposite lag
+ONE_SINE = 0.9  # of the increments' power within five frequencies
+AS_GOOD = 0.98  # of the best correlation
 SMOOTH_S = (0.1, 0.3, 0.6)
 BINS = 4000
 MOVING = 0.05  # of the largest increment
 CUT = 6.0  # of the median increment
 WINDOWS = 8
 EARNED = 0.8  # of the squared error that is left without the shift
-EARNED_ALONE = 0.4  # the same where zero lag correlates nearly as well, as it does on long even ramps
+EARNED_ALONE = 0.6  # the same where zero lag correlates nearly as well, as it does on long even ramps
 TIME_CONSTANTS_S = (0.05, 0.15, 0.5, 1.5, 5.0, 15.0, 60.0)
-PLAY_WIDTHS = (0.01, 0.03, 0.08, 0.16)  # of the load's span
+PLAY_WIDTHS = (0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.12, 0.16)  # of the load's span
 
 
 def align(view: View) -> View:
@@ -76,6 +81,8 @@ def _lag_line(view: View) -> tuple[float, float] | None:
     grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
     load = _binned(view.time_s, five_point_median(view.load.values), grid, width_s)
     reading = _binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
+    if _is_one_sine(load):
+        return None
     for smooth_s in SMOOTH_S:  # as little as the noise allows, since smoothing blunts the edges
         places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s)
         if weights.size and float(np.median(weights)) >= CLEAR:
@@ -86,15 +93,41 @@ def _lag_line(view: View) -> tuple[float, float] | None:
     for lags, earned in ((smallest, EARNED), (best, EARNED_ALONE)):
         if places.size == 0 or np.max(np.abs(lags)) <= least:
             continue
-        offset_s, rate = _robust_line(places - middle, lags, weights)
-        ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
-        if np.max(np.abs(ends)) <= least:
+        offered = []
+        for offset_s, rate in _lines(places - middle, lags, weights):
+            ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
+            if np.max(np.abs(ends)) <= least:
+                continue
+            if lags is smallest and _unanimous(places - middle, lags, offset_s, rate):
+                return offset_s, rate
+            shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
+            offered.append((_unexplained(grid, shifted, reading, smooth_s), offset_s, rate))
+        if not offered:
             continue
-        shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
         before = _unexplained(grid, load, reading, smooth_s) if before is None else before
-        if _unexplained(grid, shifted, reading, smooth_s) < earned * before:
+        after, offset_s, rate = min(offered)
+        if after < earned * before:
             return offset_s, rate
     return None
+
+
+def _is_one_sine(load: Array) -> bool:
+    """Whether the load is little more than one sine: its lag is a phase, which any relaxation has."""
+    power = np.abs(np.fft.rfft(np.diff(load))) ** 2
+    best = int(np.argmax(power))
+    return bool(power[max(best - 2, 0) : best + 3].sum() > ONE_SINE * power.sum())
+
+
+def _unanimous(places: Array, lags: Array, offset_s: float, rate: float) -> bool:
+    """Whether windows agree on a lag too long for a sensor's own: then edges need not be sharp enough to tell the two.
+
+    Counted are the windows in which the line itself is a long lag; hardly any of them may allow zero.
+    """
+    line = offset_s + rate * places
+    far = np.abs(line) > LONG_LAG_S
+    if far.sum() < UNANIMOUS or np.mean(lags[far] != 0.0) < 0.75:
+        return False
+    return bool(np.median(np.abs(lags - line)) < 0.25 * np.max(np.abs(line)))
 
 
 def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
@@ -107,7 +140,9 @@ def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
     return out
 
 
-def _window_lags(grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float) -> tuple[Array, Array, Array, Array]:
+def _window_lags(
+    grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float
+) -> tuple[Array, Array, Array, Array]:
     """Middle, smallest and best lag in s and correlation, (w,) each, of windows in which load and reading both move."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -123,14 +158,14 @@ def _window_lags(grid: Array, load: Array, reading: Array, width_s: float, smoot
     cumulated = np.cumsum(d_load**2)
     cuts = np.searchsorted(cumulated, np.linspace(0.0, cumulated[-1], windows + 1))
     places, smallest, peaks, weights = [], [], [], []
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        low, high = max(int(low) - most, 0), min(int(high) + most, grid.size)
+    for first, last in pairwise(cuts):
+        low, high = max(int(first) - most, 0), min(int(last) + most, grid.size)
         if high - low < 4 * most:
             continue
         correlation = _correlation(d_load[low:high], d_reading[low:high], most)
         best = int(np.argmax(correlation))
-        if correlation[best] < LEAST_CORRELATION:
-            continue
+        if correlation[best] < LEAST_CORRELATION or correlation[-1 - best] < -MIRRORED * correlation[best]:
+            continue  # as much against it as for it, on both sides of zero: one is the other's rate, as in friction
         good = np.flatnonzero(correlation >= AS_GOOD * correlation[best])
         chosen = int(good[np.argmin(np.abs(lags_bins[good]))])
         # Where zero is not as good as the best there is no plateau from zero on: the peak itself is the lag.
@@ -157,19 +192,24 @@ def _correlation(load: Array, reading: Array, most: int) -> Array:
     return out
 
 
-def _robust_line(places: Array, lags: Array, weights: Array) -> tuple[float, float]:
-    """Median offset and, from four windows on, the median of all pairs' slopes (Theil 1950, Sen 1968)."""
-    rate = 0.0
+def _lines(places: Array, lags: Array, weights: Array) -> list[tuple[float, float]]:
+    """Offset and rate to try: with four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), where
+    it halves the scatter; then the constant."""
+    found = []
     if places.size >= 4:
         i, j = np.triu_indices(places.size, 1)
         apart = places[j] - places[i] > 0.2 * np.ptp(places)
         rate = float(np.median((lags[j] - lags[i])[apart] / (places[j] - places[i])[apart]))
         left = lags - rate * places
-        if np.median(np.abs(left - np.median(left))) > 0.5 * np.median(np.abs(lags - np.median(lags))):
-            rate = 0.0
-    order = np.argsort(lags - rate * places)
-    share = np.cumsum(weights[order]) / weights.sum()
-    return float((lags - rate * places)[order][np.searchsorted(share, 0.5)]), rate
+        if np.median(np.abs(left - np.median(left))) < 0.5 * np.median(np.abs(lags - np.median(lags))):
+            found.append((_middle(left, weights), rate))
+    return [*found, (_middle(lags, weights), 0.0)]
+
+
+def _middle(values: Array, weights: Array) -> float:
+    """The weighted median."""
+    order = np.argsort(values)
+    return float(values[order][np.searchsorted(np.cumsum(weights[order]) / weights.sum(), 0.5)])
 
 
 @on_one_thread

@@ -83,9 +83,7 @@ def _examined(recording: Recording) -> tuple[list[Finding], Mask, tuple[float, f
     view = None
     lacking = _lacking(recording)
     if lacking is not None:
-        findings.append(
-            Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking)
-        )
+        findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
     elif not any(finding.refuses for finding in findings):
         view = _view(recording)
         if view is None:
@@ -107,11 +105,16 @@ def _examined(recording: Recording) -> tuple[list[Finding], Mask, tuple[float, f
 def _lacking(recording: Recording) -> str | None:
     """Why there is no pair of load and reading, or None."""
     if not recording.of_role("load"):
-        return "there is no reference load: without it an error of the unit cannot be told from the load; name it with --force"
+        return (
+            "there is no reference load: without it an error of the unit cannot be told from the load; name its column"
+            " with --force"
+        )
     count = len(recording.sensors)
     if count == 1:
         return None
-    return f"there are {count} readings: name one with --sensor" if count else "there is no reading: name it with --sensor"
+    return (
+        f"there are {count} readings: name one with --sensor" if count else "there is no reading: name it with --sensor"
+    )
 
 
 def _view(recording: Recording) -> View | None:

@@ -12,7 +12,7 @@ from smartshoe.diagnosis.integrity.view import View
 LEAST_SHARE = 0.3  # of the reading's variance that a unit which follows at all leaves explained
 CERTAIN_SHARE = 0.85
 LEAST_MOVES_WITH = 0.05  # correlation of increments; a random walk may explain half of the variance, but not move along
-STRIDES_S = (0.3, 1.0, 3.0)
+STRIDES_S = (0.3, 1.0, 3.0, 10.0)
 LEAST_MOVE = 10.0  # standard deviations of noise
 POINTS = 3000
 TIME_CONSTANTS_S = (0.3, 3.0, 30.0)
@@ -26,9 +26,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
     if float(np.ptp(reading.values)) == 0.0:
         says = "the reading is constant: is the unit connected, and is this its column?"
     elif view.load_span <= LEAST_MOVE * load.quiet_noise or view.load_span == 0.0:
-        says = (
-            f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
-        )
+        says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
     else:
         share, moves_with = _followed_share(view)
         if share >= CERTAIN_SHARE or (share >= LEAST_SHARE and moves_with >= LEAST_MOVES_WITH):
@@ -59,7 +57,8 @@ def _followed_share(view: View) -> tuple[float, float]:
     count = n // width
     load = view.load.values[: count * width].reshape(count, width).mean(axis=1)
     reading = np.median(view.reading.values[: count * width].reshape(count, width), axis=1)
-    columns = _of_load(load, width * view.step_s)
+    curve = np.interp(load, view.curve[0], view.curve[1])
+    columns = np.concatenate([_of_load(load, width * view.step_s), curve[:, None]], axis=1)
     trend = np.linspace(-1.0, 1.0, count)
     base = np.stack([np.ones(count), trend], axis=1)
     matrix = np.concatenate([base, columns], axis=1)
@@ -68,7 +67,7 @@ def _followed_share(view: View) -> tuple[float, float]:
     total = float(np.dot(left_base, left_base))
     if total == 0.0:
         return 0.0, 0.0
-    together = max(_moves_with(load, reading, stride_s / (width * view.step_s)) for stride_s in STRIDES_S)
+    together = max(_moves_with(curve, reading, stride_s / (width * view.step_s)) for stride_s in STRIDES_S)
     return 1.0 - float(np.dot(left, left)) / total, together
 
 
@@ -81,7 +80,7 @@ def _moves_with(load: Array, reading: Array, stride: float) -> float:
     size = float(np.sqrt(np.dot(d_load, d_load) * np.dot(d_reading, d_reading)))
     if size == 0.0:
         return 0.0
-    return float(np.dot(d_load, d_reading)) / size - 2.0 / np.sqrt(load.size / apart)
+    return float(np.dot(d_load, d_reading) / size - 2.0 / np.sqrt(load.size / apart))
 
 
 def _of_load(load: Array, step_s: float) -> Array:

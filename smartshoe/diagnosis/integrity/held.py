@@ -10,9 +10,11 @@ from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
 from smartshoe.diagnosis.integrity.view import DITHERED, Index, View
 
 CERTAIN = 1e-9  # chance that an honest run would repeat so
-LEVELS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+LEVELS = tuple(10.0 ** (-0.25 * k) for k in range(24, 5, -1))  # chances at which honest runs are counted
 FLOAT_STEP = 1e-9  # of the span: what a noiseless relaxation comes to rest within
-WINDOW = 32
+DOUBT = 0.1  # honest repeats among those that are left out, at most
+WINDOW, LEAST_TURNS = 32, 8
+CAUGHT = 0.4  # of the slope on either side, that a held run's mean slope up to the next value has at least
 LONG = 30  # repeats; beyond, the slopes on both sides say little of what lies between
 SMALLEST_WIDTH = 0.15  # of the lattice step: what noise is taken for at least, where motion is judged
 
@@ -50,8 +52,8 @@ def held(view: View) -> Mask:
     sure = log_chance < np.log(CERTAIN)
     for level in LEVELS:  # more runs of small chance than that chance allows: the logger does hold, and how often
         found, honest = int((log_chance < np.log(level)).sum()), level * y.size
-        if found > honest + 6.0 * np.sqrt(honest) + 6.0:
-            sure |= log_chance < np.log(0.05 * (found - honest) / y.size)
+        if found > honest + 5.0 * np.sqrt(honest) + 5.0:
+            sure |= log_chance < np.log(DOUBT * (found - honest) / y.size)
     sure |= _caught_up(view, starts, stops)
     for first, last in zip(starts[sure], stops[sure], strict=True):
         at[first + 1 : last + 1] = True
@@ -89,12 +91,12 @@ def _alternates(y: Array, starts: Index, stops: Index) -> Mask:
     product = second[1:] * second[:-1]
     turns = np.concatenate([[0], np.cumsum((product < 0.0).astype(np.int64))])
     stays = np.concatenate([[0], np.cumsum((product > 0.0).astype(np.int64))])
-    out = np.ones(starts.size, dtype=bool)
+    turned, stayed = np.zeros(starts.size, dtype=np.int64), np.zeros(starts.size, dtype=np.int64)
     for low, high in ((starts - WINDOW, starts - 2), (stops, stops + WINDOW - 2)):
         a, b = np.clip(low, 0, product.size), np.clip(high, 0, product.size)
-        turned, stayed = turns[b] - turns[a], stays[b] - stays[a]
-        short = b - a < WINDOW // 2  # at either end of the record the other side alone says it
-        out &= ((turned > stayed) & (turned >= 5)) | short
+        turned += turns[b] - turns[a]
+        stayed += stays[b] - stays[a]
+    out: Mask = (turned > stayed) & (turned >= LEAST_TURNS)
     return out
 
 
@@ -115,12 +117,16 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     caught = (y[after_first] - y[starts]) / (repeats + 1)
     agree = (np.sign(before) == np.sign(caught)) & (np.sign(after) == np.sign(caught))
     least = np.minimum(np.minimum(np.abs(before), np.abs(after)), np.abs(caught))
-    half = np.maximum((repeats + 1) // 2, 1)
-    moved = np.minimum(np.abs(load[starts + half] - load[starts]), np.abs(load[stops] - load[stops - half]))
+    # What a friction or a dead band has kept is not caught up with.
+    kept = np.abs(caught) < CAUGHT * np.minimum(np.abs(before), np.abs(after))
+    edge = np.minimum(view.near, repeats // 4)  # the mean over ``near`` samples brings a step beside the run into it
+    a, b = starts + edge, stops - edge
+    half = np.maximum((b - a + 1) // 2, 1)
+    moved = np.minimum(np.abs(load[a + half] - load[a]), np.abs(load[b] - load[b - half]))
     moved = np.maximum(moved - 6.0 * view.load.quiet_noise / np.sqrt(view.near) - view.load.step, 0.0)
     least = np.where(repeats > LONG, np.minimum(least, 2.0 * view.gain * moved / half), least)
     # A slope between two lattice values is uncertain by a step.
-    out: Array = np.where(agree, np.maximum(least - step / reach, 0.0), 0.0)
+    out: Array = np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
     return out
 
 
@@ -131,7 +137,8 @@ def _caught_up(view: View, starts: Index, stops: Index) -> Mask:
     """
     out = np.zeros(starts.size, dtype=bool)
     y, load, jump = view.reading.values, view.load.values, view.jump
-    for i in np.flatnonzero((stops - starts >= 3) & (stops < y.size - 1)):
+    rail = (y[starts] == y.min()) | (y[starts] == y.max())  # there a dead band or saturation stands still
+    for i in np.flatnonzero((stops - starts >= 3) & (stops < y.size - 1) & ~rail):
         first, last = int(starts[i]), int(stops[i])
         if jump[last] == 0.0:
             continue

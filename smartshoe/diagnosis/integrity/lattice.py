@@ -14,6 +14,7 @@ from smartshoe.diagnosis.integrity.view import View
 # noise dithers the lattice and hides it.
 MATERIAL_SHARE = 0.0003
 BESIDE_NOISE = 0.25
+LEAST_MOVES, LEAST_SHARE = 20, 0.02  # of moves by a single step
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
@@ -21,6 +22,9 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     step = view.reading.step
     if step == 0.0 or view.span == 0.0:
         return
+    moves = np.rint(np.abs(np.diff(view.reading.values)) / step)
+    if int((moves == 1.0).sum()) < max(LEAST_MOVES, LEAST_SHARE * int((moves > 0.0).sum())):
+        return  # a noiseless reading of a load in steps has a few levels, and leaps between them
     error = step / np.sqrt(12.0)
     noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
     if error < MATERIAL_SHARE * view.span or error < BESIDE_NOISE * noise:

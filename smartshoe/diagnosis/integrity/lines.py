@@ -89,15 +89,13 @@ def _quiet_stretches(view: View) -> list[tuple[int, int]]:
     still = np.abs(np.diff(mean)) <= max(QUIET_MOVE * view.load_span, 4.0 * noise / np.sqrt(block))
     calm = blocks.std(axis=1) <= QUIET_MOVE * view.load_span + 1.5 * noise  # a sine of four cycles a second is not
     still &= calm[1:] & calm[:-1]
-    gap = np.flatnonzero(np.diff(view.time_s) > 1.6 * view.step_s) // block
+    gap = np.flatnonzero((np.diff(view.time_s) > 1.6 * view.step_s) | (view.jump != 0.0)) // block
     still[np.minimum(gap, still.size - 1)] = False
     quiet = np.zeros(count, dtype=bool)
     quiet[1:-1] = still[1:] & still[:-1]
     starts, stops = runs_of(quiet)
     least = max(4, round(LEAST_STRETCH_S / (block * view.step_s)))
-    return [
-        (int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a - 1 >= least
-    ]
+    return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a - 1 >= least]
 
 
 def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[Array, Array]:

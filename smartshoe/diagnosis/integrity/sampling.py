@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Finding, runs_of
 from smartshoe.recording import Recording
 
 LEAST_SAMPLES = 100

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smartshoe.diagnosis.integrity.fault import Array
 
@@ -11,6 +12,7 @@ CUT = 3.0  # medians of the absolute value
 CUT_SHORT = 0.93  # what is left of a normal deviate's root mean square
 SAME_GAP = 0.01  # of the logarithm
 COMMON = 0.2  # of the commonest gap's number
+OFTEN, CANDIDATES, SAMPLE = 3, 40, 2000
 FEW, FEW_FIT, MANY_FIT = 50, 0.98, 0.75  # three gaps of ten fit any step
 SECOND_DIFFERENCE = 6.0**0.5  # standard deviation of white noise's, over the noise's own
 
@@ -88,7 +90,7 @@ def own_corner(values: Array, near: int) -> Array:
     return out
 
 
-def lattice_step(levels: Array, count: Array) -> float:
+def lattice_step(levels: Array, count: NDArray[np.intp]) -> float:
     """The step of the lattice on which values lie; 0 where there is none that can be told.
 
     ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left
@@ -103,14 +105,28 @@ def lattice_step(levels: Array, count: Array) -> float:
     gaps = gaps[gaps > 1e-9 * np.max(np.abs(levels))]  # two readings of one level that differ by rounding
     if gaps.size < 2:
         return 0.0
-    # The smallest of the common gaps is one step, whatever some values off the lattice have made of theirs.
+    # One step is a gap that occurs often, and the largest of which the others are multiples; values off the lattice
+    # have made some gaps what they are.
     place, number = np.unique(np.rint(np.log(gaps) / SAME_GAP).astype(np.int64), return_counts=True)
-    step = float(np.exp(SAME_GAP * place[np.argmax(number >= COMMON * number.max())]))
+    often_enough = number >= min(OFTEN, int(number.max()))
+    offered = np.concatenate([place[often_enough][:CANDIDATES], place[number >= COMMON * number.max()][:CANDIDATES]])
+    some = gaps[:: max(1, gaps.size // SAMPLE)]
+    least = FEW_FIT if gaps.size < FEW else MANY_FIT
+    for candidate in np.unique(offered)[::-1]:
+        step = _refined(some, float(np.exp(SAME_GAP * candidate)))
+        if step > 0.0 and _fits(some, step).mean() > least:
+            return step
+    return 0.0
+
+
+def _fits(gaps: Array, step: float) -> NDArray[np.bool_]:
+    """(g,) which gaps are multiples of ``step``, one at least."""
     multiple = np.rint(gaps / step)
-    near = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < 0.15)
-    if not near.any():
-        return 0.0
-    step = float(np.median(gaps[near] / multiple[near]))
-    multiple = gaps / step
-    fits = (np.rint(multiple) >= 1.0) & (np.abs(multiple - np.rint(multiple)) < 0.15)
-    return step if fits.mean() > (FEW_FIT if gaps.size < FEW else MANY_FIT) else 0.0
+    out: NDArray[np.bool_] = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < 0.15)
+    return out
+
+
+def _refined(gaps: Array, step: float) -> float:
+    """The step by the gaps that are its multiples, 0 where none is."""
+    near = gaps[_fits(gaps, step)]
+    return float(np.median(near / np.rint(near / step))) if near.size else 0.0

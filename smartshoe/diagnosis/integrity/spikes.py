@@ -10,10 +10,10 @@ from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask
 from smartshoe.diagnosis.integrity.scales import local_scale, own_corner
 from smartshoe.diagnosis.integrity.view import Signal, View
 
-NOISES = 6.0  # the largest of 1e6 normal deviates reaches 5.1 of this scale
+NOISES = 6.5  # the largest of 1e6 normal deviates reaches 5.1 of this scale
 STEPS = 2.0  # of a lattice
 CORNERS = 1.5  # of what the other channel's corner explains
-LEAST_SHARE = 0.0002  # of the span
+LEAST_SHARE = 0.0005  # of the span
 
 
 def isolated(signal: Signal, corner: Array, scale: float, span: float, near: int) -> Mask:

@@ -23,6 +23,7 @@ Index = NDArray[np.intp]
 CURVE_BINS = 40
 NEAR_S = 0.1  # corners of load and reading this near to each other are taken for one
 NEAR_SAMPLES = 3
+LEAST_NOISE = 1e-4  # of the range: less is arithmetic
 DITHERED = 0.7  # of a lattice step: less noise than this may be the toggling between two levels
 
 
@@ -33,9 +34,10 @@ class Signal:
     values: Array
 
     @cached_property
-    def levels(self) -> tuple[Array, NDArray[np.intp]]:
+    def levels(self) -> tuple[Array, Index]:
         """The values that occur, increasing, and how often each does."""
-        return np.unique(self.values, return_counts=True)
+        values, count = np.unique(self.values, return_counts=True)
+        return values, count.astype(np.intp)
 
     @cached_property
     def step(self) -> float:
@@ -53,7 +55,8 @@ class Signal:
         """Whether second differences change sign more often than not: noise above one lattice step, not curvature."""
         second = np.diff(self.values, 2)
         product = second[1:] * second[:-1]
-        return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > DITHERED * self.step
+        least = max(DITHERED * self.step, LEAST_NOISE * float(np.ptp(self.values)))
+        return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > least
 
     @cached_property
     def outlying(self) -> Array:

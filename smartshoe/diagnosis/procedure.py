@@ -30,7 +30,7 @@ Progress = Callable[[str], None]
 
 REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
 NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
-LEFT_OF_EXPLAINED = 0.15  # of the structure that was there: less than this left over is a matter of equations' shape
+LEFT_OF_EXPLAINED = 0.12  # of the structure that was there: less than this left over is a matter of equations' shape
 
 
 def _silent(_: str) -> None:
@@ -90,44 +90,41 @@ def _diagnosed(
     choice = choose(start, sessions, rest_loads(sessions), material, progress)
     before = leftover_of(sessions, choice.evidence.residuals(choice.baseline.model))
     after = leftover_of(sessions, choice.evidence.residuals(choice.fit.model))
-    names, verdict = _judged(choice, before, after, material)
     progress("judging on held-out data")
     fine = at_full_rate(sessions, usable, scale)
-    baseline, extended = choice.baseline.model, choice.fit.model
+    baseline, best = errors(fine, choice.baseline.model), errors(fine, choice.fit.model)
+    causes = [_cause(name, choice, fine, best, scale, traits) for name in choice.causes]
+    causes, verdict = _judged([one for one in causes if one.held_out.gain_percent > 0], before, after, material)
+    extended, after_all, last = choice.fit.model, best, after
     if verdict == "unexplained":
-        extended = baseline
-    all_before, all_after = errors(fine, baseline), errors(fine, extended)
-    causes = [
-        _cause(name, choice, fine, scale, traits) for name in names
-    ]
-    rivals = causes[0].rivals if causes else _candidates(choice)
-    total_before = all_before.rmse**2
-    structure = max(before.rms**2 - 0.0, 0.0)
-    explainable = 100.0 * min(structure / max(total_before, 1e-300), 1.0)
-    explained = 100.0 * max(0.0, 1.0 - all_after.rmse**2 / max(total_before, 1e-300))
+        extended, after, after_all = choice.baseline.model, before, baseline
+    # What the best model leaves is noise but for the structure in it.
+    noise = max(best.rmse**2 - last.rms**2, 0.0)
+    wrong = float(np.sqrt(max(baseline.rmse**2 - noise, 0.0)))
+    named = [cause.name for cause in causes]
     return Diagnosis(
         verdict,
-        _sentence(verdict, causes, before, after),
+        _sentence(verdict, causes, wrong, after.rms),
         scale.unit.symbol,
         scale.load_n,
         scale.reading,
         causes=tuple(causes),
-        minor=tuple(name for name in choice.fit.model.names if name not in names) if verdict != "unexplained" else (),
+        minor=tuple(name for name in extended.names if name not in named),
         data_faults=integrity.faults,
-        baseline=_standing(all_before, baseline, before, fine, scale),
-        extended=_standing(all_after, extended, after if verdict != "unexplained" else before, fine, scale),
-        gain=gain(all_before, all_after, scale),
-        explainable_percent=max(explainable, explained) if verdict != "adequate" else explainable,
-        explained_percent=explained,
-        rivals=tuple(rivals),
+        baseline=_standing(baseline, choice.baseline.model, before, fine, scale),
+        extended=_standing(after_all, extended, after, fine, scale),
+        gain=gain(baseline, after_all, scale),
+        explainable_percent=_percent_less(noise, baseline.rmse**2),
+        explained_percent=_percent_less(after_all.rmse**2, baseline.rmse**2),
+        rivals=causes[0].rivals if causes else _candidates(choice),
         next_experiment=next_experiment(choice, causes, traits, sessions),
         limits=tuple(traits.limits()),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=tuple((one.candidate.effect.name, float(one.fall)) for one in choice.screening.ranked),
         likeness=choice.screening.likeness,
         model=extended,
-        baseline_model=baseline,
-        traces=tuple(_trace(session, baseline, extended, scale) for session in fine),
+        baseline_model=choice.baseline.model,
+        traces=tuple(_trace(session, choice.baseline.model, extended, scale) for session in fine),
     )
 
 
@@ -145,13 +142,20 @@ def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
     return np.array(means), REST_SD
 
 
-def _judged(choice: Choice, before: Leftover, after: Leftover, material: float) -> tuple[list[str], Verdict]:
-    """Which of the chosen effects keep their names, and the verdict."""
-    names = list(choice.causes)
+def _percent_less(after: float, before: float) -> float:
+    """By how many percent a variance falls, 0 where it grows."""
+    return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
+
+
+def _judged(causes: list[Cause], before: Leftover, after: Leftover, material: float) -> tuple[list[Cause], Verdict]:
+    """The causes that keep their names, and the verdict.
+
+    A name that explains little more than what is left over is withdrawn: the truth may be another thing altogether.
+    """
     left = after.rms if after.significant and after.rms > material else 0.0
     if left <= LEFT_OF_EXPLAINED * before.rms:
         left = 0.0
-    kept = [name for name in names if choice.sizes[name] >= NAMED_OVER_LEFT * left]
+    kept = [cause for cause in causes if cause.size >= NAMED_OVER_LEFT * left]
     if kept:
         return kept, "partly_explained" if left else "explained"
     if left or (before.significant and before.rms > material):
@@ -159,19 +163,18 @@ def _judged(choice: Choice, before: Leftover, after: Leftover, material: float) 
     return [], "adequate"
 
 
-def _sentence(verdict: Verdict, causes: Sequence[Cause], before: Leftover, after: Leftover) -> str:
-    named = " and ".join(cause.name.replace("_", " ") for cause in causes)
-    percent = f"{100 * before.rms:.2g} % of full scale"
+def _sentence(verdict: Verdict, causes: Sequence[Cause], wrong: float, left: float) -> str:
+    names = [cause.name.replace("_", " ") for cause in causes]
+    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    verb = "account" if len(names) > 1 else "accounts"
+    wrong_by = f"the baseline simulation is wrong by {100 * wrong:.2g} % of full scale"
     if verdict == "adequate":
         return "the baseline simulation leaves nothing that repeats and matters"
     if verdict == "explained":
-        return f"the baseline simulation is wrong by {percent}: {named} accounts for it"
+        return f"{wrong_by}: {named} {verb} for it"
     if verdict == "partly_explained":
-        return (
-            f"the baseline simulation is wrong by {percent}: {named} accounts for part of it, and"
-            f" {100 * after.rms:.2g} % of full scale is still unexplained"
-        )
-    return f"the baseline simulation is wrong by {percent}, and no effect of the catalogue accounts for it"
+        return f"{wrong_by}: {named} {verb} for part of it, and {100 * left:.2g} % of full scale is still unexplained"
+    return f"{wrong_by}, and no effect of the catalogue accounts for it"
 
 
 def _candidates(choice: Choice) -> tuple[Rival, ...]:
@@ -181,11 +184,9 @@ def _candidates(choice: Choice) -> tuple[Rival, ...]:
     return tuple(Rival(one.candidate.effect.name, float(ranked[0].fall - one.fall)) for one in ranked)
 
 
-def _cause(
-    name: str, choice: Choice, fine: Sequence[Session], scale: Scale, traits: Traits
-) -> Cause:
+def _cause(name: str, choice: Choice, fine: Sequence[Session], best: Errors, scale: Scale, traits: Traits) -> Cause:
     less = choice.without[name]
-    won = gain(errors(fine, less.model), errors(fine, choice.fit.model), scale)
+    won = gain(errors(fine, less.model), best, scale)
     rivals = tuple(Rival(one.effect, one.margin) for one in choice.rivals[name])
     equivalents = inseparable(rivals)
     sure = confidence(rivals, choice.falls[name], choice.sizes[name])
@@ -196,7 +197,7 @@ def _cause(
             "fall of -2 log likelihood",
             fall,
             penalty(name),
-            f"without it, and everything else fitted anew, the fit is worse by {fall:.4g} where {penalty(name):.0f} would do",
+            f"without it, and all else fitted anew, the fit is worse by {fall:,.0f} where {penalty(name):.0f} would do",
         ),
         Statement(
             "size in percent of full scale",
@@ -208,7 +209,7 @@ def _cause(
             "gain on held-out data in percent",
             won.gain_percent,
             0.0,
-            f"on load cycles that were not fitted the error falls from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+            f"on data not fitted the error falls from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
         ),
     ]
     if rivals:
@@ -218,7 +219,7 @@ def _cause(
                 "margin to the nearest rival",
                 nearest.margin,
                 6.0,
-                f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:.4g}",
+                f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:,.0f}",
             )
         )
     lacking = one.exposed_by - traits.present
@@ -234,9 +235,7 @@ def _cause(
     return Cause(one, sure, equivalents, parameters_of(choice.fit, name, scale), tuple(evidence), won, size, rivals)
 
 
-def _standing(
-    found: Errors, model: ExtendedModel, left: Leftover, fine: Sequence[Session], scale: Scale
-) -> Standing:
+def _standing(found: Errors, model: ExtendedModel, left: Leftover, fine: Sequence[Session], scale: Scale) -> Standing:
     return Standing(
         found.rmse * scale.reading,
         scale.unit.symbol,
@@ -249,7 +248,7 @@ def _standing(
 def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, scale: Scale) -> Trace:
     return Trace(
         session.recording.name,
-        session.conditions.time_s,
+        session.conditions.time_s + session.recording.time_s[0],
         session.conditions.load * scale.load_n,
         session.reading * scale.reading,
         baseline.simulate(session.conditions) * scale.reading,

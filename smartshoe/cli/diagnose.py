@@ -1,0 +1,152 @@
+"""``smartshoe diagnose``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from smartshoe.cli.inputs import column_options, read_all
+
+if TYPE_CHECKING:
+    from smartshoe.diagnosis import Diagnosis
+    from smartshoe.recording import Recording
+
+
+@click.command(
+    "diagnose",
+    epilog="Example: smartshoe diagnose left_toe_1.csv left_toe_2.csv --hold-out left_toe_3.csv --out out/left_toe",
+)
+@click.argument("files", nargs=-1, required=True)
+@click.option(
+    "--hold-out",
+    "held_out",
+    multiple=True,
+    metavar="FILE",
+    help="An experiment to judge on and never to fit (repeatable); without it every third load cycle.",
+)
+@click.option(
+    "--material",
+    type=click.FloatRange(min=0.0, max=50.0, min_open=True),
+    default=0.02,
+    show_default=True,
+    metavar="PERCENT",
+    help="Of full scale: what is smaller does not count.",
+)
+@click.option("--json", "json_path", metavar="PATH", help="Write the diagnosis as JSON (- for stdout).")
+@click.option("--out", "out_folder", metavar="DIR", help="Write diagnosis.html, diagnosis.json and the next protocol.")
+@click.option(
+    "--calibration",
+    "calibration_path",
+    metavar="OUT.json",
+    help="Write the extended model's calibration for compensate.",
+)
+@column_options
+def command(
+    files: tuple[str, ...],
+    held_out: tuple[str, ...],
+    material: float,
+    json_path: str | None,
+    out_folder: str | None,
+    calibration_path: str | None,
+    unit: str | None,
+    **columns: Any,
+) -> None:
+    """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
+    from smartshoe.atomic import make_folder
+    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.diagnosis import diagnose
+    from smartshoe.errors import NotIdentifiableError
+
+    _check(files, held_out, material)
+    recordings = read_all(files, unit=unit, **columns)
+    others = read_all(held_out, unit=unit, **columns) if held_out else []
+    folder = make_folder(out_folder) if out_folder is not None else None
+    with progress() as step:
+        found = diagnose(recordings, hold_out=others, material=material / 100.0, progress=step)
+        title = _title(recordings, unit)
+        written: dict[str, Path] = {}
+        if folder is not None:
+            step("writing the report")
+            written = _publish(folder, found, title, _facts(recordings, others))
+    refused = found.verdict == "refused"
+    if calibration_path is not None and not refused:
+        _save_calibration(calibration_path, found, recordings, unit)
+    taken = emit_json(found.to_dict(), json_path)
+    if refused:
+        raise NotIdentifiableError(found.limits[0] if found.limits else found.says)
+    if taken:
+        return
+    from smartshoe.report.diagnosis.terminal import print_diagnosis
+
+    print_diagnosis(found, title)
+    for name, path in written.items():
+        click.echo(f"{name}: {path}")
+    if calibration_path is not None:
+        click.echo(f"calibration: {calibration_path}")
+
+
+def _check(files: tuple[str, ...], held_out: tuple[str, ...], material: float) -> None:
+    from smartshoe.errors import UsageError
+
+    if not math.isfinite(material):
+        raise UsageError(f"--material is {material:g}: give a number of percent, for example 0.02")
+    fitted = {Path(file).resolve() for file in files}
+    for file in held_out:
+        if Path(file).resolve() in fitted:
+            raise UsageError(f"{file} is to be fitted and held out at once: name it as FILE or with --hold-out")
+
+
+def _title(recordings: list[Recording], unit: str | None) -> str:
+    names = dict.fromkeys(recording.unit for recording in recordings if recording.unit)
+    return unit or ", ".join(names) or recordings[0].name
+
+
+def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, str]:
+    import smartshoe
+
+    facts = {"fitted": ", ".join(recording.name for recording in recordings)}
+    facts["judged on"] = ", ".join(recording.name for recording in others) or "every third load cycle, not fitted"
+    return {**facts, "smartshoe": smartshoe.__version__}
+
+
+def _publish(folder: Path, found: Diagnosis, title: str, facts: dict[str, str]) -> dict[str, Path]:
+    """Write the page, the result and the next experiment's protocol; those to tell of, by what they are."""
+    from smartshoe.atomic import write_text
+    from smartshoe.cli.output import to_json
+    from smartshoe.report.diagnosis.page import write_diagnosis_page
+    from smartshoe.report.diagnosis.protocol_file import protocol_text, table_name
+
+    page = folder / "diagnosis.html"
+    written = {"report": page}
+    protocol_file = None
+    following = found.next_experiment
+    if following is not None and following.steps is not None:
+        protocol_file = f"{table_name(following.steps.name)}.toml"
+        written["next protocol"] = folder / protocol_file
+        write_text(folder / protocol_file, protocol_text(following.steps, [following.says]))
+    write_text(folder / "diagnosis.json", to_json(found.to_dict()))
+    write_diagnosis_page(page, found, f"Diagnosis of {title}", facts, protocol_file)
+    return written
+
+
+def _save_calibration(path: str, found: Diagnosis, recordings: list[Recording], unit: str | None) -> None:
+    import datetime
+
+    from smartshoe.compensation import extended_calibration
+
+    if found.model is None:
+        return
+    parameters = {
+        f"{cause.name}.{name}": parameter for cause in found.causes for name, parameter in cause.parameters.items()
+    }
+    extended_calibration(
+        found.model,
+        unit=unit or recordings[0].unit or "",
+        parameters=parameters,
+        covariance=tuple((math.nan,) * len(parameters) for _ in parameters),
+        sample_rate_hz=1.0 / recordings[0].sample_time_s,
+        created=datetime.datetime.now(datetime.UTC).date().isoformat(),
+    ).save(path)

@@ -1,0 +1,106 @@
+"""A diagnosis on a terminal: the verdict first, then causes, faults, before and after, limits, what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from smartshoe.diagnosis.result import Cause, Diagnosis
+from smartshoe.report.diagnosis.sentences import (
+    HEADINGS,
+    comparison,
+    fault_text,
+    gain_text,
+    how_much,
+    listed,
+    parameter_text,
+    sentence,
+    shares_text,
+    sure,
+    why_this_one,
+    words,
+)
+from smartshoe.report.tables import new_console, table_of
+
+MOST_FAULTS = 12
+
+
+def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
+    """The whole diagnosis as a person reads it; the page of ``--out`` says more."""
+    console = new_console()
+    heading = f"{title}: {HEADINGS[diagnosis.verdict]}" if title else HEADINGS[diagnosis.verdict]
+    console.print(f"[bold]{escape(heading)}[/bold]", soft_wrap=True)
+    _line(console, sentence(diagnosis.says))
+    said = how_much(diagnosis)
+    if said is not None:
+        _line(console, said)
+    if diagnosis.causes:
+        _causes(console, diagnosis)
+    if diagnosis.minor:
+        _line(
+            console,
+            f"also in the extended model, too small to be named as causes: {listed(sorted(diagnosis.minor), 'and')}",
+        )
+    if diagnosis.leftover:
+        _line(console, f"what is left: {diagnosis.leftover}")
+    rows = comparison(diagnosis)
+    if rows:
+        table = _wrapping("before and after, on data that was not fitted", ["", "baseline", "extended", "change"])
+        for row in rows:
+            table.add_row(row.name, row.before, row.after, row.change)
+        console.print()
+        console.print(table)
+        _line(console, shares_text(diagnosis))
+    _several(console, "faults of the data", [fault_text(fault) for fault in diagnosis.data_faults])
+    _several(console, "limits of this data", diagnosis.limits)
+    if diagnosis.next_experiment is not None:
+        _several(console, "what to do next", [diagnosis.next_experiment.says])
+
+
+def _causes(console: Console, diagnosis: Diagnosis) -> None:
+    table = _wrapping(
+        "causes, the largest first; errors on data that was not fitted; 95 % intervals in brackets",
+        ["cause", "parameter", "value", "error falls by", "sure", "or it is"],
+    )
+    for cause in diagnosis.causes:
+        shown = [(words(name), parameter_text(value)) for name, value in cause.parameters.items()] or [("–", "–")]
+        for k, (name, value) in enumerate(shown):
+            of_cause = (
+                (gain_text(cause.held_out), sure(cause.confidence), listed(cause.equivalents) or "–")
+                if k == 0
+                else ("", "", "")
+            )
+            table.add_row(words(cause.name) if k == 0 else "", name, escape(value), *map(escape, of_cause))
+    console.print()
+    console.print(table)
+    for cause in diagnosis.causes:
+        _line(console, _about(cause))
+
+
+def _wrapping(title: str, columns: Sequence[str]) -> Table:
+    """A table that a narrow terminal folds, and does not cut."""
+    table = table_of(title, columns)
+    for column in table.columns:
+        column.no_wrap, column.overflow, column.min_width = False, "fold", None
+    return table
+
+
+def _about(cause: Cause) -> str:
+    return f"{words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
+
+
+def _several(console: Console, heading: str, lines: Sequence[str]) -> None:
+    if not lines:
+        return
+    console.print(f"\n[bold]{heading}[/bold]")
+    for line in lines[:MOST_FAULTS]:
+        _line(console, f"- {line}")
+    if len(lines) > MOST_FAULTS:
+        _line(console, f"- and {len(lines) - MOST_FAULTS} more")
+
+
+def _line(console: Console, text: str) -> None:
+    console.print(escape(text), soft_wrap=True)

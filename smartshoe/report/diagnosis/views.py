@@ -1,0 +1,304 @@
+"""What the figures of a diagnosis show, as numbers: the worst cycle, residuals by load, rate, cycle and frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.result import Trace
+from smartshoe.loading import Cycle, by_rate, cycles, ramps
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SLOPE_S = 0.2  # over which a load's rate is taken
+STANDING_SHARE = 0.004  # of full scale a second: below it the load stands
+FEWEST_IN_A_BIN = 5
+FEWEST_IN_A_CELL = 15  # of the map over load and rate, where the fastest ramps leave few samples
+BINS = 24
+ENOUGH = 20_000  # samples of a recording, to find its ramps
+PLACES = 40  # of a cycle, in a map
+MOST_CYCLES = 80
+
+
+@dataclass(frozen=True, eq=False)
+class Binned:
+    """Mean and standard deviation of a residual in bins of ``x``; empty bins are left out. All (m,)."""
+
+    x: Array
+    mean: Array
+    sd: Array
+
+
+def binned(x: Array, values: Array, bins: int = BINS) -> Binned:
+    """Bins of equal width between the 0.5th and 99.5th percentile of ``x`` (n,)."""
+    if x.size < FEWEST_IN_A_BIN:
+        return Binned(*(np.zeros(0) for _ in range(3)))
+    low, high = (float(edge) for edge in np.percentile(x, [0.5, 99.5]))
+    width = (high - low) / bins or 1.0
+    place = np.clip(((x - low) / width).astype(np.intp), 0, bins - 1)
+    count = np.bincount(place, minlength=bins)
+    total = np.bincount(place, values, bins)
+    square = np.bincount(place, values**2, bins)
+    kept = count >= FEWEST_IN_A_BIN
+    mean = total[kept] / count[kept]
+    variance = np.maximum(square[kept] / count[kept] - mean**2, 0.0)
+    centre = np.bincount(place, x, bins)[kept] / count[kept]
+    return Binned(centre, mean, np.sqrt(variance))
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Every usable sample of every recording, one after the other. All (n,) except ``starts`` and ``names``.
+
+    ``time_s`` runs on from recording to recording, each of which begins at its ``starts``. ``before`` and ``after``
+    are measured less simulated reading, ``judged`` marks what was not fitted (everything where nothing was kept).
+    """
+
+    time_s: Array
+    load_n: Array
+    reading: Array
+    rate_n_per_s: Array
+    cycle: NDArray[np.intp]
+    before: Array
+    after: Array
+    held_out: Mask
+    starts: tuple[float, ...]
+    names: tuple[str, ...]
+    full_scale_load_n: float
+
+    @cached_property
+    def judged(self) -> Mask:
+        """(n,) what was not fitted, or everything where nothing was kept from the fit."""
+        return self.held_out if self.held_out.any() else np.ones(self.held_out.size, dtype=bool)
+
+    @cached_property
+    def is_changed(self) -> bool:
+        """Whether anything was added to the baseline."""
+        return not np.array_equal(self.before, self.after)
+
+    @cached_property
+    def direction(self) -> NDArray[np.intp]:
+        """(n,) 1 while loading, -1 while unloading, 0 while the load stands."""
+        still = STANDING_SHARE * self.full_scale_load_n
+        return np.sign(np.where(np.abs(self.rate_n_per_s) < still, 0.0, self.rate_n_per_s)).astype(np.intp)
+
+
+def evidence(traces: Sequence[Trace], full_scale_load_n: float) -> Evidence | None:
+    """The traces joined; None where no sample can be used."""
+    columns: list[tuple[Array, ...]] = []
+    starts, names = [], []
+    clock, first_cycle = 0.0, 0
+    for trace in traces:
+        good = trace.usable & np.isfinite(trace.reading) & np.isfinite(trace.baseline) & np.isfinite(trace.extended)
+        if good.sum() < 2:
+            continue
+        time_s = trace.time_s - trace.time_s[0]
+        starts.append(clock)
+        names.append(trace.name)
+        columns.append(
+            tuple(
+                np.asarray(column, dtype=float)[good]
+                for column in (
+                    clock + time_s,
+                    trace.load_n,
+                    trace.reading,
+                    slope(trace.time_s, trace.load_n),
+                    trace.cycle + float(first_cycle),
+                    trace.reading - trace.baseline,
+                    trace.reading - trace.extended,
+                    trace.held_out.astype(float),
+                )
+            )
+        )
+        clock += float(time_s[-1])
+        first_cycle += int(trace.cycle[-1]) + 1
+    if not columns:
+        return None
+    time_s, load_n, reading, rate, cycle, before, after, held_out = (
+        np.concatenate([part[k] for part in columns]) for k in range(8)
+    )
+    return Evidence(
+        time_s,
+        load_n,
+        reading,
+        rate,
+        cycle.astype(np.intp),
+        before,
+        after,
+        held_out > 0.5,
+        tuple(starts),
+        tuple(names),
+        full_scale_load_n or float(np.max(np.abs(load_n))) or 1.0,
+    )
+
+
+def slope(time_s: Array, load_n: Array) -> Array:
+    """(n,) the load's rate in N/s over `SLOPE_S`."""
+    if time_s.size < 3:
+        return np.zeros(time_s.size)
+    step_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+    half = min(max(1, round(0.5 * SLOPE_S / step_s)), (time_s.size - 1) // 2)
+    index = np.arange(time_s.size)
+    right, left = np.minimum(index + half, time_s.size - 1), np.maximum(index - half, 0)
+    return np.asarray((load_n[right] - load_n[left]) / (time_s[right] - time_s[left]))
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Samples ``start:stop`` of a trace."""
+
+    trace: Trace
+    start: int
+    stop: int
+
+    @property
+    def span(self) -> slice:
+        """As a slice."""
+        return slice(self.start, self.stop)
+
+
+def worst_cycle(traces: Sequence[Trace]) -> Stretch | None:
+    """The load cycle on which the baseline simulation is furthest off, among those not fitted where there are any."""
+    found: list[tuple[bool, float, Stretch]] = []
+    for trace in traces:
+        edges = np.flatnonzero(np.diff(trace.cycle)) + 1
+        for start, stop in zip([0, *edges], [*edges, trace.cycle.size], strict=True):
+            usable = trace.usable[start:stop] & np.isfinite(trace.baseline[start:stop])
+            if usable.sum() < 8:
+                continue
+            error = (trace.reading - trace.baseline)[start:stop][usable]
+            found.append(
+                (
+                    bool(trace.held_out[start:stop].mean() > 0.5),
+                    float(np.mean(error**2)),
+                    Stretch(trace, int(start), int(stop)),
+                )
+            )
+    if not found:
+        return None
+    return max(found, key=lambda one: one[:2])[2]
+
+
+def loops_at_two_rates(traces: Sequence[Trace]) -> list[tuple[float, Stretch]]:
+    """A cycle at the lowest and one at the highest loading rate (N/s), not fitted ones first; empty without cycles."""
+    owner: dict[int, Stretch] = {}
+    found: list[Cycle] = []
+    for trace in traces:
+        step = max(1, trace.time_s.size // ENOUGH)
+        for cycle in cycles(trace.time_s[::step], trace.load_n[::step]):
+            owner[id(cycle)] = Stretch(trace, step * cycle.start, min(step * cycle.stop, trace.time_s.size))
+            found.append(cycle)
+    groups = by_rate(found)
+    chosen = sorted({min(groups), max(groups)}) if groups else []
+
+    def merit(cycle: Cycle) -> tuple[bool, float]:
+        one = owner[id(cycle)]
+        return bool(one.trace.held_out[one.span].mean() > 0.5), float(np.ptp(one.trace.load_n[one.span]))
+
+    return [(rate, owner[id(max(groups[rate], key=merit))]) for rate in chosen]
+
+
+@dataclass(frozen=True, eq=False)
+class Map:
+    """Mean residuals ``values`` (rows, columns), NaN where there is no data; ``row_edges`` (rows + 1,)."""
+
+    values: Array
+    columns: tuple[str, ...]
+    row_edges: Array
+
+
+def by_load_and_rate(found: Evidence, residual: Array, traces: Sequence[Trace], bins: int = 12) -> Map | None:
+    """Mean residual by load (rows, N) and by the rate of the ramp (columns), unloading left, standing in the middle."""
+    rates = sorted({abs(_two_digits(rate)) for trace in traces for rate in _rates(trace)})
+    if not rates:
+        return None
+    classes = _merged(rates)
+    signed = [-rate for rate in reversed(classes)] + [0.0, *classes]
+    speed = np.abs(found.rate_n_per_s)
+    nearest = np.argmin(np.abs(np.log(np.maximum(speed, 1e-9))[:, None] - np.log(np.array(classes))[None, :]), axis=1)
+    column = len(classes) + found.direction * (1 + nearest)
+    low, high = (float(edge) for edge in np.percentile(found.load_n, [0.1, 99.9]))
+    edges = np.linspace(low, high if high > low else low + 1.0, bins + 1)
+    row = np.clip(np.searchsorted(edges, found.load_n, "right") - 1, 0, bins - 1)
+    names = tuple("held" if rate == 0 else f"{rate:+g}" for rate in signed)
+    values = _means(row, column, residual, bins, len(signed), FEWEST_IN_A_CELL)
+    return Map(values, names, edges)
+
+
+def by_place_and_cycle(found: Evidence, residual: Array) -> Map | None:
+    """Mean residual by place within the load cycle (rows, percent of its time) and by cycle (columns)."""
+    numbers = int(found.cycle.max()) + 1
+    if numbers < 2:
+        return None
+    first = np.full(numbers, np.inf)
+    last = np.full(numbers, -np.inf)
+    np.minimum.at(first, found.cycle, found.time_s)
+    np.maximum.at(last, found.cycle, found.time_s)
+    length = np.maximum(last - first, 1e-9)[found.cycle]
+    row = np.clip(((found.time_s - first[found.cycle]) / length * PLACES).astype(np.intp), 0, PLACES - 1)
+    group = -(-numbers // MOST_CYCLES)
+    columns = -(-numbers // group)
+    values = _means(row, found.cycle // group, residual, PLACES, columns, FEWEST_IN_A_BIN)
+    edges = np.linspace(0.0, 100.0, PLACES + 1)
+    return Map(values, tuple(str(1 + group * k) for k in range(columns)), edges)
+
+
+def _means(
+    row: NDArray[np.intp], column: NDArray[np.intp], values: Array, rows: int, columns: int, fewest: int
+) -> Array:
+    flat = row * columns + column
+    count = np.bincount(flat, minlength=rows * columns).astype(float)
+    total = np.bincount(flat, values, rows * columns)
+    return np.where(count >= fewest, total / np.maximum(count, 1.0), np.nan).reshape(rows, columns)
+
+
+def _rates(trace: Trace) -> list[float]:
+    step = max(1, trace.time_s.size // ENOUGH)
+    return [ramp.rate_n_per_s for ramp in ramps(trace.time_s[::step], trace.load_n[::step])]
+
+
+def _two_digits(value: float) -> float:
+    return float(f"{value:.2g}")
+
+
+def _merged(rates: Sequence[float], alike: float = 0.25, most: int = 6) -> list[float]:
+    """Rates with those that lie within ``alike`` of each other as one, at most ``most`` of them."""
+    kept: list[list[float]] = []
+    for rate in rates:
+        if rate <= 0:
+            continue
+        if kept and rate <= (1.0 + alike) * kept[-1][0]:
+            kept[-1].append(rate)
+        else:
+            kept.append([rate])
+    means = [_two_digits(float(np.median(group))) for group in kept]
+    if len(means) > most:
+        means = [means[k] for k in np.unique(np.linspace(0, len(means) - 1, most).round().astype(int))]
+    return means
+
+
+def spectrum(found: Evidence, residual: Array) -> tuple[Array, Array]:
+    """Frequency (m,) in Hz and amplitude spectral density (m,) of the residual, evened out over log frequency.
+
+    Frequencies at which there is nothing are left out.
+    """
+    from matplotlib import mlab
+
+    time_s = found.time_s
+    gaps = np.diff(time_s)
+    step_s = float(np.median(gaps[gaps > 0])) if np.any(gaps > 0) else 1.0
+    length = int(min(residual.size, max(256, 2 ** int(np.log2(max(residual.size / 4, 2))))))
+    density: tuple[Array, Array] = mlab.psd(  # type: ignore[assignment]
+        residual - residual.mean(), NFFT=length, Fs=1.0 / step_s, noverlap=length // 2, window=np.hanning(length)
+    )
+    power, frequency = density[0][1:], density[1][1:]
+    place = np.floor(24 * np.log10(frequency / frequency[0])).astype(np.intp)
+    count = np.bincount(place)
+    kept = (count > 0) & (np.bincount(place, power) > 0)
+    mean = np.bincount(place, power)[kept] / count[kept]
+    return np.bincount(place, frequency)[kept] / count[kept], np.sqrt(mean)

@@ -1,0 +1,57 @@
+"""What every figure of a report shares: its look, its thinning, its SVG text."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MOST = 900  # points of a line
+STYLE: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "smartshoe",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e5e7eb",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+}
+
+
+def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
+    """At most about `MOST` points that keep each stretch's extremes of the first signal."""
+    if x.size <= MOST:
+        return (x, *signals)
+    block = -(-x.size // (MOST // 2))
+    count = x.size // block
+    cut = signals[0][: count * block].reshape(count, block)
+    start = np.arange(count) * block
+    index = np.unique(np.concatenate([start + cut.argmin(axis=1), start + cut.argmax(axis=1), [0, x.size - 1]]))
+    return (x[index], *(signal[index] for signal in signals))
+
+
+def svg(figure: Figure) -> str:
+    """The figure as an SVG element, the same bytes every time."""
+    buffer = io.StringIO()
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def figure_of(width: float, height: float, columns: int, rows: int = 1) -> tuple[Figure, list[Any]]:
+    """A figure of ``width`` by ``height`` inches and its axes, row by row."""
+    figure = Figure(figsize=(width, height))
+    axes = figure.subplots(rows, columns, squeeze=False)
+    # Fixed margins (in inches over the size): a tight layout would draw every text twice.
+    figure.subplots_adjust(0.75 / width, 0.45 / height, 1 - 0.15 / width, 1 - 0.3 / height, 0.25, 0.3)
+    return figure, list(axes.ravel())

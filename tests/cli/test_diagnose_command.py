@@ -1,0 +1,178 @@
+"""``smartshoe diagnose`` as its users' scripts see it: the contract's keys, what files it writes, exit statuses."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import smartshoe
+import smartshoe.diagnosis
+from simulators.hidden import hide
+from smartshoe.cli import run_command
+from smartshoe.protocol import Protocol, Segment, dynamic_protocol
+
+CONTRACT: dict[str, Any] = {
+    "schema": None,
+    "verdict": None,
+    "causes": {
+        "effect": None,
+        "family": None,
+        "stage": None,
+        "confidence": None,
+        "equivalents": None,
+        "parameters": None,
+        "evidence": {"statistic": None, "value": None, "threshold": None, "says": None},
+        "held_out": {"rmse_before": None, "rmse_after": None, "unit": None, "gain_percent": None, "ci95": None},
+    },
+    "data_faults": {"kind": None, "where": None, "share": None, "says": None},
+    "baseline": {"rmse": None, "fit_percent": None, "force_rmse_n": None},
+    "extended": {"rmse": None, "fit_percent": None, "force_rmse_n": None},
+    "explainable_percent": None,
+    "explained_percent": None,
+    "rivals": {"effect": None, "margin": None},
+    "next_experiment": {"separates": None, "protocol": None, "channel": None, "says": None},
+    "limits": None,
+}
+
+
+def holds(found: Any, wanted: Any) -> bool:
+    """Whether every key of ``wanted`` is in ``found``; a list is held to it entry by entry, null is let pass."""
+    if isinstance(found, list):
+        return wanted is None or all(holds(one, wanted) for one in found)
+    if wanted is None or found is None:
+        return True
+    return all(key in found and holds(found[key], below) for key, below in wanted.items())
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Two experiments of a unit that leaks, as tables: one to fit, one to hold out."""
+    triangles = dynamic_protocol((200.0, 800.0), repeats=3, rest_s=2.0).segments
+    held = (Segment("ramp", 600.0, 3.0), Segment("hold", 600.0, 20.0), Segment("ramp", 0.0, 3.0))
+    steps = Protocol("short", (*triangles, *held, Segment("rest", 0.0, 10.0)))
+    case = hide(
+        ["linear_leak"], strength_percent_fs=3.0, protocol=steps, seed=5, nuisances=0, recordings=1, sample_rate_hz=50.0
+    )
+    folder = tmp_path_factory.mktemp("leak")
+    paths = folder / "first.csv", folder / "second.csv"
+    for recording, path in zip((*case.recordings, *case.hold_out), paths, strict=True):
+        smartshoe.write(recording, path)
+    return paths
+
+
+def test_one_command_writes_page_result_and_calibration(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, result, calibration = tmp_path / "out", tmp_path / "d.json", tmp_path / "c.json"
+    words = ["diagnose", str(files[0]), "--hold-out", str(files[1]), "--unit", "toe <b>"]
+    assert run_command([*words, "--json", str(result), "--out", str(out), "--calibration", str(calibration)]) == 0
+    said = capsys.readouterr().out
+    found = json.loads(result.read_text())
+    assert found["schema"] == "smartshoe.diagnosis/1"
+    assert holds(found, CONTRACT)
+    assert found["causes"][0]["family"] == "leak"
+    assert found["extended"]["rmse"]["value"] < found["baseline"]["rmse"]["value"]
+
+    assert said.splitlines()[0].startswith("toe <b>: ")
+    assert found["causes"][0]["effect"].replace("_", " ") in said
+    assert "before and after" in said
+    assert f"report: {out / 'diagnosis.html'}" in said
+
+    assert json.loads((out / "diagnosis.json").read_text()) == found
+    page = (out / "diagnosis.html").read_text()
+    assert "Diagnosis of toe &lt;b&gt;" in page
+    assert found["causes"][0]["says"][1:] in page
+    for protocol in out.glob("*.toml"):
+        table = tomllib.loads(protocol.read_text())["protocol"]
+        assert next(iter(table.values()))["kind"] == "segments"
+
+    saved = json.loads(calibration.read_text())
+    assert saved["unit"] == "toe <b>"
+    assert found["causes"][0]["effect"] in saved["extended"]["effects"]
+    estimate = tmp_path / "force.csv"
+    assert run_command(["compensate", str(files[1]), "--calibration", str(calibration), "--out", str(estimate)]) == 0
+    force_n = smartshoe.read(estimate).channels["force_estimate"].si
+    assert float(np.sqrt(np.mean((force_n - smartshoe.read(files[1]).force_n) ** 2))) < 40.0
+
+
+def test_a_dash_for_json_leaves_nothing_else_on_stdout(
+    files: tuple[Path, Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from smartshoe.diagnosis.result import Diagnosis
+
+    def quick(*_: Any, **options: Any) -> Diagnosis:
+        assert options["material"] == pytest.approx(0.0005)
+        assert len(options["hold_out"]) == 1
+        options["progress"]("a step")
+        return Diagnosis("adequate", "nothing matters", "mbar", 800.0, 70.0)
+
+    monkeypatch.setattr(smartshoe.diagnosis, "diagnose", quick)
+    words = ["diagnose", str(files[0]), "--hold-out", str(files[1]), "--material", "0.05", "--json", "-"]
+    assert run_command(words) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"] == "adequate"
+
+
+def _dead(path: Path) -> Path:
+    """A table whose reading never leaves zero."""
+    time_s = np.arange(0.0, 40.0, 0.02)
+    load_n = 400.0 * (1.0 - np.cos(time_s))
+    rows = np.column_stack([time_s, load_n, np.zeros(time_s.size)])
+    np.savetxt(path, rows, delimiter=",", header="time_s,force_n,pressure_mbar", comments="", fmt="%.6g")
+    return path
+
+
+def test_hopeless_data_is_refused_in_one_sentence_and_the_json_says_so_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table, result, out, calibration = _dead(tmp_path / "dead.csv"), *(tmp_path / n for n in ("d.json", "out", "c.json"))
+    words = ["diagnose", str(table), "--json", str(result), "--out", str(out), "--calibration", str(calibration)]
+    assert run_command(words) == 5
+    heard = capsys.readouterr()
+    last = heard.err.strip().splitlines()[-1]
+    assert last.startswith("error: ")
+    assert "dead.csv" in last
+    assert heard.out == ""
+    found = json.loads(result.read_text())
+    assert found["verdict"] == "refused"
+    assert holds(found, CONTRACT)
+    assert last == f"error: {found['limits'][0]}"
+    assert "No diagnosis" in (out / "diagnosis.html").read_text()
+    assert not calibration.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "says"),
+    [
+        (["{0}", "--hold-out", "{0}"], 2, "to be fitted and held out at once"),
+        (["{0}", "--material", "0"], 2, "--material"),
+        (["{0}", "--material", "nan"], 2, "--material"),
+        (["{0}", "--force", "no_such"], 3, "no_such"),
+        (["no_such.csv"], 3, "no_such.csv"),
+        (["{0}", "--hold-out", "no_such.csv"], 3, "no_such.csv"),
+        ([], 2, "FILES"),
+    ],
+)
+def test_errors_are_one_sentence_and_leave_no_file(
+    words: list[str], status: int, says: str, files: tuple[Path, Path], tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    result = tmp_path / "d.json"
+    spoken = [word.format(str(files[0])) for word in words]
+    assert run_command(["diagnose", *spoken, "--json", str(result)]) == status
+    heard = capsys.readouterr()
+    assert says in heard.err.strip().splitlines()[-1]
+    assert "Traceback" not in heard.err
+    assert heard.out == ""
+    assert not result.exists()
+
+
+def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["diagnose", "--help"]) == 0
+    said = capsys.readouterr().out
+    assert "Example: smartshoe diagnose" in said
+    assert "--hold-out" in said

@@ -1,0 +1,425 @@
+"""The page and the table of a diagnosis: its facts in a person's words, for every verdict, whatever the names are."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from smartshoe.diagnosis.integrity import DataFault
+from smartshoe.diagnosis.judgement import Gain
+from smartshoe.diagnosis.result import Cause, Diagnosis, NextExperiment, Rival, Standing, Statement, Trace
+from smartshoe.models.effects import Conditions, Effect, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import Parameter
+from smartshoe.protocol import Protocol, Segment, dynamic_protocol
+from smartshoe.report.diagnosis.page import write_diagnosis_page
+from smartshoe.report.diagnosis.protocol_file import protocol_text
+from smartshoe.report.diagnosis.sentences import (
+    HEADINGS,
+    gain_sentence,
+    interval,
+    listed,
+    parameter_text,
+    shares,
+    sure,
+    two_numbers,
+)
+from smartshoe.report.diagnosis.terminal import print_diagnosis
+from smartshoe.report.diagnosis.views import binned, evidence, loops_at_two_rates, worst_cycle
+
+NAME = '<script>alert("1")</script> & $x$'
+FULL_LOAD_N, FULL_READING, STEP_S = 800.0, 70.0, 0.02
+CASES = ("adequate", "one cause", "two causes", "partly_explained", "unexplained", "refused")
+BASELINE = ExtendedModel(1.0, 0.12, 0.2, FULL_LOAD_N, FULL_READING, "mbar")
+
+
+def _with(name: str, strength: float) -> tuple[Effect, np.ndarray]:
+    """An effect with its first strength away from null."""
+    one = effect(name)
+    values = one.start()
+    values[next(k for k, parameter in enumerate(one.parameters) if parameter.null is not None)] = strength
+    return one, values
+
+
+LEAK, PLAY = _with("linear_leak", 0.002), _with("play_hysteresis", 0.012)
+
+
+def _load(peak_n: float) -> tuple[np.ndarray, np.ndarray]:
+    triangles = dynamic_protocol((100.0, 400.0, 800.0), peak_n=peak_n, repeats=2, rest_s=3.0)
+    held = (Segment("ramp", peak_n, 2.0), Segment("hold", peak_n, 20.0), Segment("ramp", 0.0, 2.0))
+    whole = Protocol("both", (*triangles.segments, *held, Segment("rest", 0.0, 10.0)))
+    time_s = np.arange(0.0, whole.duration_s, STEP_S)
+    return time_s, whole.load_at(time_s)
+
+
+@cache
+def _traces(parts: tuple[str, ...], found: tuple[str, ...], step_in_gain: float = 0.0) -> tuple[Trace, ...]:
+    """Two recordings of a unit with ``parts``, of which the extended model knows those ``found``."""
+    rng = np.random.default_rng(3)
+    traces = []
+    for index, peak_n in enumerate((800.0, 720.0)):
+        time_s, load_n = _load(peak_n)
+        conditions = Conditions(time_s, load_n / FULL_LOAD_N, STEP_S)
+        truth, extended = BASELINE, BASELINE
+        for name, (one, values) in (("leak", LEAK), ("play", PLAY)):
+            truth = truth.with_part(one, values) if name in parts else truth
+            extended = extended.with_part(one, values) if name in found else extended
+        reading = truth.reading(conditions) * (1.0 + step_in_gain * (time_s > 30.0)) + rng.normal(0, 0.1, time_s.size)
+        traces.append(
+            Trace(
+                f"triangles_{index + 1}",
+                time_s,
+                load_n,
+                reading,
+                BASELINE.reading(conditions),
+                extended.reading(conditions),
+                np.ones(time_s.size, dtype=bool),
+                np.full(time_s.size, index == 1),
+                np.minimum(time_s // 8, 11).astype(np.intp),
+            )
+        )
+    return tuple(traces)
+
+
+def _standing(trace: Trace, simulated: np.ndarray, structure: float) -> Standing:
+    rmse = float(np.sqrt(np.mean((trace.reading - simulated) ** 2)))
+    return Standing(rmse, "mbar", 100 * (1 - rmse / float(np.std(trace.reading))), 12.3 * rmse, structure)
+
+
+LEAK_CAUSE = Cause(
+    LEAK[0],
+    0.9931,
+    (),
+    {"leak_rate": Parameter.from_sd(0.002, 0.00003, "1/s")},
+    (Statement("fall", 1234.0, 30.0, "without it the fit is worse by 1234 where 30 would do"),),
+    Gain(0.8, 0.31, "mbar", 61.3, (55.0, 66.0)),
+    0.011,
+    (Rival("zero_drift", 88.0),),
+)
+PLAY_CAUSE = Cause(
+    PLAY[0],
+    0.62,
+    ("bouc_wen_hysteresis",),
+    {"half_height": Parameter.from_sd(9.6, 0.4, "N"), "width": Parameter.from_sd(80.0, math.nan, "N")},
+    (Statement("fall", 321.0, 30.0, "without it the fit is worse by 321 where 30 would do"),),
+    Gain(0.33, 0.31, "mbar", 6.1, (2.0, 9.0)),
+    0.004,
+    (Rival("bouc_wen_hysteresis", 1.7), Rival("dead_band", 45.0)),
+)
+LOOPS = Protocol("minor_loops", (Segment("ramp", 400.0, 4.0), Segment("ramp", 200.0, 2.0), Segment("ramp", 0.0, 2.0)))
+FAULTS = (
+    DataFault("held_samples", 0, "triangles_1", 5.0, 5.6, 0.02, "a value repeats while the load moves", "material"),
+    DataFault("spikes", 1, "triangles_2", 40.0, 40.02, 1e-5, "one sample stands alone", "minor"),
+)
+SCREENING = (("linear_leak", 5000.0), ("zero_drift", 4900.0), ("play_hysteresis", 310.0), ("delay", 0.0))
+LIKENESS = np.array([[1, 0.99, 0.2, 0.1], [0.99, 1, 0.2, 0.1], [0.2, 0.2, 1, 0.5], [0.1, 0.1, 0.5, math.nan]])
+
+
+def case(name: str) -> Diagnosis:
+    """A diagnosis made by hand, one for each verdict and for one and two causes."""
+    if name == "refused":
+        reason = "triangles_1: there is no reference load: name it with --force"
+        return Diagnosis(
+            "refused", f"no diagnosis: {reason}", "mbar", 0.0, 0.0, data_faults=FAULTS[:1], limits=(reason,)
+        )
+    both = ("leak", "play")
+    traces = {
+        "adequate": lambda: _traces((), ()),
+        "one cause": lambda: _traces(("leak",), ("leak",)),
+        "two causes": lambda: _traces(both, both),
+        "partly_explained": lambda: _traces(both, ("leak",)),
+        "unexplained": lambda: _traces((), (), 0.02),
+    }[name]()
+    judged = traces[-1]
+    causes = {"one cause": (LEAK_CAUSE,), "two causes": (LEAK_CAUSE, PLAY_CAUSE), "partly_explained": (LEAK_CAUSE,)}
+    left = "70 % of it sits at 50-75 % of the load while unloading"
+    made = Diagnosis(
+        "explained" if "cause" in name else name,  # type: ignore[arg-type]
+        f"the verdict on {name}",
+        "mbar",
+        FULL_LOAD_N,
+        FULL_READING,
+        causes=causes.get(name, ()),
+        minor=("sensor_lag",) if name == "two causes" else (),
+        data_faults=FAULTS if name in ("two causes", "partly_explained") else (),
+        baseline=_standing(judged, judged.baseline, 0.0 if name == "adequate" else 0.7),
+        extended=_standing(judged, judged.extended, 0.2 if name == "partly_explained" else 0.0),
+        gain=Gain(0.9, 0.2, "mbar", 77.7, (70.0, 80.0)),
+        explainable_percent=3.0 if name == "adequate" else 92.0,
+        explained_percent={"adequate": 0.4, "unexplained": 0.0, "partly_explained": 61.0}.get(name, 90.5),
+        rivals=(Rival("zero_drift", 88.0),),
+        limits=("one loading rate only: nothing can be said of rate dependence",) if name == "one cause" else (),
+        leftover=left if name in ("partly_explained", "unexplained") else None,
+        screening=SCREENING,
+        likeness=LIKENESS,
+        traces=traces,
+    )
+    if name != "two causes":
+        return made
+    following = NextExperiment(
+        ("play_hysteresis", "bouc_wen_hysteresis"), "minor_loops", None, "run minor loops", 35.2, LOOPS
+    )
+    return replace(made, next_experiment=following)
+
+
+@cache
+def page(name: str) -> str:
+    """The page's text, written once a case."""
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_diagnosis_page(Path(folder) / "diagnosis.html", case(name), "Diagnosis", {"fitted": "a"}, "x.toml")
+        return path.read_text(encoding="utf-8")
+
+
+def plain_text(html: str) -> str:
+    """What a person reads: no tags, no style, spaces as one."""
+    import html as escapes
+
+    kept = re.sub(r"<style.*?</style>|<metadata.*?</metadata>|<!--.*?-->", "", html, flags=re.DOTALL)
+    return " ".join(escapes.unescape(re.sub(r"<[^>]+>", " ", kept)).split())
+
+
+class _Balance(HTMLParser):
+    void = frozenset({"meta", "br", "link", "img"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        if tag not in self.void:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_page_is_whole_and_says_no_number_that_is_none(name: str) -> None:
+    html = page(name)
+    parser = _Balance()
+    parser.feed(html)
+    assert parser.open == []
+    assert "script" not in parser.tags
+    assert len(html.encode()) < 3_000_000
+    assert not re.search(r'(?:src|href)="https?:', re.sub(r"<svg.*?</svg>", "", html, flags=re.DOTALL))
+    for drawn in re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL):
+        ET.fromstring(drawn)
+    text = plain_text(html)
+    assert not re.search(r"\b(nan|inf|None|True|False)\b", text)
+    assert HEADINGS[case(name).verdict] in text
+    assert case(name).says[1:] in text
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_sections_come_in_the_order_in_which_a_person_asks(name: str) -> None:
+    asked = ["verdict", "beside", "why", "gained", "left", "faults", "limits", "next"]
+    found = re.findall(r'<section id="(\w+)">', page(name))
+    assert found == [section for section in asked if section in found]
+    assert {"verdict", "faults", "limits", "next"} <= set(found)
+    assert ("beside" in found) is (name != "refused")
+    for target in re.findall(r'href="#(\w+)"', re.sub(r"<svg.*?</svg>", "", page(name), flags=re.DOTALL)):
+        assert target in found
+
+
+def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be() -> None:
+    text = plain_text(page("two causes"))
+    assert "1. Linear leak over 99 % sure" in text
+    assert "2. Play hysteresis 62 % sure" in text
+    assert LEAK[0].says[1:] in text
+    assert "0.002000 [0.001941, 0.002059] 1/s" in text
+    assert "9.60 [8.82, 10.38] N" in text
+    assert "0.800 mbar without it and 0.310 mbar with it: it falls by 61 % [55, 66]" in text
+    assert "Without it the fit is worse by 321 where 30 would do." in text
+    assert "This data cannot tell it from bouc wen hysteresis" in text
+    assert effect("bouc_wen_hysteresis").says in text
+    assert "the nearest, zero drift, fits worse by 88" in text
+    assert "too small to be named as causes: sensor lag" in text
+
+
+def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
+    made = case("two causes")
+    text = plain_text(page("two causes"))
+    assert made.baseline is not None
+    assert made.extended is not None
+    assert f"{made.baseline.rmse:.2f} mbar ({100 * made.baseline.rmse / FULL_READING:.1f} %)" in text
+    assert f"{made.baseline.fit_percent:.2f} % {made.extended.fit_percent:.2f} %" in text
+    assert "error of the compensated force" in text
+    assert "explained: 90.5 %" in text
+    assert "left: 1.5 %" in text
+    assert "noise: 8.0 %" in text
+    assert "90.5 % is explained: 98 % of that" in text
+
+
+def test_faults_left_over_and_the_next_experiment_are_told() -> None:
+    text = plain_text(page("two causes"))
+    assert "Held samples, triangles_1, 5–5.6 s (2.0 % of the samples): a value repeats while the load moves." in text
+    assert "under 0.01 % of the samples" in text
+    assert "It tells play hysteresis and bouc wen hysteresis apart, with an expected margin of 35" in text
+    assert "x.toml" in text
+    assert "70 % of it sits at 50-75 % of the load while unloading." in plain_text(page("partly_explained"))
+    assert "no reference load: name it with --force" in plain_text(page("refused"))
+
+
+def test_nothing_is_named_where_nothing_was_found() -> None:
+    for name in ("adequate", "unexplained"):
+        text = plain_text(page(name))
+        assert "sure ·" not in text
+        assert "Nothing that matters was added." in text
+    assert "none is named" in plain_text(page("unexplained"))
+
+
+def test_names_and_sentences_from_files_are_escaped(tmp_path: Path) -> None:
+    made = case("two causes")
+    traces = tuple(replace(trace, name=NAME) for trace in made.traces)
+    faults = tuple(replace(fault, label=NAME, says=NAME) for fault in made.data_faults)
+    hostile = replace(made, says=NAME, unit="m$b", limits=(NAME,), traces=traces, data_faults=faults, leftover=NAME)
+    html = write_diagnosis_page(tmp_path / "x.html", hostile, NAME, {NAME: NAME}).read_text(encoding="utf-8")
+    assert "<script" not in html
+    parser = _Balance()
+    parser.feed(html)
+    assert parser.open == []
+    assert NAME in plain_text(html)
+
+
+def test_a_page_of_unusual_data_is_written_all_the_same(tmp_path: Path) -> None:
+    """One recording, nothing held out, a load that never turns, a simulation that runs away, samples missing."""
+    time_s = np.linspace(0.0, 9.0, 300)
+    steady = np.full(300, 500.0)
+    runaway = np.where(time_s > 8, np.inf, 1.0)
+    usable = time_s > 1
+    trace = Trace(
+        "t", time_s, steady, np.ones(300), np.zeros(300), runaway, usable, ~usable & usable, np.zeros(300, int)
+    )
+    made = replace(case("one cause"), traces=(trace,), likeness=None, screening=(), gain=None)
+    html = write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8")
+    assert "Where the simulation leaves the measurement" in html
+    assert not re.search(r"\b(nan|inf)\b", plain_text(html))
+    nothing = replace(trace, usable=np.zeros(300, dtype=bool))
+    html = write_diagnosis_page(tmp_path / "y.html", replace(made, traces=(nothing,)), "t", {}).read_text()
+    assert "Where the simulation leaves the measurement" not in html
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_terminal_says_the_verdict_first_and_everything_after(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = case(name)
+    print_diagnosis(made, "left_toe")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"left_toe: {HEADINGS[made.verdict]}"
+    said = "\n".join(lines)
+    assert not re.search(r"\b(nan|inf|None)\b", said)
+    for cause in made.causes:
+        assert cause.name.replace("_", " ") in said
+        assert f"{cause.held_out.gain_percent:.0f}" in said
+    for text in (*made.limits, made.leftover, *(fault.says for fault in made.data_faults)):
+        assert text is None or text in said
+    if made.causes:
+        assert "[0.001941, 0.002059] 1/s" in said
+    if made.next_experiment:
+        assert "run minor loops" in said
+
+
+def test_a_protocol_becomes_a_table_that_toml_reads_back() -> None:
+    steps = Protocol('odd "name" 1', LOOPS.segments)
+    table = tomllib.loads(protocol_text(steps, ["why\nit is run " * 30]))["protocol"]["odd_name_1"]
+    assert table["kind"] == "segments"
+    time_s, load_n = LOOPS.corners()
+    np.testing.assert_allclose(np.array(table["corners"]), np.column_stack([time_s, load_n]))
+
+
+def test_the_worst_cycle_is_the_one_with_the_largest_error_among_those_held_out() -> None:
+    traces = _traces((), (), 0.02)
+    found = worst_cycle(traces)
+    assert found is not None
+    assert found.trace is traces[1]
+    error = (found.trace.reading - found.trace.baseline) ** 2
+    means = [float(error[found.trace.cycle == k].mean()) for k in range(int(found.trace.cycle.max()) + 1)]
+    assert float(error[found.span].mean()) == pytest.approx(max(means))
+
+
+def test_loops_are_taken_at_the_slowest_and_the_fastest_rate() -> None:
+    rates = [rate for rate, _ in loops_at_two_rates(_traces((), ()))]
+    assert rates == [pytest.approx(100, rel=0.05), pytest.approx(800, rel=0.1)]
+
+
+def test_bins_keep_the_mean_and_the_spread() -> None:
+    x = np.linspace(0.0, 1.0, 10_001)
+    noise = np.random.default_rng(0).normal(0.0, 0.1, x.size)
+    found = binned(x, 2.0 * x + noise, 20)
+    np.testing.assert_allclose(found.mean, 2.0 * found.x, atol=5 * 0.1 / math.sqrt(500))
+    np.testing.assert_allclose(found.sd, math.hypot(0.1, 2 * 0.05 / math.sqrt(12)), rtol=0.2)
+
+
+def test_residuals_run_on_from_recording_to_recording() -> None:
+    traces = _traces((), ())
+    found = evidence(traces, FULL_LOAD_N)
+    assert found is not None
+    assert np.all(np.diff(found.time_s) >= 0)
+    assert found.cycle.max() == sum(int(trace.cycle[-1]) + 1 for trace in traces) - 1
+    assert found.judged.sum() == traces[1].time_s.size
+    assert set(np.unique(found.direction)) == {-1, 0, 1}
+
+
+percent = st.floats(-50.0, 150.0)
+
+
+@given(percent, percent)
+def test_shares_are_a_whole_whatever_was_estimated(explained: float, explainable: float) -> None:
+    part = shares(replace(case("refused"), explained_percent=explained, explainable_percent=explainable))
+    assert min(part.explained, part.left, part.noise) >= 0.0
+    assert part.explained + part.left + part.noise == pytest.approx(100.0)
+
+
+@given(st.floats(-1e4, 1e4), st.floats(1e-6, 1e4))
+def test_an_interval_keeps_value_and_bounds_to_a_tenth_of_its_half_width(value: float, half: float) -> None:
+    said = interval(value, value - half, value + half).replace("−", "-")
+    shown = [float(number) for number in re.findall(r"-?\d[\d.e+-]*", said)]
+    # Two digits of the half width: half a unit of the second one is a twentieth at most.
+    for number, true in zip(shown, (value, value - half, value + half), strict=True):
+        assert number == pytest.approx(true, abs=0.06 * half, rel=1e-3)
+
+
+@given(
+    st.lists(st.floats(-1e3, 1e3), min_size=5, max_size=60).filter(lambda x: max(x) - min(x) > 1e-6),
+    st.floats(-10.0, 10.0),
+)
+def test_bins_of_a_constant_are_that_constant(x: list[float], level: float) -> None:
+    found = binned(np.array(x), np.full(len(x), level), 4)
+    np.testing.assert_allclose(found.mean, level, atol=1e-12)
+    np.testing.assert_allclose(found.sd, 0.0, atol=1e-6)
+
+
+def test_a_gain_that_is_none_is_not_called_one() -> None:
+    assert "it does not fall: −0.84 % [−2.2, 0.41]" in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
+    assert parameter_text(Parameter(0.0, 0.0, (0.0, 0.0), "1/K")) == "held at 0 1/K"
+
+
+def test_words_for_numbers() -> None:
+    assert interval(50.0, 0.5, 50.0) == "50 [0.5, 50]"
+    assert interval(2.0, math.nan, 3.0) == "2.000"
+    assert interval(-0.5, -0.6, -0.4) == "−0.50 [−0.60, −0.40]"
+    assert sure(0.9999) == "over 99 %"
+    assert sure(0.62) == "62 %"
+    assert two_numbers(0.17853, 0.17906) == ("0.1785", "0.1791")
+    assert listed(["a_b", "c", "d"]) == "a b, c or d"
+    part = shares(replace(case("refused"), explained_percent=120.0, explainable_percent=50.0))
+    assert (part.explained, part.left, part.noise) == (100.0, 0.0, 0.0)
