@@ -70,7 +70,10 @@ def command(
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
-            written = _publish(folder, found, title, _facts(recordings, others))
+            from smartshoe.cli.output import to_json
+            from smartshoe.report.diagnosis.folder import publish_diagnosis
+
+            written = publish_diagnosis(folder, found, title, _facts(recordings, others), to_json(found.to_dict()))
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, recordings, unit)
@@ -112,41 +115,11 @@ def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, st
     return {**facts, "smartshoe": smartshoe.__version__}
 
 
-def _publish(folder: Path, found: Diagnosis, title: str, facts: dict[str, str]) -> dict[str, Path]:
-    """Write the page, the result and the next experiment's protocol; those to tell of, by what they are."""
-    from smartshoe.atomic import write_text
-    from smartshoe.cli.output import to_json
-    from smartshoe.report.diagnosis.page import write_diagnosis_page
-    from smartshoe.report.diagnosis.protocol_file import protocol_text, table_name
-
-    page = folder / "diagnosis.html"
-    written = {"report": page}
-    protocol_file = None
-    following = found.next_experiment
-    if following is not None and following.steps is not None:
-        protocol_file = f"{table_name(following.steps.name)}.toml"
-        written["next protocol"] = folder / protocol_file
-        write_text(folder / protocol_file, protocol_text(following.steps, [following.says]))
-    write_text(folder / "diagnosis.json", to_json(found.to_dict()))
-    write_diagnosis_page(page, found, f"Diagnosis of {title}", facts, protocol_file)
-    return written
-
-
 def _save_calibration(path: str, found: Diagnosis, recordings: list[Recording], unit: str | None) -> None:
     import datetime
 
-    from smartshoe.compensation import extended_calibration
-
-    if found.model is None:
-        return
-    parameters = {
-        f"{cause.name}.{name}": parameter for cause in found.causes for name, parameter in cause.parameters.items()
-    }
-    extended_calibration(
-        found.model,
+    found.calibration(
         unit=unit or recordings[0].unit or "",
-        parameters=parameters,
-        covariance=tuple((math.nan,) * len(parameters) for _ in parameters),
         sample_rate_hz=1.0 / recordings[0].sample_time_s,
         created=datetime.datetime.now(datetime.UTC).date().isoformat(),
     ).save(path)

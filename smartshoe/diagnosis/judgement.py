@@ -37,7 +37,9 @@ class Errors:
 
 def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
     """The errors over what is held out."""
-    squares, counts, readings = [], [], []
+    squares: list[Array] = []
+    counts: list[Array] = []
+    readings: list[Array] = []
     for session in sessions:
         judged = session.judged
         residual = session.reading - model.simulate(session.conditions)
@@ -45,8 +47,8 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
         if not cycle.size:
             continue
         number = int(session.cycle[-1]) + 1
-        squares.append(np.bincount(cycle, residual[judged] ** 2, number))
-        counts.append(np.bincount(cycle, minlength=number).astype(float))
+        squares.append(np.bincount(cycle, residual[judged] ** 2, number).astype(np.float64))
+        counts.append(np.bincount(cycle, minlength=number).astype(np.float64))
         readings.append(session.reading[judged])
     if not squares:
         return Errors(np.zeros(1), np.zeros(1), 0.0)

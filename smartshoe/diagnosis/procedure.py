@@ -15,7 +15,8 @@ from smartshoe.diagnosis.integrity import Integrity, examine
 from smartshoe.diagnosis.judgement import Errors, errors, gain
 from smartshoe.diagnosis.leftover import Leftover, leftover_of
 from smartshoe.diagnosis.next_experiment import next_experiment
-from smartshoe.diagnosis.parameters import parameters_of
+from smartshoe.diagnosis.noise_kinds import noise_kinds
+from smartshoe.diagnosis.parameters import joint_parameters, parameters_of
 from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
 from smartshoe.diagnosis.selection import MATERIAL, Choice, choose, penalty
 from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
@@ -99,9 +100,13 @@ def _diagnosed(
     if verdict == "unexplained":
         extended, after, after_all = choice.baseline.model, before, baseline
     # What the best model leaves is noise but for the structure in it.
-    noise = max(best.rmse**2 - last.rms**2, 0.0)
-    wrong = float(np.sqrt(max(baseline.rmse**2 - noise, 0.0)))
+    noise_variance = max(best.rmse**2 - last.rms**2, 0.0)
+    wrong = float(np.sqrt(max(baseline.rmse**2 - noise_variance, 0.0)))
+    # Structure that no effect explains would be taken for coloured noise.
+    noise = noise_kinds(fine, extended, integrity.faults) if verdict in ("adequate", "explained") else []
     named = [cause.name for cause in causes]
+    fitted_to = choice.baseline if verdict == "unexplained" else choice.fit
+    parameters, covariance = joint_parameters(fitted_to, scale)
     return Diagnosis(
         verdict,
         _sentence(verdict, causes, wrong, after.rms),
@@ -110,11 +115,11 @@ def _diagnosed(
         scale.reading,
         causes=tuple(causes),
         minor=tuple(name for name in extended.names if name not in named),
-        data_faults=integrity.faults,
+        data_faults=(*integrity.faults, *noise),
         baseline=_standing(baseline, choice.baseline.model, before, fine, scale),
         extended=_standing(after_all, extended, after, fine, scale),
         gain=gain(baseline, after_all, scale),
-        explainable_percent=_percent_less(noise, baseline.rmse**2),
+        explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(after_all.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _candidates(choice),
         next_experiment=next_experiment(choice, causes, traits, sessions),
@@ -124,6 +129,8 @@ def _diagnosed(
         likeness=choice.screening.likeness,
         model=extended,
         baseline_model=choice.baseline.model,
+        parameters=parameters,
+        covariance=covariance,
         traces=tuple(_trace(session, choice.baseline.model, extended, scale) for session in fine),
     )
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.judgement import Gain
+from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
+
+if TYPE_CHECKING:
+    from smartshoe.compensation import Calibration
 
 Array = NDArray[np.float64]
 Verdict = Literal["adequate", "explained", "partly_explained", "unexplained", "refused"]
@@ -147,7 +152,8 @@ class Diagnosis:
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
     ``minor``: effects that are significant but immaterial; they stay in the model and are no causes.
-    ``leftover`` says where the remaining structure sits.
+    ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
+    ``effect.parameter``, with their ``covariance``.
     """
 
     verdict: Verdict
@@ -172,6 +178,27 @@ class Diagnosis:
     model: ExtendedModel | None = None
     baseline_model: ExtendedModel | None = None
     traces: tuple[Trace, ...] = field(default=())
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    covariance: tuple[tuple[float, ...], ...] = ()
+
+    def calibration(self, *, unit: str = "", sample_rate_hz: float = 100.0, created: str = "") -> Calibration:
+        """The extended model as a calibration, for `compensate`, `export` and a twin.
+
+        Raises `NotIdentifiableError` where the diagnosis was refused.
+        """
+        from smartshoe.compensation import extended_calibration
+
+        if self.model is None:
+            raise NotIdentifiableError(f"there is no model to calibrate by: {self.says}")
+        return extended_calibration(
+            self.model,
+            unit=unit,
+            parameters=self.parameters,
+            covariance=self.covariance,
+            load_range_n=(0.0, self.full_scale_load_n),
+            sample_rate_hz=sample_rate_hz,
+            created=created,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Schema ``smartshoe.diagnosis/1``."""

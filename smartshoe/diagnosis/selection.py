@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from smartshoe.diagnosis.noise import white
 from smartshoe.diagnosis.screen import Screened, Screening, dictionary, noise_of, screen
 from smartshoe.diagnosis.session import Session
 from smartshoe.models.effects import catalogue, effect
-from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.extended import ExtendedModel, Part
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -28,6 +29,8 @@ MOST_PARTS = 6
 QUICK_STEPS = 8
 FIRST_STEPS = 2
 CLOSE = 0.1  # of what the best candidate takes off the cost
+WORTH_A_MERGER = 0.8
+MOST_MERGED = 4
 WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
 NAMED_OF_LARGEST = 0.03
@@ -35,6 +38,7 @@ LEAST_OF_LARGEST = (
     0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
 )
 SHAPE_ERROR = 0.05
+MERGED_SHAPE_ERROR = 0.02
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
 CANCELLING = 4.0  # times what an addition takes off the error: what it may move the reading by
@@ -91,13 +95,26 @@ def held_out_cost(evidence: Evidence, model: ExtendedModel) -> float:
     return total
 
 
-def tempered(margin: float, fall: float) -> float:
-    """A difference of -2 log likelihood between two effects that take about ``fall`` off it, allowing for their shape.
+def margin(evidence: Evidence, one: Fit, other: Fit, less: Fit) -> float:
+    """By how much -2 log likelihood is worse for ``one`` than for ``other``, which differ in the last effect.
 
-    No equation is exact. A truth that departs from its effect's equation by `SHAPE_ERROR` of the effect's own size
-    leaves SHAPE_ERROR^2 fall behind, so that differences of that order say little, however many samples say so.
+    ``less`` is the fit without either. Among static curves the pressure alone says little: no equation is exact, and
+    a truth that departs from its own by `SHAPE_ERROR` of the effect's size leaves SHAPE_ERROR^2 of the fall behind,
+    which another curve may follow better. There the displacement decides, where it was logged.
     """
-    return margin / (1.0 + SHAPE_ERROR**2 * max(fall, 0.0) / SEEN_CLEARLY)
+    names = one.model.names[-1], other.model.names[-1]
+    worse = one.cost - other.cost
+    more = penalty(names[0]) - penalty(names[1])
+    seen = evidence.displacement_cost(other.model)
+    if seen == 0.0 or any(effect(name).family != "static_curve" for name in names):
+        return worse + more
+    fall = max(less.cost - min(one.cost, other.cost), 0.0)
+    return worse / (1.0 + SHAPE_ERROR**2 * fall / SEEN_CLEARLY) + more + evidence.displacement_cost(one.model) - seen
+
+
+def part_of(model: ExtendedModel, name: str) -> Part:
+    """The part that holds an effect."""
+    return next(part for part in model.parts if part.name == name)
 
 
 def held_out_square(evidence: Evidence, model: ExtendedModel) -> float:
@@ -144,7 +161,7 @@ def choose(
         if names in seen:  # it goes in circles: what is here is as good as what was before
             break
         seen.add(names)
-    settled = _settled(evidence, current, set(seen), progress)
+    settled = _settled(evidence, current, set(), progress)
     return _concluded(evidence, settled, fit(evidence, baseline), screening, material)
 
 
@@ -161,11 +178,10 @@ def _added(evidence: Evidence, current: Fit, looked: Screening, progress: Progre
     tried = _raced(evidence, current, _worth_trying(looked))
     if not tried:
         return None
-    best = min(one.cost for one in tried)
+    first = min(tried, key=lambda one: one.cost)
 
     def worse(one: Fit) -> float:
-        margin = tempered(one.cost - best, current.cost - best)
-        return margin + penalty(one.model.names[-1]) + evidence.displacement_cost(one.model)
+        return margin(evidence, one, first, current) if one is not first else 0.0
 
     tried.sort(key=worse)
     for attempt in tried:
@@ -239,10 +255,41 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
             if new and new[0].margin < -BETTER:
                 better = name, new[0]
                 break
-        if better is None or better[1].fit is None:
+        if better is not None and better[1].fit is not None:
+            progress(f"swapped {better[0]} for {better[1].effect}")
+            current = fit(evidence, better[1].fit.model)
+            continue
+        one = _merged(evidence, current, without, tried)
+        if one is None:
             return Settled(current, without, rivals)
-        progress(f"swapped {better[0]} for {better[1].effect}")
-        current = fit(evidence, better[1].fit.model)
+        progress(f"merged {' and '.join(set(current.model.names) - set(one.model.names))} into {one.model.names[-1]}")
+        current = one
+
+
+def _merged(evidence: Evidence, current: Fit, without: dict[str, Fit], tried: set[frozenset[str]]) -> Fit | None:
+    """One effect in the place of two, where it does as well: two that lean on each other may have come in by turns."""
+    names = sorted(without, key=lambda one: without[one].cost)[:MOST_MERGED]
+    for pair in combinations(names, 2):
+        less = fit(evidence, current.model.without(pair[0]).without(pair[1]), QUICK_STEPS)
+        whole = less.cost - current.cost
+        looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
+        worth = [one for one in _newcomers(looked, less, pair) if one.fall >= WORTH_A_MERGER * whole][:BEST_SWAPS]
+        saved = penalty(pair[0]) + penalty(pair[1]) + MERGED_SHAPE_ERROR**2 * whole
+        for one in _raced(evidence, less, worth):
+            worse = one.cost - current.cost + penalty(one.model.names[-1])
+            if worse < saved and frozenset(one.model.names) not in tried:
+                return one
+    return None
+
+
+def _newcomers(looked: Screening, less: Fit, gone: Sequence[str]) -> list[Screened]:
+    """Candidates in the place of ``gone``: one member a family, beside those that stay."""
+    families = {effect(name).family for name in less.model.names}
+    return [
+        one
+        for one in looked.ranked
+        if one.fall > 0 and one.candidate.effect.name not in gone and one.candidate.effect.family not in families
+    ]
 
 
 def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> str | None:
@@ -269,19 +316,17 @@ def _least_size(name: str, sizes: dict[str, float]) -> float:
 def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival]:
     """Other effects in the place of ``name`` and how much worse each is, nearest first; ``less``: the fit without."""
     looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
-    others = [one for one in looked.ranked if one.candidate.effect.name != name and one.fall > 0]
+    others = _newcomers(looked, less, (name,))
     whole = less.cost - current.cost
     near = [one for one in others if one.fall >= WORTH_A_SWAP * whole][:BEST_SWAPS]
     raced = _raced(evidence, less, near)
-    own = evidence.displacement_cost(current.model) + penalty(name)
-    rivals = []
-    for one in raced:
-        margin = tempered(one.cost - current.cost, less.cost - min(one.cost, current.cost))
-        margin += evidence.displacement_cost(one.model) + penalty(one.model.names[-1]) - own
-        rivals.append(Rival(one.model.names[-1], float(margin), one))
+    own = replace(
+        current, model=current.model.without(name).with_part(effect(name), part_of(current.model, name).values)
+    )
+    rivals = [Rival(one.model.names[-1], float(margin(evidence, one, own, less)), one) for one in raced]
     rivals.sort(key=lambda rival: rival.margin)
     far = [one for one in others[:BEST_SWAPS] if one not in near]
-    return rivals + [Rival(one.candidate.effect.name, float(tempered(whole - one.fall, whole)), None) for one in far]
+    return rivals + [Rival(one.candidate.effect.name, float(whole - one.fall), None) for one in far]
 
 
 def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:

@@ -166,8 +166,7 @@ def _session(
         extra["temperature_k"] = temperature.si - temperature.si[0]
     neighbour = _neighbour(recording)
     if neighbour is not None:
-        largest = float(np.max(np.abs(neighbour.values))) or 1.0
-        extra["neighbour"] = neighbour.values / largest
+        extra["neighbour"] = neighbour.in_unit(scale.unit) / scale.reading
     crosshead = _named(recording, "displacement")
     displacement = crosshead.si if crosshead is not None else None
     if not recording.is_uniform:

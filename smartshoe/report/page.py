@@ -17,6 +17,14 @@ from smartshoe.report.numbers import plain, with_sd
 from smartshoe.validation import Validation
 
 
+@dataclass(frozen=True, slots=True)
+class DiagnosisLink:
+    """A diagnosis in a sentence, and where its own page lies (relative to this one)."""
+
+    says: str
+    page: str
+
+
 @dataclass(frozen=True, eq=False)
 class UnitReport:
     """What the page says of one unit; ``identification`` is `Identification.to_dict()`."""
@@ -27,6 +35,7 @@ class UnitReport:
     recordings: Sequence[Recording]
     fitted: Sequence[str]
     judged: Sequence[str]
+    diagnosis: DiagnosisLink | None = None
 
 
 def verdict(unit: UnitReport) -> str:

@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -19,8 +19,11 @@ from smartshoe.identification import Identification, identify
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
-from smartshoe.scenario.schema import Scenario, Source, UnitTable
+from smartshoe.scenario.schema import DiagnoseTable, Scenario, Source, UnitTable
 from smartshoe.validation import Validation, validate
+
+if TYPE_CHECKING:
+    from smartshoe.diagnosis import Diagnosis
 
 Progress = Callable[[str], None]
 
@@ -41,6 +44,7 @@ class UnitResult:
     fitted: tuple[str, ...]
     judged: tuple[str, ...]
     truth: dict[str, Any] = field(default_factory=dict)
+    diagnosis: Diagnosis | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The unit's part of ``result.json``."""
@@ -59,6 +63,7 @@ class UnitResult:
             "device": self.truth,
             "identification": self.identification.to_dict(),
             "validation": self.validation.to_dict(),
+            "diagnosis": self.diagnosis.to_dict() if self.diagnosis else None,
         }
 
 
@@ -149,6 +154,18 @@ def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str
     return names or tuple(recordings)
 
 
+def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Diagnosis:
+    from smartshoe.diagnosis import diagnose
+
+    kept = set(settings.hold_out)
+    used = settings.use or tuple(name for name in recordings if name not in kept)
+    return diagnose(
+        [recordings[name] for name in used if name in recordings],
+        hold_out=[recordings[name] for name in settings.hold_out if name in recordings],
+        material=settings.material_percent / 100.0,
+    )
+
+
 def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> ScenarioResult:
     """Devices, then identification, calibration and validation of each unit.
 
@@ -174,9 +191,15 @@ def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> Sce
             calibration = found.calibration()
             progress(f"{name}: validating")
             validation = validate([recordings[key] for key in judged], calibration)
+            diagnosis = None
+            if scenario.diagnose is not None:
+                progress(f"{name}: diagnosing")
+                diagnosis = _diagnosed(recordings, scenario.diagnose)
         except SmartShoeError as error:
             error.args = (f"{source.path}, unit {name}: {error}",)
             raise
         truth = next(unit.options for unit in scenario.unit if unit.name == name)
-        results.append(UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth)))
+        results.append(
+            UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth), diagnosis)
+        )
     return ScenarioResult(scenario, source.path, tuple(results))

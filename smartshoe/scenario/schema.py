@@ -139,6 +139,14 @@ class IdentifyTable(_Table):
     sample_rate_hz: PositiveFloat = 100.0
 
 
+class DiagnoseTable(_Table):
+    """``[diagnose]``: which experiments are diagnosed, and which are kept for judging; no table, no diagnosis."""
+
+    use: tuple[str, ...] = ()
+    hold_out: tuple[str, ...] = ()
+    material_percent: float = Field(0.02, gt=0.0, le=50.0)
+
+
 class ValidateTable(_Table):
     """``[validate]``: which experiments are judged."""
 
@@ -156,6 +164,7 @@ class Scenario(_Table):
     unit: tuple[UnitTable, ...] = Field(min_length=1)
     identify: IdentifyTable = IdentifyTable()
     validate_: ValidateTable = Field(ValidateTable(), alias="validate")
+    diagnose: DiagnoseTable | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -223,13 +232,17 @@ def load(path: Path | str) -> tuple[Scenario, Source]:
             raise source.error(("unit", index, "name"), f"unit {unit.name} is there twice; give it another name")
         if not unit.recordings and not scenario.protocol:
             raise source.error(("unit", index), "there is nothing to run: add recordings, or a [protocol.dynamic]")
-    for step, table in (("identify", scenario.identify), ("validate", scenario.validate_)):
-        for name in table.use:
-            known = set(scenario.protocol) or {Path(r).stem for u in scenario.unit for r in u.recordings}
+    known = set(scenario.protocol) or {Path(r).stem for u in scenario.unit for r in u.recordings}
+    used = [(("identify", "use"), scenario.identify.use), (("validate", "use"), scenario.validate_.use)]
+    if scenario.diagnose is not None:
+        used += [
+            (("diagnose", "use"), scenario.diagnose.use),
+            (("diagnose", "hold_out"), scenario.diagnose.hold_out),
+        ]
+    for keys, wanted in used:
+        for name in wanted:
             if name not in known:
-                raise source.error(
-                    (step, "use"), f"{name!r} is no experiment here; there are {', '.join(sorted(known))}"
-                )
+                raise source.error(keys, f"{name!r} is no experiment here; there are {', '.join(sorted(known))}")
     return scenario, source
 
 

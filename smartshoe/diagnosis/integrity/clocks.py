@@ -21,7 +21,7 @@ from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask
 from smartshoe.diagnosis.integrity.scales import five_point_median
 from smartshoe.diagnosis.integrity.view import Signal, View
 
-LEAST_LAG_S = 0.1
+LEAST_LAG_S = 0.2  # a lag of the sensor itself may look like half of that
 LEAST_LAG_SAMPLES = 5.0  # less is the delay of a logger, which a model holds
 LARGEST_LAG_S = 6.0
 LONG_LAG_S = 0.4  # no pressure sensor is so slow, and a unit that relaxes answers a corner at once
@@ -38,7 +38,7 @@ CUT = 6.0  # of the median increment
 WINDOWS = 8
 EARNED = 0.8  # of the squared error that is left without the shift
 EARNED_ALONE = 0.6  # the same where zero lag correlates nearly as well, as it does on long even ramps
-TIME_CONSTANTS_S = (0.05, 0.15, 0.5, 1.5, 5.0, 15.0, 60.0)
+TIME_CONSTANTS_S = (0.05, 0.1, 0.2, 0.5, 1.5, 5.0, 15.0, 60.0)
 PLAY_WIDTHS = (0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.12, 0.16)  # of the load's span
 
 

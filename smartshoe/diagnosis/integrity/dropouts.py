@@ -6,15 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
 from smartshoe.diagnosis.integrity.held import held
-from smartshoe.diagnosis.integrity.spikes import isolated
+from smartshoe.diagnosis.integrity.spikes import isolated_beside
 from smartshoe.diagnosis.integrity.view import View
 
 GONE = 0.25  # of the expected reading at most is left
 LEAST_EXPECTED = 0.03  # of the span: below, a dropout cannot be told from rest
+EDGE, BESIDE = 0.5, 5
 LET_GO = 0.3  # of the span
 BELOW_REST = 0.05  # of the span
+PASSES = 2
 LEVEL = 0.01  # of the span: within which dropouts end at one level
 
 
@@ -25,7 +27,8 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     at = dropped(view)
     if not at.any():
         return
-    at |= _also_gone(view, at)
+    for _ in range(PASSES):  # with those known cut out the noise is known better
+        at |= _also_gone(view, at)
     starts, stops = runs_of(at)
     longest = int((stops - starts).max())
     if longest <= 2 and not _one_level(view, at):
@@ -51,10 +54,12 @@ def dropped(view: View) -> Mask:
     below = y < view.rest - np.maximum(BELOW_REST * view.span, 10.0 * noise)
     out = np.zeros(y.size, dtype=bool)
     jump, gap = view.jump, np.diff(view.time_s) > 1.6 * view.step_s
+    lost = np.where(below, view.rest - y, view.expected - y)
     for first, stop in zip(*runs_of(low | below), strict=True):
         ends_open = stop == y.size or bool(gap[stop - 1])
-        falls = first > 0 and jump[first - 1] < 0.0
-        rises = not ends_open and jump[stop - 1] > 0.0
+        # Both edges make up most of what is lost, and not from a spike.
+        falls = first > 0 and jump[first - 1] < 0.0 and _left(y[max(first - BESIDE, 0) : first], y[first], lost[first])
+        rises = not ends_open and jump[stop - 1] > 0.0 and _left(y[stop : stop + BESIDE], y[stop - 1], lost[stop - 1])
         if falls and rises:
             out[first:stop] = True
         elif falls and (ends_open or not loaded[stop]):
@@ -63,12 +68,20 @@ def dropped(view: View) -> Mask:
     return out
 
 
+def _left(beside: Array, low: float, lost: float) -> bool:
+    """Whether readings beside a run stand above its ``low`` end by most of what is ``lost`` there.
+
+    The second largest of a few does: one may be a spike, and most may have dropped out.
+    """
+    return bool(np.sort(beside)[max(beside.size - 2, 0)] - low > EDGE * lost)
+
+
 def _also_gone(view: View, at: Mask) -> Mask:
     """(m,) samples at the level of known dropouts where load is too low to tell: isolated ones and held runs."""
     y = view.reading.values
     level = float(np.median(y[at]))
     near = np.abs(y - level) <= 3.0 * view.reading.quiet_noise + LEVEL * view.span
-    alone = isolated(view.reading, view.load_corner, view.gain, view.span, view.near) & near
+    alone = isolated_beside(view, at) & near
     values, count = np.unique(y[at], return_counts=True)
     common = values[count >= 0.02 * at.sum()]
     if common.size == 0 or common.size > 20:

@@ -26,13 +26,14 @@ OF_RECORDING: tuple[Callable[[Recording], Iterator[Finding]], ...] = (
     gaps,
     uneven_sampling,
 )
-# Dropouts and rails before held samples and spikes, which they also look like; spikes where readings are not held.
+# A saturated reading may follow too little: both are said. Dropouts and rails before held samples and spikes, which
+# they also look like; spikes where readings are not held.
 OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
+    saturation,
     does_not_follow_load,
     two_clocks,
     wrong_sign,
     dropouts,
-    saturation,
     low_rail,
     held_samples,
     spikes,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.scales import SECOND_DIFFERENCE
 from smartshoe.diagnosis.integrity.view import DITHERED, Index, View
 
 CERTAIN = 1e-9  # chance that an honest run would repeat so
@@ -14,8 +15,10 @@ LEVELS = tuple(10.0 ** (-0.25 * k) for k in range(24, 5, -1))  # chances at whic
 FLOAT_STEP = 1e-9  # of the span: what a noiseless relaxation comes to rest within
 DOUBT = 0.1  # honest repeats among those that are left out, at most
 WINDOW, LEAST_TURNS = 32, 8
+NEIGHBOURS = 40
+BESIDE = 14
 CAUGHT = 0.4  # of the slope on either side, that a held run's mean slope up to the next value has at least
-LONG = 30  # repeats; beyond, the slopes on both sides say little of what lies between
+LONG = 8  # repeats; from there on the slopes on both sides say little of what lies between
 SMALLEST_WIDTH = 0.15  # of the lattice step: what noise is taken for at least, where motion is judged
 
 
@@ -69,19 +72,45 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     repeats = stops - starts
     # Where no lattice was told the smallest gap between readings is an upper bound of its step.
     step = max(reading.step or reading.least_gap, FLOAT_STEP * view.span)
-    least = np.minimum(np.minimum(reading.noise[starts], reading.noise[stops]), view.noise_at_load[starts])
+    least = np.minimum(_noise_beside(y, starts, stops), view.noise_at_load[starts])
     # A rail repeats without being held. Between two levels an undithered signal toggles, which looks like half a step
     # of noise and says nothing.
     rail = (y[starts] == y.min()) | (y[starts] == y.max())
     noisy = (least > DITHERED * step) & ~rail & _alternates(y, starts, stops)
     within = np.ones(starts.size)
     within[noisy] = erf(step / (np.sqrt(8.0) * least[noisy]))
+    within[noisy] = np.maximum(within[noisy], _common(y, starts[noisy], stops[noisy]))
     motion = _motion(view, starts, stops, step)
     beyond = np.maximum(0.5 * (motion * repeats - step), 0.0)
     many = np.maximum(beyond / (3.0 * np.maximum(motion, 1e-300)), 1.0)
     noise = np.maximum(reading.noise[starts], reading.noise[stops])
     width = np.hypot(noise, SMALLEST_WIDTH * step)
     out: Array = repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
+    return out
+
+
+def _noise_beside(y: Array, starts: Index, stops: Index) -> Array:
+    """(runs,) the lesser noise of the stretches just before and just after each run, 0 at an end."""
+    second = np.concatenate([[0.0], np.cumsum(np.diff(y, 2) ** 2)])
+    sides = []
+    for low, high in ((starts - BESIDE, starts - 1), (stops, stops + BESIDE - 1)):
+        a, b = np.clip(low, 0, y.size - 2), np.clip(high, 0, y.size - 2)
+        sides.append(np.where(b - a >= BESIDE // 2, np.sqrt((second[b] - second[a]) / np.maximum(b - a, 1)), 0.0))
+    out: Array = np.minimum(*sides) / SECOND_DIFFERENCE
+    return out
+
+
+def _common(y: Array, starts: Index, stops: Index) -> Array:
+    """(runs,) share of the readings before and after each run that equal it: some converters favour a value."""
+    away = np.arange(1, NEIGHBOURS + 1)
+    before, after = starts[:, None] - away, stops[:, None] + away
+    equal = np.zeros(starts.size)
+    there = np.zeros(starts.size)
+    for place in (before, after):
+        inside = (place >= 0) & (place < y.size)
+        equal += (inside & (y[np.clip(place, 0, y.size - 1)] == y[starts][:, None])).sum(axis=1)
+        there += inside.sum(axis=1)
+    out: Array = equal / np.maximum(there, 1.0)
     return out
 
 
@@ -96,7 +125,7 @@ def _alternates(y: Array, starts: Index, stops: Index) -> Mask:
         a, b = np.clip(low, 0, product.size), np.clip(high, 0, product.size)
         turned += turns[b] - turns[a]
         stayed += stays[b] - stays[a]
-    out: Mask = (turned > stayed) & (turned >= LEAST_TURNS)
+    out: Mask = (turned > 1.5 * stayed) & (turned >= LEAST_TURNS)  # white noise has 2.7 times as many
     return out
 
 
@@ -119,12 +148,19 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     least = np.minimum(np.minimum(np.abs(before), np.abs(after)), np.abs(caught))
     # What a friction or a dead band has kept is not caught up with.
     kept = np.abs(caught) < CAUGHT * np.minimum(np.abs(before), np.abs(after))
-    edge = np.minimum(view.near, repeats // 4)  # the mean over ``near`` samples brings a step beside the run into it
+    last = y[starts] - y[np.maximum(starts - 3, 0)]
+    agree &= np.sign(last) == np.sign(caught)
+    # A quarter is left out at both ends: the reading may follow a step of load a little late.
+    edge = np.minimum(view.near, repeats // 4)
     a, b = starts + edge, stops - edge
     half = np.maximum((b - a + 1) // 2, 1)
-    moved = np.minimum(np.abs(load[a + half] - load[a]), np.abs(load[b] - load[b - half]))
-    moved = np.maximum(moved - 6.0 * view.load.quiet_noise / np.sqrt(view.near) - view.load.step, 0.0)
-    least = np.where(repeats > LONG, np.minimum(least, 2.0 * view.gain * moved / half), least)
+    steady = np.minimum(np.abs(load[a + half] - load[a]), np.abs(load[b] - load[b - half])) / half
+    steady -= (6.0 * view.load.quiet_noise / np.sqrt(view.near) + view.load.step) / half
+    # The mean over ``near`` samples brings a step beside a shorter run into it.
+    span = np.maximum(b - a, 1)
+    plain = (np.abs(view.load.values[b] - view.load.values[a]) - 5.0 * view.load.quiet_noise - view.load.step) / span
+    moved = np.maximum(np.where(repeats > 2 * view.near, steady, plain), 0.0)
+    least = np.where(repeats >= LONG, np.minimum(least, 2.0 * view.gain * moved), least)
     # A slope between two lattice values is uncertain by a step.
     out: Array = np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
     return out

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Finding, Mask
+from smartshoe.diagnosis.integrity.fault import Finding, Mask, runs_of
 from smartshoe.diagnosis.integrity.view import View
 
 # A lattice of step q adds an error of q/sqrt(12). It is a fault where that is at least 0.03 % of the reading's span
@@ -14,7 +14,8 @@ from smartshoe.diagnosis.integrity.view import View
 # noise dithers the lattice and hides it.
 MATERIAL_SHARE = 0.0003
 BESIDE_NOISE = 0.25
-LEAST_MOVES, LEAST_SHARE = 20, 0.02  # of moves by a single step
+LEAST_RUNS = 10
+MOVED = 0.4  # of a step
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
@@ -22,9 +23,8 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     step = view.reading.step
     if step == 0.0 or view.span == 0.0:
         return
-    moves = np.rint(np.abs(np.diff(view.reading.values)) / step)
-    if int((moves == 1.0).sum()) < max(LEAST_MOVES, LEAST_SHARE * int((moves > 0.0).sum())):
-        return  # a noiseless reading of a load in steps has a few levels, and leaps between them
+    if not _stands_while_load_moves(view, step):
+        return
     error = step / np.sqrt(12.0)
     noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
     if error < MATERIAL_SHARE * view.span or error < BESIDE_NOISE * noise:
@@ -36,3 +36,10 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         f" {100 * step / view.span:.2g} % of its span: an error of {100 * error / view.span:.2g} % that noise does not"
         " smooth away",
     )
+
+
+def _stands_while_load_moves(view: View, step: float) -> bool:
+    """Whether a reading stays on a level while the load goes on; a noiseless reading of a load in steps does not."""
+    starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
+    moved = view.gain * np.abs(view.steady_load[stops] - view.steady_load[starts])
+    return int((moved > MOVED * step).sum()) >= LEAST_RUNS

@@ -152,7 +152,7 @@ def _strongest(
                 halves[i] += abs(part) ** 2
                 own.append(abs(part))
     amplitude = max(abs(whole), float(np.median(own)))
-    step, noise = view.reading.step, view.reading.quiet_noise
+    step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
     least = max(LEAST_SHARE * view.span, BESIDE_LATTICE * step if noise < 0.5 * step else 0.0)
     steady = halves[0] < STEADY**2 * halves[1]
     if amplitude < least or not steady or abs(whole) < 0.3 * amplitude:

@@ -105,9 +105,9 @@ def _hidden(view: View, tied: Mask, rail: float, inward: float) -> float:
     if starts.size == 0:
         return 0.0
     load = view.load.values
-    # The echo of a corner may come a little late: the rise is counted from that much later on.
-    later = np.minimum(starts + min(view.near, LEAST_RUN), stops - 1)
-    pairs = np.stack([later, stops], axis=1).ravel()
+    # The echo of a corner may come a little late: so many samples are left out at both ends of a run.
+    later = np.minimum(starts + LEAST_RUN, stops - 1)
+    pairs = np.stack([later, np.maximum(stops - LEAST_RUN, later + 1)], axis=1).ravel()
     peaks = np.maximum.reduceat(np.append(load, load[-1]), pairs)[::2]
     rise = peaks - load[later] - 6.0 * view.load.quiet_noise
     at, middle, _ = view.curve
@@ -118,4 +118,3 @@ def _hidden(view: View, tied: Mask, rail: float, inward: float) -> float:
     edge = float(np.median(load[starts])) if inward < 0 else float(np.median(load[stops - 1]))
     slope = BAND * view.span / max(abs(edge - inner), BAND * view.load_span)
     return float(slope * rise.max())
-

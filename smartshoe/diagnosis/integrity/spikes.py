@@ -30,15 +30,21 @@ def isolated(signal: Signal, corner: Array, scale: float, span: float, near: int
     return out
 
 
+def isolated_beside(view: View, bad: Mask) -> Mask:
+    """(m,) isolated readings of what is left when ``bad`` ones are cut out: a good one between two of them is none."""
+    good = ~bad
+    reading = Signal(view.reading.values[good]) if bad.any() else view.reading
+    found = np.zeros(bad.size, dtype=bool)
+    if good.any():
+        found[good] = isolated(reading, view.load_corner[good], view.gain, view.span, view.near)
+    return found
+
+
 def spikes(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``spikes``; masked. One finding for the reading, one for the reference load."""
     if view.span == 0.0 or view.gain == 0.0:
         return
-    # What is bad already is cut out: a good sample between two dropouts is no spike.
-    good = ~bad
-    reading = Signal(view.reading.values[good]) if bad.any() else view.reading
-    found = np.zeros(bad.size, dtype=bool)
-    found[good] = isolated(reading, view.load_corner[good], view.gain, view.span, view.near)
+    found = isolated_beside(view, bad)
     if found.any():
         yield _finding(view, found, view.reading, view.span, "reading")
     load_gain = view.load_span / view.span

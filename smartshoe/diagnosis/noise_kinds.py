@@ -1,0 +1,42 @@
+"""Kinds of noise in what the chosen model leaves: after the data's own faults, and beside the causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from smartshoe.diagnosis.integrity import DataFault
+from smartshoe.diagnosis.session import Session
+from smartshoe.models.effects import coloured_noise, heteroscedastic_noise, hum, timing_jitter
+from smartshoe.models.extended import ExtendedModel
+
+KINDS = {
+    "hum": hum.evidence,
+    "timing_jitter": timing_jitter.evidence,
+    "heteroscedastic_noise": heteroscedastic_noise.evidence,
+    "coloured_noise": coloured_noise.evidence,
+}
+# A sample that repeats the one before it lags like jitter; a dropout or a spike makes the variance follow the load.
+IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"})
+
+
+def noise_kinds(fine: Sequence[Session], model: ExtendedModel, known: Sequence[DataFault]) -> list[DataFault]:
+    """What the residual at the full rate shows, for recordings in which no fault of the data would imitate it."""
+    found = []
+    for session in fine:
+        faults = {fault.kind for fault in known if fault.recording == session.index}
+        if faults & IMITATED_BY or not session.usable.all():
+            continue
+        conditions = session.conditions
+        prediction = model.simulate(conditions)
+        residual = session.reading - prediction
+        for kind, evidence in KINDS.items():
+            if kind in faults:
+                continue
+            one = evidence(residual, conditions, prediction, conditions.step_s)
+            if one is not None:
+                start_s = float(session.recording.time_s[0])
+                stop_s = start_s + float(conditions.time_s[-1])
+                found.append(
+                    DataFault(kind, session.index, session.recording.label, start_s, stop_s, 1.0, one.says, "minor")
+                )
+    return found

@@ -1,0 +1,257 @@
+"""The parts of a diagnosis by themselves: what each promises, on signals whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from smartshoe import Recording, dynamic_protocol
+from smartshoe.diagnosis.baseline import global_baseline
+from smartshoe.diagnosis.experiments import EXPERIMENTS
+from smartshoe.diagnosis.fitting import Evidence, fit
+from smartshoe.diagnosis.judgement import errors, gain
+from smartshoe.diagnosis.next_experiment import expected_margin
+from smartshoe.diagnosis.noise import autoregression, white
+from smartshoe.diagnosis.remainder import repeating, slow
+from smartshoe.diagnosis.screen import dictionary, screen
+from smartshoe.diagnosis.session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
+from smartshoe.diagnosis.traits import traits_of
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import MILLIBAR
+
+RATE_HZ = 50.0
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
+
+
+def recording(
+    model: ExtendedModel = MODEL, seed: int = 0, noise: float = 0.001, rates: tuple[float, ...] = (100, 200, 400, 800)
+) -> Recording:
+    """What a model itself would read: for the arithmetic of the parts, not for hidden effects."""
+    protocol = dynamic_protocol(rates, repeats=3, rest_s=4.0)
+    time_s = np.arange(0.0, protocol.duration_s, 1 / RATE_HZ)
+    load_n = protocol.load_at(time_s)
+    conditions = Conditions(time_s, load_n / model.full_scale_load_n, 1 / RATE_HZ)
+    reading = model.simulate(conditions) + noise * np.random.default_rng(seed).standard_normal(time_s.size)
+    return Recording.from_arrays(
+        time_s=time_s, force_n=load_n, pressure_mbar=reading * model.full_scale_reading, name=f"triangles_{seed}"
+    )
+
+
+def sessions_of(*recordings: Recording) -> tuple[list[Session], Scale]:
+    usable = [one.sensor.present for one in recordings]
+    scale = full_scale(recordings, usable)
+    return prepare(recordings, usable, None, scale, thinning(recordings, scale)), scale
+
+
+def evidence_of(sessions: list[Session]) -> Evidence:
+    return Evidence(sessions, white(0.001), np.zeros(0), 1.0)
+
+
+# -- sessions ---------------------------------------------------------------------------------------------------
+@given(st.integers(1, 12), st.floats(-3, 3), st.floats(-2, 2))
+def test_smoothing_leaves_straight_lines_where_they_are(factor: int, start: float, slope: float) -> None:
+    line = start + slope * np.arange(200.0)
+    assert_allclose(smoothed(line, kernel(factor), factor), line[::factor], atol=1e-9)
+
+
+def test_every_third_load_cycle_is_held_out_and_nothing_else() -> None:
+    (session,), _ = sessions_of(recording())
+    held = {int(number) for number in session.cycle[session.held_out]}
+    assert held == set(range(2, int(session.cycle[-1]) + 1, 3))
+    assert not (session.fitted & session.judged).any()
+
+
+def test_held_out_recordings_are_never_fitted() -> None:
+    pair = [recording(seed=1), recording(seed=2)]
+    usable = [one.sensor.present for one in pair]
+    scale = full_scale(pair, usable)
+    first, second = prepare(pair, usable, [False, True], scale, 3)
+    assert first.fitted.all()
+    assert not second.fitted.any()
+
+
+def test_a_recording_that_continues_another_knows_what_went_before() -> None:
+    first = recording(seed=1)
+    later = Recording.from_arrays(
+        time_s=first.time_s, force_n=first.force_n, pressure_mbar=first["pressure"].values, name="later",
+        metadata={"continues": first.name},
+    )  # fmt: skip
+    sessions, _ = sessions_of(first, later)
+    assert sessions[0].conditions.before == {}
+    assert sessions[1].conditions.before["largest_load"] == pytest.approx(1.0, abs=0.05)
+    assert sessions[1].conditions.before["cycles"] == 12
+    assert sessions[1].conditions.before["time_s"] == pytest.approx(first.duration_s, abs=0.5)
+
+
+def test_the_load_cells_noise_is_taken_out_of_rests() -> None:
+    noisy = recording()
+    load = noisy.force_n + 0.8 * np.random.default_rng(3).standard_normal(len(noisy))
+    again = Recording.from_arrays(
+        time_s=noisy.time_s, force_n=load, pressure_mbar=noisy["pressure"].values, name="noisy"
+    )
+    (session,), _ = sessions_of(again)
+    inner = np.convolve(session.resting, np.ones(15), "same") > 14.5
+    assert np.std(session.conditions.load[inner]) < 3e-4
+
+
+# -- noise ------------------------------------------------------------------------------------------------------
+@given(st.floats(0.0, 0.9), st.integers(0, 99))
+@settings(max_examples=15, deadline=None)
+def test_whitened_noise_is_white_with_variance_one(memory: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    e = np.zeros(6000)
+    for k in range(1, e.size):
+        e[k] = memory * e[k - 1] + 0.002 * rng.standard_normal()
+    model = autoregression([e], [np.ones(e.size, dtype=bool)])
+    w = model.whitened(e)[20:]
+    assert np.std(w) == pytest.approx(1.0, abs=0.05)
+    assert abs(np.corrcoef(w[1:], w[:-1])[0, 1]) < 0.06
+
+
+# -- baseline and fits --------------------------------------------------------------------------------------------
+@given(st.floats(0.03, 0.5), st.floats(0.05, 2.0))
+@settings(max_examples=12, deadline=None)
+def test_the_baseline_is_found_wherever_its_pole_is(share: float, rate: float) -> None:
+    truth = ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")
+    sessions, scale = sessions_of(recording(truth, noise=0.0005))
+    start = global_baseline(sessions, scale)
+    found = fit(evidence_of(sessions), start).model
+    at = sessions[0].conditions
+    off = found.simulate(at) - sessions[0].reading
+    assert np.sqrt(np.mean(off**2)) < 0.0007
+
+
+def test_a_fit_finds_an_effects_parameter_within_its_error_bar() -> None:
+    truth = MODEL.with_part(effect("zero_offset"), np.array([0.004])).with_part(
+        effect("gain_drift"), np.array([2e-4, 0.0])
+    )
+    sessions, scale = sessions_of(recording(truth))
+    start = global_baseline(sessions, scale).with_part(effect("zero_offset")).with_part(effect("gain_drift"))
+    found = fit(evidence_of(sessions), start)
+    theta = found.model.theta * 1.0
+    # Shares of full scale depend on the scale that was taken: the record's own largest reading.
+    offset = theta[3] * found.model.gain * scale.reading / 140.0
+    assert offset == pytest.approx(0.004, abs=4 * found.sd(3) + 1e-5)
+    assert theta[4] == pytest.approx(2e-4, abs=4 * found.sd(4) + 1e-6)
+
+
+def test_a_bound_holds_and_a_parameter_without_influence_stays() -> None:
+    sessions, scale = sessions_of(recording(MODEL.with_part(effect("zero_offset"), np.array([0.01]))))
+    start = global_baseline(sessions, scale).with_part(effect("linear_leak")).with_part(effect("gain_drift"))
+    found = fit(evidence_of(sessions), start).model
+    leak, drift = (part for part in found.parts)
+    assert leak.values[0] >= 0.0
+    assert drift.values[1] == 0.0  # the coefficient of a temperature that was not logged
+
+
+# -- screen ---------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("gain_drift", [3e-4, 0.0]), ("zero_offset", [0.01]), ("gas_compression", [0.01]), ("delay", [0.01])],
+)
+def test_the_screen_ranks_the_effect_that_is_there_among_the_first(name: str, values: list[float]) -> None:
+    sessions, scale = sessions_of(recording(MODEL.with_part(effect(name), np.array(values))))
+    start = fit(evidence_of(sessions), global_baseline(sessions, scale)).model
+    looked = screen(dictionary(start, sessions), white(0.001))
+    assert name in looked.names[:4]
+
+
+def test_likeness_is_symmetric_one_with_itself_and_high_for_a_tare_and_an_offset() -> None:
+    sessions, scale = sessions_of(recording())
+    looked = screen(dictionary(global_baseline(sessions, scale), sessions), white(0.001))
+    assert_allclose(looked.likeness, looked.likeness.T)
+    assert_allclose(np.diag(looked.likeness), 1.0)
+    place = {name: k for k, name in enumerate(looked.names)}
+    # By the waveform alone nothing tells them apart.
+    assert looked.likeness[place["zero_offset"], place["load_cell_tare"]] > 0.99
+
+
+# -- what is left ---------------------------------------------------------------------------------------------
+@given(st.integers(0, 50), st.floats(0.0, 0.5), st.sampled_from([0.1, 0.3, 0.6]))
+@settings(max_examples=25, deadline=None)
+def test_noise_of_any_colour_is_not_taken_for_structure(seed: int, share: float, tau_s: float) -> None:
+    sessions, _ = sessions_of(recording(rates=(50, 100, 200, 400)))
+    rng = np.random.default_rng(seed)
+    session = sessions[0]
+    step_s, n = session.conditions.step_s, session.reading.size
+    keep = np.exp(-step_s / tau_s)
+    coloured = np.zeros(n)
+    for k in range(1, n):
+        coloured[k] = keep * coloured[k - 1] + np.sqrt(1 - keep**2) * rng.standard_normal()
+    noise = 0.001 * (np.sqrt(1 - share) * rng.standard_normal(n) + np.sqrt(share) * coloured)
+    assert repeating(sessions, [noise]).z < 5.0
+    assert slow(sessions, [noise], 5.0).z < 5.0
+
+
+def test_what_repeats_and_what_wanders_are_seen() -> None:
+    sessions, _ = sessions_of(recording(rates=(50, 100, 200, 400)))
+    at = sessions[0].conditions
+    noise = 0.0005 * np.random.default_rng(1).standard_normal(at.load.size)
+    bow = 0.002 * at.load * (1 - at.load)
+    wander = 0.001 * np.sin(2 * np.pi * at.time_s / 47.0)
+    assert repeating(sessions, [noise + bow]).z > 10.0
+    seen = slow(sessions, [noise + wander], 5.0)
+    assert seen.z > 5.0
+    assert seen.rms == pytest.approx(0.001 / np.sqrt(2), rel=0.2)
+
+
+# -- judgement, traits, experiments ---------------------------------------------------------------------------
+def test_a_gains_interval_holds_the_gain_and_shrinks_to_nothing_for_nothing() -> None:
+    truth = MODEL.with_part(effect("zero_offset"), np.array([0.01]))
+    sessions, scale = sessions_of(recording(truth))
+    start = fit(evidence_of(sessions), global_baseline(sessions, scale)).model
+    better = fit(evidence_of(sessions), start.with_part(effect("zero_offset"))).model
+    won = gain(errors(sessions, start), errors(sessions, better), scale)
+    assert won.ci95[0] <= won.gain_percent <= won.ci95[1]
+    assert won.gain_percent > 30.0
+    nothing = gain(errors(sessions, start), errors(sessions, start), scale)
+    assert nothing.gain_percent == 0.0
+    assert nothing.ci95 == (0.0, 0.0)
+
+
+def test_one_rate_is_said_to_say_nothing_of_rates() -> None:
+    sessions, _ = sessions_of(recording(rates=(200, 200)))
+    said = " ".join(traits_of(sessions).limits())
+    assert "one loading rate only" in said
+    several, _ = sessions_of(recording())
+    assert "one loading rate only" not in " ".join(traits_of(several).limits())
+    assert {"rates", "rests", "repeats"} <= traits_of(several).present
+
+
+@pytest.mark.parametrize("name", sorted(EXPERIMENTS))
+def test_an_experiment_asks_for_no_more_than_the_load_it_is_made_for(name: str) -> None:
+    protocol = EXPERIMENTS[name](800.0)
+    assert protocol.peak_load_n <= 800.0 + 1e-9
+    assert protocol.name == name
+    assert all(segment.duration_s > 0 and segment.load_n >= 0 for segment in protocol.segments)
+
+
+def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
+    sessions, scale = sessions_of(recording())
+    found = fit(evidence_of(sessions), global_baseline(sessions, scale))
+    for made in EXPERIMENTS.values():
+        assert expected_margin(found, found, made(800.0), white(0.001), sessions[0]) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
+    truth = MODEL.with_part(effect("sensor_lag"), np.array([0.03, 0.0]))
+    sessions, scale = sessions_of(recording(truth))
+    start = fit(evidence_of(sessions), global_baseline(sessions, scale)).model
+    lag = fit(evidence_of(sessions), start.with_part(effect("sensor_lag"), np.array([0.02, 0.1])))
+    delay = fit(evidence_of(sessions), start.with_part(effect("delay"), np.array([0.02])))
+    margins = {
+        name: expected_margin(lag, delay, EXPERIMENTS[name](800.0), white(0.001), sessions[0])
+        for name in ("steps", "rates", "idle")
+    }
+    assert margins["steps"] > 2 * margins["rates"]
+    assert margins["steps"] > 2 * margins["idle"]
+
+
+def test_units_of_the_scale_are_the_readings() -> None:
+    _, scale = sessions_of(recording())
+    assert scale.unit == MILLIBAR
+    assert scale.load_n == pytest.approx(800.0, rel=0.01)
