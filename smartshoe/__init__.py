@@ -32,12 +32,16 @@ _HOME = {
     "Compensator": "smartshoe.compensation",
     "stack": "smartshoe.compensation",
     "validate": "smartshoe.validation",
+    "diagnose": "smartshoe.diagnosis",
+    "Diagnosis": "smartshoe.diagnosis",
+    "ExtendedModel": "smartshoe.models.extended",
     "SmartShoeError": "smartshoe.errors",
 }
 
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration, Compensator, stack
     from smartshoe.devices import open_machine, open_shoe
+    from smartshoe.diagnosis import Diagnosis, diagnose
     from smartshoe.errors import SmartShoeError
     from smartshoe.identification import Identification, identify
     from smartshoe.identification.lack_of_fit import lack_of_fit
@@ -49,6 +53,7 @@ if TYPE_CHECKING:
         select_order,
     )
     from smartshoe.logs import read, write
+    from smartshoe.models.extended import ExtendedModel
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
     from smartshoe.validation import validate
@@ -57,12 +62,15 @@ __all__ = [
     "Calibration",
     "Channel",
     "Compensator",
+    "Diagnosis",
+    "ExtendedModel",
     "Identification",
     "Protocol",
     "Recording",
     "RecursiveIdentification",
     "SmartShoeError",
     "TransferFunctionEstimate",
+    "diagnose",
     "dynamic_protocol",
     "identify",
     "identify_transfer_function",

@@ -14,7 +14,7 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
-POLES_PER_S = np.geomspace(0.005, 20.0, 31)
+POLES_PER_S = np.geomspace(0.01, 20.0, 31)
 LEAST_SHARE = 1e-3  # of the load that relaxes: below it the pole means nothing
 
 

@@ -139,7 +139,9 @@ def fit(evidence: Evidence, start: ExtendedModel, steps: int = MOST_STEPS, settl
         best: tuple[float, ExtendedModel] | None = None
         for _ in range(6):
             step = _bounded_step(normal, right, damping, theta, low, high, logarithmic)
-            moved = np.clip(np.where(logarithmic, theta * np.exp(step), theta + step), low, high)
+            moved = np.clip(
+                np.where(logarithmic, theta * np.exp(np.where(logarithmic, step, 0.0)), theta + step), low, high
+            )
             trial = model.at(moved)
             trial_cost = evidence.cost(trial)
             if np.isfinite(trial_cost) and trial_cost < cost:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
+from smartshoe.diagnosis.aligned import put_right
 from smartshoe.diagnosis.baseline import global_baseline
 from smartshoe.diagnosis.confidence import confidence, inseparable
 from smartshoe.diagnosis.force import force_rmse_n
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
+BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
+LEAST_FIT_PERCENT = 70.0  # of the best model on held-out data: below it a name means nothing
 NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
 LEFT_OF_EXPLAINED = 0.12  # of the structure that was there: less than this left over is a matter of equations' shape
 
@@ -59,22 +62,36 @@ def diagnose(
         raise UsageError("diagnose was given no recording: give one at least")
     everything = [*fitted, *hold_out]
     integrity = examine(everything)
-    if integrity.refusals:
-        return _refused(everything, integrity)
+    refusals = integrity.refusals or _outside(everything)
+    if refusals:
+        return _refused(everything, integrity, refusals)
     return _diagnosed(everything, len(fitted), integrity, material, progress)
 
 
-def _refused(recordings: Sequence[Recording], integrity: Integrity) -> Diagnosis:
+def _outside(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Why the recordings are none of a unit that is pressed."""
+    for recording in recordings:
+        low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
+        if min(abs(low), abs(high)) > BOTH_WAYS * max(abs(low), abs(high)) and low < 0 < high:
+            return (
+                f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is"
+                " pressed, which bears compression only (turn the sign of the load, or take its mean out, if that is"
+                " what was meant)",
+            )
+    return ()
+
+
+def _refused(recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str]) -> Diagnosis:
     sensors = recordings[0].sensors
     unit = sensors[0].unit.symbol if sensors else ""
     return Diagnosis(
         "refused",
-        f"no diagnosis: {integrity.refusals[0]}",
+        f"no diagnosis: {refusals[0]}",
         unit,
         0.0,
         0.0,
         data_faults=integrity.faults,
-        limits=tuple(integrity.refusals),
+        limits=tuple(refusals),
     )
 
 
@@ -82,7 +99,7 @@ def _refused(recordings: Sequence[Recording], integrity: Integrity) -> Diagnosis
 def _diagnosed(
     recordings: Sequence[Recording], count: int, integrity: Integrity, material: float, progress: Progress
 ) -> Diagnosis:
-    usable = integrity.usable
+    recordings, usable, put = put_right(recordings, integrity)
     scale = full_scale(recordings[:count], usable[:count])
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
     sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
@@ -95,7 +112,10 @@ def _diagnosed(
     fine = at_full_rate(sessions, usable, scale)
     baseline, best = errors(fine, choice.baseline.model), errors(fine, choice.fit.model)
     causes = [_cause(name, choice, fine, best, scale, traits) for name in choice.causes]
-    causes, verdict = _judged([one for one in causes if one.held_out.gain_percent > 0], before, after, material)
+    causes, verdict = _judged([one for one in causes if _stands(one)], before, after, material)
+    follows = best.fit_percent >= LEAST_FIT_PERCENT
+    if not follows:
+        causes, verdict = [], "unexplained"
     extended, after_all, last = choice.fit.model, best, after
     if verdict == "unexplained":
         extended, after, after_all = choice.baseline.model, before, baseline
@@ -123,7 +143,7 @@ def _diagnosed(
         explained_percent=_percent_less(after_all.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _candidates(choice),
         next_experiment=next_experiment(choice, causes, traits, sessions),
-        limits=tuple(traits.limits()),
+        limits=(*put, *traits.limits(), *([] if follows else [_does_not_follow(best)])),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=tuple((one.candidate.effect.name, float(one.fall)) for one in choice.screening.ranked),
         likeness=choice.screening.likeness,
@@ -147,6 +167,23 @@ def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
         if resting.sum() > 10:
             means.append(float(np.mean(session.conditions.load[resting])))
     return np.array(means), REST_SD
+
+
+def _stands(cause: Cause) -> bool:
+    """Whether a cause gains on data it has not seen, and its strength is told from nothing."""
+    if cause.held_out.gain_percent <= 0:
+        return False
+    strengths = [p for p in cause.effect.parameters if p.null is not None]
+    intervals = [cause.parameters[p.name].ci95 for p in strengths]
+    nulls = [p.null or 0.0 for p in strengths]
+    return any(not low <= null <= high for null, (low, high) in zip(nulls, intervals, strict=True))
+
+
+def _does_not_follow(best: Errors) -> str:
+    return (
+        f"the best model of a pressed unit follows this reading by {best.fit_percent:.0f} % only: it is of another"
+        " kind, or its columns are mistaken, and no cause can be named by it"
+    )
 
 
 def _percent_less(after: float, before: float) -> float:

@@ -83,8 +83,9 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[li
         for number in range(int(session.cycle[-1]) + 1):
             index = np.flatnonzero(session.cycle == number)
             part = load[index]
-            peak = float(part.max())
-            inside = np.flatnonzero(part > 0.1 * peak) if peak > 0.1 else np.zeros(0, dtype=int)
+            low, peak = float(load.min()), float(part.max())
+            tall = peak - low > 0.1 * np.ptp(load)
+            inside = np.flatnonzero(part > low + 0.1 * (peak - low)) if tall else np.zeros(0, dtype=int)
             if inside.size < 8:
                 continue
             first, last = index[inside[0]], index[inside[-1]]

@@ -23,7 +23,7 @@ MATERIAL = 2e-4  # of the full-scale reading: what an effect must move the readi
 SLIGHT = 5e-5  # what is significant but moves the reading by less is left alone
 LEAST_FALL = 30.0  # of -2 log likelihood for an effect with one parameter
 FALL_A_PARAMETER = 8.0
-BEST_WHITENED, BEST_RAW = 4, 1
+BEST_WHITENED, BEST_OF_FAMILY, BEST_RAW = 6, 2, 1
 BEST_SWAPS = 3
 MOST_PARTS = 6
 QUICK_STEPS = 8
@@ -33,7 +33,7 @@ WORTH_A_MERGER = 0.8
 MOST_MERGED = 4
 WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
-NAMED_OF_LARGEST = 0.03
+NAMED_OF_LARGEST = 0.05
 LEAST_OF_LARGEST = (
     0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
 )
@@ -41,6 +41,7 @@ SHAPE_ERROR = 0.05
 MERGED_SHAPE_ERROR = 0.02
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
+CANCELLING_OTHERS = 12.0
 CANCELLING = 4.0  # times what an addition takes off the error: what it may move the reading by
 
 
@@ -179,11 +180,7 @@ def _added(evidence: Evidence, current: Fit, looked: Screening, progress: Progre
     if not tried:
         return None
     first = min(tried, key=lambda one: one.cost)
-
-    def worse(one: Fit) -> float:
-        return margin(evidence, one, first, current) if one is not first else 0.0
-
-    tried.sort(key=worse)
+    tried.sort(key=lambda one: margin(evidence, one, first, current) if one is not first else 0.0)
     for attempt in tried:
         name = attempt.model.names[-1]
         why = _refusal(evidence, current, attempt)
@@ -195,7 +192,13 @@ def _added(evidence: Evidence, current: Fit, looked: Screening, progress: Progre
 
 
 def _worth_trying(looked: Screening) -> list[Screened]:
-    white = [one for one in looked.ranked if one.fall > LEAST_FALL / 2][:BEST_WHITENED]
+    white: list[Screened] = []
+    families: dict[str, int] = {}
+    for one in looked.ranked:
+        family = one.candidate.effect.family
+        if one.fall > LEAST_FALL / 2 and len(white) < BEST_WHITENED and families.get(family, 0) < BEST_OF_FAMILY:
+            white.append(one)
+            families[family] = families.get(family, 0) + 1
     raw = sorted(looked.ranked, key=lambda one: -one.raw_share)[:BEST_RAW]
     return [*white, *(one for one in raw if one not in white and one.raw_share > 0)]
 
@@ -224,46 +227,68 @@ def _refusal(evidence: Evidence, current: Fit, attempt: Fit) -> str | None:
     if held_out_cost(evidence, attempt.model) >= held_out_cost(evidence, current.model):
         return "no gain on held-out data"
     added = attempt.model.parts[-1]
-    alone = visible(evidence, attempt.model, _nulled(attempt.model, added.name))
-    if alone > CANCELLING * size and any(effect(one).family == added.effect.family for one in current.model.names):
-        return "it only cancels one of its family"
+    alone = visible(evidence, attempt.model, attempt.model.without(added.name))
+    related = any(effect(one).family == added.effect.family for one in current.model.names)
+    if alone > (CANCELLING if related else CANCELLING_OTHERS) * size:
+        return "it mostly cancels what is there"
     return None
 
 
-def _nulled(model: ExtendedModel, name: str) -> ExtendedModel:
-    """The model with one effect taken out and everything else as it is."""
-    return model.without(name)
-
-
 def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progress: Progress) -> Settled:
-    """Drop what has become needless; swap what another effect does better, for a set that was not ``seen`` before."""
+    """Drop what has become needless; swap what another effect does better, for a set that was not ``seen`` before.
+
+    Ends at the best of the sets that it came by: a swap that fits better may lead nowhere.
+    """
     tried = set(seen)
+    best: Settled | None = None
+    merged: str | None = None
     while True:
         without = {name: fit(evidence, current.model.without(name), QUICK_STEPS) for name in current.model.names}
         name = _needless(evidence, current, without)
+        if name is not None and name == merged and best is not None:
+            return best  # the merger was no gain
         if name is not None:
             progress(f"dropped {name}")
             current = without[name]
             continue
         tried.add(frozenset(current.model.names))
-        rivals: dict[str, tuple[Rival, ...]] = {}
-        better: tuple[str, Rival] | None = None
-        for name in sorted(without, key=lambda one: without[one].cost):
-            found = _swaps(evidence, current, without[name], name)
-            rivals[name] = tuple(found)
-            new = [one for one in found if one.fit is not None and frozenset(one.fit.model.names) not in tried]
-            if new and new[0].margin < -BETTER:
-                better = name, new[0]
-                break
-        if better is not None and better[1].fit is not None:
-            progress(f"swapped {better[0]} for {better[1].effect}")
-            current = fit(evidence, better[1].fit.model)
-            continue
-        one = _merged(evidence, current, without, tried)
-        if one is None:
-            return Settled(current, without, rivals)
-        progress(f"merged {' and '.join(set(current.model.names) - set(one.model.names))} into {one.model.names[-1]}")
-        current = one
+        rivals = {name: tuple(_swaps(evidence, current, less, name)) for name, less in without.items()}
+        here = Settled(current, without, rivals)
+        if best is None or merged is not None or _score(evidence, current) < _score(evidence, best.fit):
+            best, merged = here, None
+        following = _better(here, tried)
+        if following is None:
+            one = _merged(evidence, current, without, tried)
+            if one is None:
+                return best
+            following, merged = one, one.model.names[-1]
+        gone = " and ".join(sorted(set(current.model.names) - set(following.model.names)))
+        progress(
+            f"{'merged' if merged else 'swapped'} {gone} {'into' if merged else 'for'} {following.model.names[-1]}"
+        )
+        current = fit(evidence, following.model)
+
+
+def _score(evidence: Evidence, one: Fit) -> float:
+    """What sets of effects are compared by."""
+    return one.cost + sum(penalty(name) for name in one.model.names) + _of_curves(evidence, one.model)
+
+
+def _of_curves(evidence: Evidence, model: ExtendedModel) -> float:
+    """What the displacement says of the static curve in a model."""
+    curved = any(part.effect.family == "static_curve" for part in model.parts)
+    return evidence.displacement_cost(model) if curved else 0.0
+
+
+def _better(here: Settled, tried: set[frozenset[str]]) -> Fit | None:
+    """The swap that gains most, to a set that was not tried."""
+    found = [
+        rival
+        for rivals in here.rivals.values()
+        for rival in rivals
+        if rival.fit is not None and rival.margin < -BETTER and frozenset(rival.fit.model.names) not in tried
+    ]
+    return min(found, key=lambda rival: rival.margin).fit if found else None
 
 
 def _merged(evidence: Evidence, current: Fit, without: dict[str, Fit], tried: set[frozenset[str]]) -> Fit | None:
@@ -318,7 +343,7 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival
     looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
     others = _newcomers(looked, less, (name,))
     whole = less.cost - current.cost
-    near = [one for one in others if one.fall >= WORTH_A_SWAP * whole][:BEST_SWAPS]
+    near = [one for k, one in enumerate(others) if k < 2 or one.fall >= WORTH_A_SWAP * whole][:BEST_SWAPS]
     raced = _raced(evidence, less, near)
     own = replace(
         current, model=current.model.without(name).with_part(effect(name), part_of(current.model, name).values)

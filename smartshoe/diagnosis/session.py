@@ -26,7 +26,8 @@ Mask = NDArray[np.bool_]
 SAMPLES_A_RAMP = 12  # of the fastest ramp from 10 to 90 % of the load
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 1.35  # times: for the sake of speed
-CYCLE_SHARE = 0.08  # of full scale that the load must fall and rise again between two cycles
+# Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
+CYCLE_SHARE = 0.08
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
 REST_MARGIN_S = 0.25  # about a rest, where the load may already move
@@ -269,12 +270,13 @@ def _noise(signal: Array) -> float:
 
 def _cycles(conditions: Conditions) -> NDArray[np.intp]:
     load = conditions.load
-    points = turning_points(load, CYCLE_SHARE)
+    threshold = CYCLE_SHARE * min(1.0, max(float(np.ptp(load)), 1e-9))
+    points = turning_points(load, threshold)
     # A cycle begins at the foot of a rise; the foot of a rest is its last sample at the low level.
-    feet = [p for p, q in pairwise(points) if load[q] - load[p] > CYCLE_SHARE]
+    feet = [p for p, q in pairwise(points) if load[q] - load[p] > threshold]
     starts = []
     for foot in feet:
-        level = load[foot] + 0.25 * CYCLE_SHARE
+        level = load[foot] + 0.25 * threshold
         end = foot
         while end + 1 < load.size and load[end + 1] <= level:
             end += 1

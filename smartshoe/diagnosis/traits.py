@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 SAME_RATE = 0.25
 SAME_PEAK = 0.10
+SAMPLES_OF_A_RATE = 4
 STEP_S = 0.15  # a ramp within this time is a step
 IDLE_S = 60.0
 FLAT_PER_S = 0.004  # of full scale: slower is a hold
@@ -67,20 +68,24 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
     kinds: dict[tuple[int, int], int] = {}
     for session in sessions:
         load, step_s = session.conditions.load, session.conditions.step_s
-        points = turning_points(load, CYCLE_SHARE)
+        span = min(1.0, max(float(np.ptp(load)), 1e-9))
+        lowest = float(load.min())
+        points = turning_points(load, CYCLE_SHARE * span)
         for first, last in pairwise(points):
             rise = float(load[last] - load[first])
-            if abs(rise) < CYCLE_SHARE:
+            if abs(rise) < 3.0 * CYCLE_SHARE * span:
                 continue
             part = (load[first : last + 1] - load[first]) / rise
             begin, end = int(np.argmax(part >= 0.2)), int(np.argmax(part >= 0.8))
+            if end - begin < SAMPLES_OF_A_RATE and session.thinned == 1:
+                continue  # too short to have a rate
             rate = 0.6 * rise / max((end - begin) * step_s, 0.5 * step_s)
             if rise > 0:
                 rates.append(rate)
                 peaks.append(float(load[last]))
                 kind = (round(10 * np.log2(rate)), round(20 * peaks[-1]))
                 kinds[kind] = kinds.get(kind, 0) + 1
-                if load[first] > 0.15:
+                if load[first] > lowest + 0.15 * span:
                     minor = True
         flat = np.abs(session.conditions.rate_per_s) < FLAT_PER_S
         hold_s = max(hold_s, _longest(flat & ~session.resting & (load > 0.1)) * step_s)

@@ -244,5 +244,7 @@ def _rate_range(experiments: Sequence[Experiment]) -> tuple[float, float]:
     rising = slope[slope > 0.02 * max(float(np.max(slope, initial=0.0)), 1e-12)]
     if not rising.size:
         return 0.0, 0.0
-    low, high = np.percentile(rising, [5, 95])
+    rising.sort()
+    # Straight lines between the sorted ones, as np.percentile has it, at a fraction of its cost.
+    low, high = np.interp([0.05 * (rising.size - 1), 0.95 * (rising.size - 1)], np.arange(rising.size), rising)
     return float(low), float(high)

@@ -120,7 +120,7 @@ def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float,
     if method == "srivc":
         # SRIVC has no delay of its own: it is found by prediction error, then SRIVC runs on the aligned signals.
         delay_s = problem.delay_s(theta)
-        alpha, p1, p2, iterations, converged = srivc(
+        alpha, p1, p2, _, iterations, converged = srivc(
             problem,
             prefilter_rad_s=prefilter_rad_s,
             tolerance=limits.tolerance,

@@ -78,9 +78,9 @@ def block_means(signal: Array, factor: int) -> Array:
 
 def whole_blocks(kept: Mask, factor: int) -> Mask:
     """(n // factor,) whether all ``factor`` neighbours are kept."""
-    if kept.all():
-        return np.ones(kept.size // factor, dtype=bool)
-    whole: Mask = block_means(kept.astype(float), factor) > 1.0 - 0.5 / factor
+    whole = np.ones(kept.size // factor, dtype=bool)
+    broken = np.flatnonzero(~kept) // factor
+    whole[broken[broken < whole.size]] = False
     return whole
 
 
@@ -200,8 +200,8 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
             )
         if what == "load":
             span = max(high for _, high in ends) - min(low for low, _ in ends)
-    rise = max(_largest_rise(load) for load in loads)
-    fall = max(_largest_rise(-load) for load in loads)
+    rises = [_largest_rises(load) for load in loads]
+    rise, fall = max(up for up, _ in rises), max(down for _, down in rises)
     if min(rise, fall) < LEAST_RETURN * span:
         missing = "never falls again" if fall < rise else "never rises"
         raise NotIdentifiableError(
@@ -210,12 +210,17 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
 
 
 def kept_of(signal: Array, kept: Mask) -> Array:
-    """``signal`` (n,) at the samples that count; itself where all do."""
-    return signal if kept.all() else signal[kept]
+    """``signal`` (n,) at the samples that count: itself, or a view, where those lie together."""
+    first, count = int(kept.argmax()), int(np.count_nonzero(kept))
+    together = slice(first, first + count)
+    return signal[together] if kept[together].all() else signal[kept]
 
 
-def _largest_rise(signal: Array) -> float:
-    """The largest climb from an earlier sample; over means of a few samples where there are thousands."""
+def _largest_rises(signal: Array) -> tuple[float, float]:
+    """The largest climb from an earlier sample, and fall; over means of a few samples where there are thousands."""
     few = max(signal.size // 2000, 1)
     coarse = block_means(signal, few) if few > 1 else signal
-    return float(np.max(coarse - np.minimum.accumulate(coarse)))
+    return (
+        float(np.max(coarse - np.minimum.accumulate(coarse))),
+        float(np.max(np.maximum.accumulate(coarse) - coarse)),
+    )

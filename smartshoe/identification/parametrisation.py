@@ -19,6 +19,7 @@ from smartshoe.models import X_OVER_NRT
 Structure = Literal["free", "grey_box"]
 GREY_NAMES = ("k1", "k2", "c", "x_over_nrt")
 GREY_FIXED = {"c": 1.0, "x_over_nrt": X_OVER_NRT}  # as the paper has it
+SAME = np.eye(3)
 LEAST = 1e-9  # of k2 and c, which must stay positive
 
 
@@ -50,7 +51,7 @@ class FreeForm:
 
     def shape(self, theta: Array) -> Shape:
         """The response at ``theta``."""
-        return Shape(float(np.exp(theta[0])), float(theta[1]), float(theta[2]), np.eye(3))
+        return Shape(float(np.exp(theta[0])), float(theta[1]), float(theta[2]), SAME)
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
         """(a1, b0, b1) of Chinimilli 2016 (13), and their derivative (3, 3)."""

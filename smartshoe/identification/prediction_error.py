@@ -1,8 +1,8 @@
 """The prediction error of the first-order model: one residual and one analytic gradient for every method.
 
 Written for an input u and an output y, as y = p1 (u - w) + p2 w + offset + h exp(-alpha t), where w = alpha/(s +
-alpha) u started in steady state. `PredictionError.evaluate` takes one compiled pass over the data;
-`PredictionError.residual` and `jacobian` are its slow twin, and what the statistics are computed from.
+alpha) u started in steady state. `PredictionError.evaluate`, `model_error` and `model_error_and_slopes` take one
+compiled pass over the data; `residual`, `jacobian` and `error_and_slopes`, from plain filters, are their slow twins.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from smartshoe.identification.solve import Evaluation
 from smartshoe.identification.whitening import Whitening, whiten, whitening
 from smartshoe.models.first_order import (
     HALF_WIDTH,
-    hold_coefficients,
-    hold_slopes,
     interpolation_gain,
     lag,
     lag_and_slope,
@@ -33,6 +31,7 @@ IMPULSE_SAMPLES = 2048
 MOST_NOISE = 0.99  # of the gradient's inner products, in any direction of theta
 NONE = np.zeros(0)
 EVERY = np.zeros(0, dtype=bool)
+NOT_STORED = np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,11 @@ class PredictionError:
     """
 
     def __init__(
-        self, experiments: Sequence[Experiment], settings: Settings, form: Parametrisation | None = None
+        self,
+        experiments: Sequence[Experiment],
+        settings: Settings,
+        form: Parametrisation | None = None,
+        kept: Sequence[Mask] | None = None,
     ) -> None:
         self.experiments, self.settings = list(experiments), settings
         self.form: Parametrisation = form or FreeForm(settings.direction)
@@ -77,10 +80,19 @@ class PredictionError:
         self.lower[: self.shape_size], self.upper[: self.shape_size] = low, high
         if self.delay_at is not None:
             self.lower[self.delay_at], self.upper[self.delay_at] = -LARGEST_DELAY_S, LARGEST_DELAY_S
-        self.kept: list[Mask] = [experiment.kept for experiment in self.experiments]
-        if self.delay_at is not None:
+        self.kept: list[Mask] = list(kept or [experiment.kept for experiment in self.experiments])
+        if self.delay_at is not None and kept is None:
             self.drop_edges(EDGE_SAMPLES)
         self._pairs = [self._signals(experiment) for experiment in self.experiments]
+        from smartshoe.kernels.first_order import COLUMNS
+
+        # From the columns of a recording's pass to theta and the error: constants and states are its own.
+        self._columns = [np.zeros((COLUMNS, self.size + 1)) for _ in self.experiments]
+        for index, own in enumerate(self._columns):
+            own[-1, -1] = 1.0
+            for column, place in ((3, self.delay_at), (4, self.offset_at), (5, self.state_at)):
+                if place is not None:
+                    own[column, place if column == 3 else place + index] = 1.0
         self._coarse: PredictionError | None = None
         self._delayed: tuple[float, list[tuple[Array, Array]]] | None = None
 
@@ -153,22 +165,18 @@ class PredictionError:
 
     def with_noise_ratio(self, ratio: float) -> PredictionError:
         """This problem with the input's noise allowed for."""
-        other = PredictionError(self.experiments, replace(self.settings, noise_ratio=ratio), self.form)
-        other.kept = self.kept
-        return other
+        return PredictionError(self.experiments, replace(self.settings, noise_ratio=ratio), self.form, self.kept)
 
     def thinned(self, factor: int) -> PredictionError:
         """This problem on means of ``factor`` neighbouring samples."""
         if factor == 1:
             return self
-        thin = PredictionError(
-            [experiment.decimated(factor) for experiment in self.experiments], self.settings, self.form
-        )
-        for index, kept in enumerate(self.kept):
-            thin.kept[index] = (
-                kept if thin.experiments[index] is self.experiments[index] else whole_blocks(kept, factor)
-            )
-        return thin
+        few = [experiment.decimated(factor) for experiment in self.experiments]
+        kept = [
+            mask if thin is experiment else whole_blocks(mask, factor)
+            for mask, thin, experiment in zip(self.kept, few, self.experiments, strict=True)
+        ]
+        return PredictionError(few, self.settings, self.form, kept)
 
     def delayed(self, theta: Array) -> list[tuple[Array, Array]]:
         """Per recording the input at the delay, and its derivative with respect to it (empty where it is fixed)."""
@@ -182,7 +190,7 @@ class PredictionError:
             found = []
             for (u, _), experiment in zip(self._pairs, self.experiments, strict=True):
                 value, slope = shifted(u, experiment.time_s, experiment.step, sign * delay_s)
-                found.append((value, sign * slope if self.delay_at is not None else NONE))
+                found.append((value, NONE if self.delay_at is None else slope if sign > 0 else -slope))
         self._delayed = (delay_s, found)
         return found
 
@@ -191,51 +199,41 @@ class PredictionError:
         """Cost, gradient and normal matrix at ``theta``: no residual is stored."""
         if self.settings.noise_ratio:
             return self._evaluate_plainly(theta)
+        sums, shape = np.zeros((self.size + 1, self.size + 1)), self.shape(theta)
+        for index in range(len(self.experiments)):
+            own = self._to_theta(shape, index)
+            sums += own.T @ self._pass(theta, shape, index, NOT_STORED) @ own
+        return Evaluation(float(sums[-1, -1]), sums[:-1, -1], sums[:-1, :-1], self.count)
+
+    def _to_theta(self, shape: Shape, index: int) -> Array:
+        """(COLUMNS, size + 1) from the columns of one recording's pass to theta and the error."""
+        own = self._columns[index].copy()
+        own[:3, : self.shape_size] = shape.slope
+        return own
+
+    def _pass(self, theta: Array, shape: Shape, index: int, stored: Array) -> Array:
+        """`inner_products` (COLUMNS, COLUMNS) of one recording at ``theta``, its columns into ``stored``."""
         from smartshoe.kernels.first_order import COLUMNS, inner_products
 
-        shape = self.shape(theta)
-        active = np.array(
-            [0, 1, 2]
-            + [3] * (self.delay_at is not None)
-            + [4] * (self.offset_at is not None)
-            + [5] * (self.state_at is not None)
-            + [COLUMNS - 1]
+        products = np.zeros((COLUMNS, COLUMNS))
+        (u, slope), y = self.delayed(theta)[index], self._pairs[index][1]
+        kept, step = self.kept[index], self.experiments[index].step
+        inner_products(
+            u,
+            slope,
+            y,
+            EVERY if kept.all() else kept,
+            np.atleast_1d(step),
+            float(self.experiments[index].time_s[0]),
+            shape.alpha,
+            shape.p1,
+            shape.p2,
+            self.constant(theta, index),
+            self.state(theta, index),
+            stored,
+            products,
         )
-        # From the kernel's six columns to theta, less the constants and states, which are each recording's own.
-        to_theta = np.zeros((4, self.size))
-        to_theta[:3, : self.shape_size] = shape.slope
-        if self.delay_at is not None:
-            to_theta[3, self.delay_at] = 1.0
-        normal, gradient, cost = np.zeros((self.size, self.size)), np.zeros(self.size), 0.0
-        for index, (experiment, (u, slope)) in enumerate(zip(self.experiments, self.delayed(theta), strict=True)):
-            products = np.zeros((COLUMNS, COLUMNS))
-            kept = self.kept[index]
-            inner_products(
-                u,
-                slope,
-                self._pairs[index][1],
-                EVERY if kept.all() else kept,
-                np.atleast_1d(experiment.step),
-                holds(shape.alpha, experiment.step),
-                shape.alpha,
-                shape.p1,
-                shape.p2,
-                self.constant(theta, index),
-                self.state(theta, index),
-                active,
-                products,
-            )
-            products += np.triu(products, 1).T
-            own = np.zeros((COLUMNS - 1, self.size))
-            own[:4] = to_theta
-            if self.offset_at is not None:
-                own[4, self.offset_at + index] = 1.0
-            if self.state_at is not None:
-                own[5, self.state_at + index] = 1.0
-            normal += own.T @ products[:-1, :-1] @ own
-            gradient += own.T @ products[:-1, -1]
-            cost += float(products[-1, -1])
-        return Evaluation(cost, gradient, normal, self.count)
+        return products
 
     def _evaluate_plainly(self, theta: Array) -> Evaluation:
         residual, jacobian = self.residual_and_jacobian(theta)
@@ -316,12 +314,23 @@ class PredictionError:
 
     def model_error(self, theta: Array, index: int) -> Array:
         """(n,) model minus measured of one recording at every sample, missing ones too; never whitened."""
-        u = self.delayed(theta)[index][0]
-        experiment, shape = self.experiments[index], self.shape(theta)
-        w = lag(u, shape.alpha, experiment.step)
-        fade = np.exp(-shape.alpha * experiment.time_s)
-        error: Array = shape.p1 * (u - w) + shape.p2 * w + self.constant(theta, index) - self._pairs[index][1]
-        return error + self.state(theta, index) * fade
+        from smartshoe.kernels.first_order import respond
+
+        experiment, shape, u = self.experiments[index], self.shape(theta), self.delayed(theta)[index][0]
+        error, constant, state = np.empty(u.size), self.constant(theta, index), self.state(theta, index)
+        steps, begin_s = np.atleast_1d(experiment.step), float(experiment.time_s[0])
+        respond(u, steps, begin_s, shape.alpha, shape.p1, shape.p2, constant, state, error)
+        error -= self._pairs[index][1]
+        return error
+
+    def model_error_and_slopes(self, theta: Array, index: int) -> tuple[Array, Array]:
+        """What `error_and_slopes` gives, from the compiled pass."""
+        from smartshoe.kernels.first_order import COLUMNS
+
+        stored, shape = np.empty((COLUMNS, self.experiments[index].time_s.size)), self.shape(theta)
+        self._pass(theta, shape, index, stored)
+        both = self._to_theta(shape, index).T @ stored
+        return both[-1], both[:-1]
 
     def error_and_slopes(
         self, theta: Array, index: int, signals: tuple[Array, Array] | None = None
@@ -348,14 +357,3 @@ class PredictionError:
         if self.state_at is not None:
             slopes[self.state_at + index] = fade
         return error, slopes
-
-
-def holds(alpha: float, step: float | Array) -> Array:
-    """(1 or n - 1, 6) first-order-hold coefficients and their derivatives with respect to ``alpha``."""
-    if isinstance(step, float):
-        x = alpha * step
-        return np.array([[*hold_coefficients(x), *(step * slope for slope in hold_slopes(x))]])
-    values: Array = np.stack(
-        [*hold_coefficients(alpha * step), *(step * slope for slope in hold_slopes(alpha * step))], axis=1
-    )
-    return np.ascontiguousarray(values)

@@ -50,21 +50,15 @@ def residual_tests(problem: PredictionError, theta: Array, errors: Sequence[Arra
 
 def whiteness(residuals: Sequence[Array], kept: Sequence[Mask]) -> ResidualTest:
     """Ljung-Box over 20 lags, pooled over recordings; pairs with a missing sample do not count."""
-    filled = [
-        residual if mask.all() else np.where(mask, residual, 0.0)
-        for residual, mask in zip(residuals, kept, strict=True)
-    ]
-    power = sum(float(residual @ residual) for residual in filled)
+    from smartshoe.kernels.residual import lagged_products
+
     total = sum(int(np.count_nonzero(mask)) for mask in kept)
     lags = min(WHITENESS_LAGS, max(total // 4, 1))
-    statistic = 0.0
-    for lag in range(1, lags + 1):
-        product = sum(float(residual[lag:] @ residual[:-lag]) for residual in filled)
-        pairs = sum(
-            max(mask.size - lag, 0) if mask.all() else int(np.count_nonzero(mask[lag:] & mask[:-lag])) for mask in kept
-        )
-        if pairs and power > 0.0:
-            statistic += (product / power * total) ** 2 / pairs
+    products, pairs = np.zeros(lags + 1), np.zeros(lags + 1, dtype=int)
+    for residual, mask in zip(residuals, kept, strict=True):
+        lagged_products(residual if mask.all() else np.where(mask, residual, 0.0), mask, products, pairs)
+    correlation = products[1:] / products[0] if products[0] > 0.0 else np.zeros(lags)
+    statistic = float(np.sum((correlation * total) ** 2 / np.maximum(pairs[1:], 1)))
     return ResidualTest(statistic, _chi_square_tail(lags, statistic), lags)
 
 
@@ -81,37 +75,33 @@ def input_independence(problem: PredictionError, theta: Array, errors: Sequence[
     their rank under white residuals. A slow dynamic left out shows here. Looked at in means of a few samples, which
     are as white as the samples.
     """
+    from smartshoe.kernels.residual import orthogonalise
+
     total = sum(error.size for error in errors)
     factor = max(total // BLOCKS, 1)
     coarse = problem.thinned(factor)
-    rows, residuals, fitted = [], [], []
-    lags = sorted({lag // factor for lag in INPUT_LAGS})
+    lags, size = sorted({lag // factor for lag in INPUT_LAGS}), problem.size
+    rows, residuals = [], []
     for index, error in enumerate(errors):
-        mask = coarse.kept[index]
-        u = coarse.delayed(theta)[index][0]
-        if factor > 1:
-            error = block_means(error, factor)
-        delayed = np.empty((len(lags), u.size))
-        for row, lag in zip(delayed, lags, strict=True):
+        u, inside = coarse.delayed(theta)[index][0], coarse.kept[index].astype(float)
+        row = np.empty((size + len(lags), u.size))
+        row[:size] = coarse.model_error_and_slopes(theta, index)[1]
+        for delayed, lag in zip(row[size:], lags, strict=True):
             lag = min(lag, u.size)
-            row[:lag], row[lag:] = u[0], u[: u.size - lag]
-        rows.append(delayed[:, mask])
-        residuals.append(error[mask])
-        fitted.append(coarse.error_and_slopes(theta, index)[1][:, mask])
-    lagged, error, used = np.concatenate(rows, axis=1), np.concatenate(residuals), np.concatenate(fitted, axis=1)
+            delayed[:lag], delayed[lag:] = u[0], u[: u.size - lag]
+        row *= inside
+        rows.append(row)
+        residuals.append((block_means(error, factor) if factor > 1 else error) * inside)
+    # Beside each other: what the fit has used, then the delayed inputs.
+    both, error = np.concatenate(rows, axis=1), np.concatenate(residuals)
+    lagged = both[size:]
     # Differences of neighbouring lags are far less collinear than the lags themselves.
-    lagged[1:] = np.diff(lagged, axis=0)
-    norm = np.sqrt(np.einsum("ij,ij->i", used, used))
-    used /= np.where(norm > 0, norm, 1.0)[:, np.newaxis]
-    before = np.sqrt(np.einsum("ij,ij->i", lagged, lagged))
-    lagged /= np.where(before > 0, before, 1.0)[:, np.newaxis]
-    gram = used @ used.T
-    for _ in range(2):  # once more, since the first pass loses digits
-        lagged -= np.linalg.lstsq(gram, used @ lagged.T, rcond=1e-13)[0].T @ used
+    lagged[1:] -= lagged[:-1].copy()
+    orthogonalise(both, size)
     values, vectors = np.linalg.eigh(lagged @ lagged.T)
     usable = values > 1e-9
     degrees = int(np.count_nonzero(usable))
-    variance = float(error @ error) / max(error.size - used.shape[0], 1)
+    variance = float(error @ error) / max(coarse.count - size, 1)
     if not degrees or variance == 0.0:
         return ResidualTest(0.0, 1.0, degrees)
     leaning = vectors[:, usable].T @ (lagged @ error)

@@ -6,6 +6,7 @@ ends them, so that they end at one optimum.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -65,12 +66,17 @@ class Minimum:
 
 def solve_normal(normal: Array, right: Array) -> Array:
     """x with normal x = right, columns scaled by their norm; the smallest x where it is singular."""
-    scale = np.sqrt(np.diag(normal))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    scale = np.sqrt(normal.diagonal())
+    if not scale.all():
+        scale = np.where(scale > 0.0, scale, 1.0)
+    values, vectors = np.linalg.eigh(normal / (scale[:, np.newaxis] * scale))
+    along = vectors.T @ (right / scale)
     usable = values > SINGULAR * values[-1]
-    inverse = np.where(usable, 1.0 / np.where(usable, values, 1.0), 0.0)
-    x: Array = vectors @ (inverse * (vectors.T @ (right / scale))) / scale
+    if usable.all():
+        along /= values
+    else:
+        along = np.where(usable, along / np.where(usable, values, 1.0), 0.0)
+    x: Array = vectors @ along / scale
     return x
 
 
@@ -80,7 +86,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
     It also ends where the full Gauss-Newton step, which is still taken, is below 1e-4 standard errors. Raises
     `NotIdentifiableError` where the normal equations have no finite solution.
     """
-    theta = np.clip(np.asarray(theta, dtype=float), problem.lower, problem.upper)
+    theta = np.minimum(np.maximum(theta, problem.lower), problem.upper)
     now = problem.evaluate(theta)
     if not np.isfinite(now.cost):
         raise NotIdentifiableError(
@@ -93,7 +99,8 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
         promised = float(newton @ now.gradient)
         if promised <= NEGLIGIBLE * now.cost / max(now.count, 1):
             # The step is worth taking, a new look at the data is not.
-            return Minimum(np.clip(theta - newton, problem.lower, problem.upper), now, iteration, True)
+            last = np.minimum(np.maximum(theta - newton, problem.lower), problem.upper)
+            return Minimum(last, now, iteration, True)
         accepted = False
         for _ in range(60):
             step = walk.step(now, newton, free)
@@ -107,7 +114,8 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
         if not accepted:
             # No descent is left within rounding: this is the optimum if little was promised.
             return Minimum(theta, now, iteration, promised <= 1e-7 * now.cost)
-        change = float(np.max(np.abs(move) / (np.abs(trial) + 1e-3 * np.max(np.abs(trial)) + 1e-300)))
+        size = np.abs(trial)
+        change = float((np.abs(move) / (size + (1e-3 * size.max() + 1e-300))).max())
         gained = now.cost - following.cost
         theta, before, now = trial, now.cost, following
         if change < tolerance or (gained <= ROUNDING * before and foretold <= 1e-6 * before):
@@ -117,6 +125,8 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
 
 def _free(problem: Problem, theta: Array, gradient: Array) -> NDArray[np.bool_]:
     """Unknowns that may move: not those at a bound that the descent would cross."""
+    if (theta > problem.lower).all() and (theta < problem.upper).all():
+        return np.ones(theta.size, dtype=bool)
     held = ((theta <= problem.lower) & (gradient > 0)) | ((theta >= problem.upper) & (gradient < 0))
     return ~held
 
@@ -132,6 +142,10 @@ def _newton_step(now: Evaluation, free: NDArray[np.bool_]) -> Array:
     if free.any():
         step[free] = solve_normal(now.normal[np.ix_(free, free)], now.gradient[free])
     return step
+
+
+def _length(vector: Array) -> float:
+    return math.sqrt(float(vector @ vector))
 
 
 class _GaussNewton:
@@ -158,10 +172,10 @@ class _LevenbergMarquardt(_GaussNewton):
 
     def __init__(self, first: Evaluation) -> None:
         self.damping, self.growth = 1e-4, 2.0
-        self.scale = np.diag(first.normal).copy()
+        self.scale = first.normal.diagonal().copy()
 
     def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
-        self.scale = np.maximum(self.scale, np.diag(now.normal))
+        self.scale = np.maximum(self.scale, now.normal.diagonal())
         damped = now.normal + self.damping * np.diag(self.scale)
         step = np.zeros(newton.size)
         step[free] = solve_normal(damped[np.ix_(free, free)], now.gradient[free])
@@ -184,11 +198,11 @@ class _TrustRegion(_GaussNewton):
 
     def __init__(self, first: Evaluation) -> None:
         self.radius = np.inf
-        self.scale = np.sqrt(np.maximum(np.diag(first.normal), 1e-300))
+        self.scale = np.sqrt(np.maximum(first.normal.diagonal(), 1e-300))
 
     def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
-        self.scale = np.maximum(self.scale, np.sqrt(np.diag(now.normal)))
-        if float(np.linalg.norm(self.scale * newton)) <= self.radius:
+        self.scale = np.maximum(self.scale, np.sqrt(now.normal.diagonal()))
+        if self.radius == np.inf or _length(self.scale * newton) <= self.radius:
             return newton
         scale = self.scale[free]
         values, vectors = np.linalg.eigh(now.normal[np.ix_(free, free)] / np.outer(scale, scale))
@@ -207,6 +221,8 @@ class _TrustRegion(_GaussNewton):
         return step
 
     def keep_inside(self, trial: Array, problem: Problem) -> Array:
+        if (trial >= problem.lower).all() and (trial <= problem.upper).all():
+            return trial
         reflected = np.where(trial < problem.lower, 2 * problem.lower - trial, trial)
         reflected = np.where(reflected > problem.upper, 2 * problem.upper - reflected, reflected)
         inside: Array = np.clip(np.where(np.isfinite(reflected), reflected, trial), problem.lower, problem.upper)
@@ -219,7 +235,7 @@ class _TrustRegion(_GaussNewton):
     def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
         gained = now.cost - following.cost
         share = gained / foretold if foretold > 0.0 else -1.0
-        length = float(np.linalg.norm(self.scale * move))
+        length = _length(self.scale * move)
         if not np.isfinite(following.cost) or share < 0.25:
             self.radius = 0.25 * length
         elif share > 0.75 and length > 0.95 * self.radius:

@@ -7,25 +7,14 @@ import math
 import numpy as np
 from numba import njit
 
-from smartshoe.kernels.first_order import COLUMNS, inner_products
-from smartshoe.kernels.srivc import instrument_products
-
-_SMALL = 1e-3
+from smartshoe.kernels.first_order import COLUMNS, hold, inner_products, respond
+from smartshoe.kernels.srivc import INSTRUMENT, REGRESSOR, TARGET, instrument_products
 
 
 @njit(cache=True)
 def hold_row(alpha, step, out):  # type: ignore[no-untyped-def]
-    """One row (1, 6) of `kernels.first_order`'s ``holds`` at ``alpha`` in 1/s and ``step`` in s."""
-    x = alpha * step
-    decay, fall = math.exp(-x), math.expm1(-x)
-    if x > _SMALL:
-        now = 1.0 + fall / x
-        slope = (decay + fall / x) / x
-    else:
-        now = x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x / 720))))
-        slope = -1 / 2 + x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x / 144)))
-    out[0, 0], out[0, 1], out[0, 2] = decay, now, -fall - now
-    out[0, 3], out[0, 4], out[0, 5] = -step * decay, -step * slope, step * (slope + decay)
+    """`kernels.first_order.hold` as one row (1, 6)."""
+    out[0, 0], out[0, 1], out[0, 2], out[0, 3], out[0, 4], out[0, 5] = hold(alpha, step)
 
 
 @njit(cache=True)
@@ -48,13 +37,15 @@ def _solve3(matrix, right, out):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _start(u, y, step, pole, theta):  # type: ignore[no-untyped-def]
     """SRIVC (Chinimilli 2016, Section V) of ``u`` and ``y``, into theta = (ln alpha, p1, p2); False if astray."""
-    every, row = np.empty(0, dtype=np.bool_), np.empty((1, 6))
-    normal, right, solution = np.empty((5, 5)), np.empty(5), np.empty(3)
+    every, steps = np.empty(0, dtype=np.bool_), np.array([step])
+    products, normal, right, solution = np.empty((COLUMNS, COLUMNS)), np.empty((3, 3)), np.empty(3), np.empty(3)
     instrument = y.copy()
     for _ in range(20):
-        hold_row(pole, step, row)
-        normal[:], right[:] = 0.0, 0.0
-        instrument_products(u, y, instrument, every, row, pole, normal, right)
+        products[:] = 0.0
+        instrument_products(u, y, instrument, every, steps, pole, products)
+        for i in range(3):
+            row = products[INSTRUMENT if i == 0 else i]
+            normal[i, 0], normal[i, 1], normal[i, 2], right[i] = row[REGRESSOR], row[1], row[2], row[TARGET]
         if not _solve3(normal, right, solution) or not math.isfinite(solution[0]) or solution[0] == 0.0:
             return False
         alpha = min(max(abs(solution[0]), 1e-4 / (u.size * step)), 1.0 / step)
@@ -64,12 +55,7 @@ def _start(u, y, step, pole, theta):  # type: ignore[no-untyped-def]
         theta[0], theta[1], theta[2] = math.log(alpha), p1, p2
         if settled:
             return True
-        hold_row(alpha, step, row)
-        w = u[0]
-        instrument[0] = p2 * w
-        for k in range(1, u.size):
-            w = row[0, 0] * w + (row[0, 1] * u[k] + row[0, 2] * u[k - 1])
-            instrument[k] = p1 * (u[k] - w) + p2 * w
+        respond(u, steps, 0.0, alpha, p1, p2, 0.0, 0.0, instrument)
     return False
 
 
@@ -80,9 +66,9 @@ def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[n
     ``u``, ``y`` (n,) input and output ``step`` s apart, no offset, no delay, steady before; ``pole`` SRIVC's first
     lambda, on means of ``factor`` samples. ``theta`` (3,) becomes (ln alpha, p1, p2), ``normal`` (3, 3) J'J.
     """
-    none, every, steps = np.empty(0), np.empty(0, dtype=np.bool_), np.array([step])
-    active = np.array([0, 1, 2, COLUMNS - 1])
-    row, products, change = np.empty((1, 6)), np.empty((COLUMNS, COLUMNS)), np.empty(3)
+    none, stored = np.empty(0), np.empty((0, 0))
+    every, steps = np.empty(0, dtype=np.bool_), np.array([step])
+    products, change = np.empty((COLUMNS, COLUMNS)), np.empty(3)
     blocks = u.size // factor
     thin_u, thin_y = np.empty(blocks), np.empty(blocks)
     for k in range(blocks):
@@ -98,10 +84,10 @@ def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[n
     gradient = np.empty(3)
     scaled = np.empty((3, 3))
     for passes in range(1, 60):
-        alpha = math.exp(theta[0])
-        hold_row(alpha, step, row)
         products[:] = 0.0
-        inner_products(u, none, y, every, steps, row, alpha, theta[1], theta[2], 0.0, 0.0, active, products)
+        inner_products(
+            u, none, y, every, steps, 0.0, math.exp(theta[0]), theta[1], theta[2], 0.0, 0.0, stored, products
+        )
         following = products[COLUMNS - 1, COLUMNS - 1]
         if not following <= cost * (1.0 + 1e-14):
             for i in range(3):
@@ -111,7 +97,7 @@ def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[n
         for i in range(3):
             gradient[i] = products[i, COLUMNS - 1]
             for j in range(3):
-                normal[i, j] = products[min(i, j), max(i, j)]
+                normal[i, j] = products[i, j]
         for i in range(3):
             for j in range(3):
                 scaled[i, j] = normal[i, j] / math.sqrt(normal[i, i] * normal[j, j])

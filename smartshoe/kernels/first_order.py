@@ -5,128 +5,211 @@ The slow twin, with which the tests compare, is `smartshoe.identification.predic
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
 CHUNK = 256  # samples whose columns stay in the first-level cache
 COLUMNS = 7  # d/d ln alpha, d/d p1, d/d p2, d/d delay, d/d offset, d/d start, error
+FADED = 1e-30  # of a start: below it nothing is left, and numbers would become subnormal, which are slow
 _LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
+_SMALL = 1e-3
+
+
+@njit(cache=True)
+def hold(alpha, step):  # type: ignore[no-untyped-def]
+    """E, A, B of `models.first_order.hold_coefficients` at ``alpha`` in 1/s, and their derivatives over alpha."""
+    x = alpha * step
+    decay, fall = math.exp(-x), math.expm1(-x)
+    if x > _SMALL:
+        now = 1.0 + fall / x
+        slope = (decay + fall / x) / x
+    else:
+        now = x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x / 720))))
+        slope = -1 / 2 + x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x / 144)))
+    return decay, now, -fall - now, -step * decay, -step * slope, step * (slope + decay)
 
 
 @njit(cache=True, fastmath=_LAX)
-def _recur(decay, last, drive, m):  # type: ignore[no-untyped-def]
-    """x_j = decay x_(j-1) + drive_j in place, four samples at a time so that one need not wait for the other."""
-    d2 = decay * decay
-    d3, d4 = d2 * decay, d2 * d2
+def recur(E, dE, w, v, s, lag, drift, slow, m):  # type: ignore[no-untyped-def]
+    """w_j = E w_(j-1) + lag_j, v_j = E v_(j-1) + dE w_(j-1) + drift_j, s_j = E s_(j-1) + slow_j for ``m`` samples.
+
+    In place of the drives, and four samples at a time, so that one need not wait for the other.
+    """
+    E2 = E * E
+    E3, E4 = E2 * E, E2 * E2
     whole = m // 4 * 4
     for j in range(0, whole, 4):
-        x0 = drive[j]
-        x1 = decay * x0 + drive[j + 1]
-        x2 = decay * x1 + drive[j + 2]
-        x3 = decay * x2 + drive[j + 3]
-        drive[j] = decay * last + x0
-        drive[j + 1] = d2 * last + x1
-        drive[j + 2] = d3 * last + x2
-        last = d4 * last + x3
-        drive[j + 3] = last
+        a0 = lag[j]
+        a1 = E * a0 + lag[j + 1]
+        a2 = E * a1 + lag[j + 2]
+        a3 = E * a2 + lag[j + 3]
+        c0 = slow[j]
+        c1 = E * c0 + slow[j + 1]
+        c2 = E * c1 + slow[j + 2]
+        c3 = E * c2 + slow[j + 3]
+        w0, w1, w2, w3 = E * w + a0, E2 * w + a1, E3 * w + a2, E4 * w + a3
+        b0 = drift[j] + dE * w
+        b1 = E * b0 + (drift[j + 1] + dE * w0)
+        b2 = E * b1 + (drift[j + 2] + dE * w1)
+        b3 = E * b2 + (drift[j + 3] + dE * w2)
+        drift[j], drift[j + 1], drift[j + 2] = E * v + b0, E2 * v + b1, E3 * v + b2
+        lag[j], lag[j + 1], lag[j + 2], lag[j + 3] = w0, w1, w2, w3
+        slow[j], slow[j + 1], slow[j + 2] = E * s + c0, E2 * s + c1, E3 * s + c2
+        w, v, s = w3, E4 * v + b3, E4 * s + c3
+        drift[j + 3], slow[j + 3] = v, s
     for j in range(whole, m):
-        last = decay * last + drive[j]
-        drive[j] = last
-    return last
+        v = E * v + dE * w + drift[j]
+        w = E * w + lag[j]
+        s = E * s + slow[j]
+        lag[j], drift[j], slow[j] = w, v, s
+    return w, v, s
+
+
+@njit(cache=True, fastmath=_LAX)
+def add_products(columns, m, out):  # type: ignore[no-untyped-def]
+    """Add the inner products of the ``m`` first samples of ``columns`` to ``out`` (COLUMNS, COLUMNS).
+
+    Written out, since 28 sums stay in registers: each sample is read once, which is four times as fast as pairs.
+    """
+    a, b, c, d = columns[0], columns[1], columns[2], columns[3]
+    e, f, g = columns[4], columns[5], columns[6]
+    aa = ab = ac = ad = ae = af = ag = 0.0
+    bb = bc = bd = be = bf = bg = 0.0
+    cc = cd = ce = cf = cg = 0.0
+    dd = de = df = dg = 0.0
+    ee = ef = eg = 0.0
+    ff = fg = gg = 0.0
+    for j in range(m):
+        p, q, r, s, t, u, v = a[j], b[j], c[j], d[j], e[j], f[j], g[j]
+        aa, ab, ac, ad, ae, af, ag = aa + p * p, ab + p * q, ac + p * r, ad + p * s, ae + p * t, af + p * u, ag + p * v
+        bb, bc, bd, be, bf, bg = bb + q * q, bc + q * r, bd + q * s, be + q * t, bf + q * u, bg + q * v
+        cc, cd, ce, cf, cg = cc + r * r, cd + r * s, ce + r * t, cf + r * u, cg + r * v
+        dd, de, df, dg = dd + s * s, de + s * t, df + s * u, dg + s * v
+        ee, ef, eg = ee + t * t, ef + t * u, eg + t * v
+        ff, fg, gg = ff + u * u, fg + u * v, gg + v * v
+    sums = (
+        aa, ab, ac, ad, ae, af, ag, bb, bc, bd, be, bf, bg, cc, cd, ce, cf, cg, dd, de, df, dg, ee, ef, eg, ff, fg, gg
+    )  # fmt: skip
+    at = 0
+    for i in range(COLUMNS):
+        for k in range(i, COLUMNS):
+            out[i, k] += sums[at]
+            out[k, i] = out[i, k]
+            at += 1
 
 
 @njit(cache=True, fastmath=_LAX)
 def inner_products(  # type: ignore[no-untyped-def]
-    u, slope, y, counted, steps, holds, alpha, p1, p2, offset, start, active, out
+    u, slope, y, counted, steps, begin_s, alpha, p1, p2, offset, start, stored, out
 ):
     """Add the inner products (COLUMNS, COLUMNS) of gradient and error over counted samples to ``out``.
 
     ``u`` (n,) input, ``slope`` (n,) its derivative with respect to the delay (or size 0), ``y`` (n,) output,
-    ``counted`` (n,) bool or size 0 for all, ``steps`` (1,) or (n - 1,) in s, ``holds`` (1 or n - 1, 6) rows E, A, B
-    of `models.first_order.hold_coefficients` and their derivatives with respect to alpha. ``active`` (c,) the
-    columns wanted, rising, the error's last. Only the upper triangle of ``out`` is filled. The model is
-    y = p1 (u - w) + p2 w + offset + start exp(-alpha t) with w = alpha/(s + alpha) u.
+    ``counted`` (n,) bool or size 0 for all, ``steps`` (1,) or (n - 1,) in s, ``begin_s`` the time of the first
+    sample. ``stored`` (COLUMNS, n) receives the columns at every sample, counted or not (or has size 0). The delay's
+    column is 0 where there is no slope. The model is y = p1 (u - w) + p2 w + offset + start exp(-alpha t) with
+    w = alpha/(s + alpha) u.
     """
     n = u.size
-    even = steps.size == 1
-    delayed = slope.size > 0
-    masked = counted.size > 0
+    even, delayed, masked = steps.size == 1, slope.size > 0, counted.size > 0
     columns = np.empty((COLUMNS, CHUNK))
-    lag, drift, slow = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK)
-    fades, times = np.empty(CHUNK), np.empty(CHUNK)
-    E, A, B, dE, dA, dB = holds[0]
+    fades, times, now_s = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK)
+    inputs, changes = np.zeros(CHUNK + 1), np.zeros(CHUNK + 1)  # the sample before the chunk, then the chunk
+    before, now, before_change, now_change = inputs[:CHUNK], inputs[1:], changes[:CHUNK], changes[1:]
+    drift, rest, lag, slow = columns[0], columns[1], columns[2], columns[3]
+    ones, fading, error = columns[4], columns[5], columns[6]
+    E, A, B, dE, dA, dB = hold(alpha, steps[0])
     fades[0], times[0] = 1.0, 0.0
-    if even:
-        for j in range(1, CHUNK):
-            fades[j] = fades[j - 1] * E
-            times[j] = j * steps[0]
-    u_last = w = u[0]
-    v = 0.0
-    s_last = ws = slope[0] if delayed else 0.0
-    fade, time_s = 1.0, 0.0
+    for j in range(1, CHUNK):
+        fades[j], times[j] = fades[j - 1] * E, j * steps[0]
+    w = v = s = 0.0
+    time_s, fade = begin_s, math.exp(-alpha * begin_s)
     drop = p2 - p1
-    at = 0
-    while at < n:
+    for at in range(0, n, CHUNK):
         m = min(CHUNK, n - at)
-        if even:
-            # The first sample of all repeats u[0], which leaves the steady start as it is.
-            lag[0] = A * u[at] + B * u_last
-            for j in range(1, m):
-                lag[j] = A * u[at + j] + B * u[at + j - 1]
-            w_last = w
-            w = _recur(E, w, lag, m)
-            drift[0] = dE * w_last + dA * u[at] + dB * u_last
-            for j in range(1, m):
-                drift[j] = dE * lag[j - 1] + dA * u[at + j] + dB * u[at + j - 1]
-            v = _recur(E, v, drift, m)
-            if delayed:
-                slow[0] = A * slope[at] + B * s_last
-                for j in range(1, m):
-                    slow[j] = A * slope[at + j] + B * slope[at + j - 1]
-                ws = _recur(E, ws, slow, m)
-                s_last = slope[at + m - 1]
-            u_last = u[at + m - 1]
+        source, target = u[at:], y[at:]
+        for j in range(m):
+            now[j] = source[j]
+        if delayed:
+            source = slope[at:]
             for j in range(m):
-                columns[4, j] = time_s + times[j]
-                columns[5, j] = fade * fades[j]
+                now_change[j] = source[j]
+        if at == 0:  # as if the first sample had lasted for ever
+            inputs[0] = w = now[0]
+            changes[0] = s = now_change[0]
+        # One short loop a column: LLVM turns none into vector instructions that touches more than a few arrays.
+        if even:
+            for j in range(m):
+                lag[j] = A * now[j] + B * before[j]
+                drift[j] = dA * now[j] + dB * before[j]
+            for j in range(m):
+                slow[j] = A * now_change[j] + B * before_change[j]
+            w, v, s = recur(E, dE, w, v, s, lag, drift, slow, m)
+            for j in range(m):
+                now_s[j] = time_s + times[j]
+                fading[j] = fade * fades[j]
             fade *= fades[m - 1] * E
             time_s += m * steps[0]
         else:
             for j in range(m):
-                k = at + j
-                if k > 0:
-                    E, A, B, dE, dA, dB = holds[k - 1]
-                    v = E * v + (dE * w + dA * u[k] + dB * u_last)
-                    w = E * w + (A * u[k] + B * u_last)
-                    if delayed:
-                        ws = E * ws + (A * slope[k] + B * s_last)
+                if at + j > 0:
+                    E, A, B, dE, dA, dB = hold(alpha, steps[at + j - 1])
+                    v = E * v + (dE * w + dA * now[j] + dB * before[j])
+                    w = E * w + (A * now[j] + B * before[j])
+                    s = E * s + (A * now_change[j] + B * before_change[j])
                     fade *= E
-                    time_s += steps[k - 1]
-                u_last = u[k]
-                if delayed:
-                    s_last = slope[k]
-                lag[j], drift[j], slow[j] = w, v, ws
-                columns[4, j], columns[5, j] = time_s, fade
+                    time_s += steps[at + j - 1]
+                lag[j], drift[j], slow[j], now_s[j], fading[j] = w, v, s, time_s, fade
+        if fade < FADED:
+            fade = 0.0
         for j in range(m):
-            k = at + j
-            columns[0, j] = alpha * (drop * drift[j] - start * columns[4, j] * columns[5, j])
-            columns[1, j] = u[k] - lag[j]
-            columns[2, j] = lag[j]
-            columns[6, j] = p1 * (u[k] - lag[j]) + p2 * lag[j] + offset + start * columns[5, j] - y[k]
-            columns[4, j] = 1.0
-        if delayed:
+            drift[j] = alpha * (drop * drift[j] - start * now_s[j] * fading[j])
+        for j in range(m):
+            ones[j], rest[j] = 1.0, now[j] - lag[j]
+        for j in range(m):
+            slow[j] = p1 * now_change[j] + drop * slow[j]
+        for j in range(m):
+            error[j] = p1 * rest[j] + p2 * lag[j] + offset + start * fading[j] - target[j]
+        inputs[0], changes[0] = now[m - 1], now_change[m - 1]
+        for i in range(stored.shape[0]):
             for j in range(m):
-                columns[3, j] = p1 * slope[at + j] + drop * slow[j]
+                stored[i, at + j] = columns[i, j]
         if masked:
+            counts = 0
             for j in range(m):
+                counts += counted[at + j]
+            for j in range(m if counts < m else 0):
                 if not counted[at + j]:
-                    columns[:, j] = 0.0
-        for i in range(active.size):
-            left = columns[active[i]]
-            for k in range(i, active.size):
-                right = columns[active[k]]
-                total = 0.0
-                for j in range(m):
-                    total += left[j] * right[j]
-                out[active[i], active[k]] += total
-        at += m
+                    for i in range(COLUMNS):
+                        columns[i, j] = 0.0
+        add_products(columns, m, out)
+
+
+@njit(cache=True, fastmath=_LAX)
+def respond(u, steps, begin_s, alpha, p1, p2, offset, start, out):  # type: ignore[no-untyped-def]
+    """The model's output (n,) alone into ``out``; arguments as those of `inner_products`."""
+    n = u.size
+    E, A, B, _, _, _ = hold(alpha, steps[0])
+    lag, none, fading = np.empty(CHUNK), np.zeros(CHUNK), np.empty(CHUNK)
+    u_last = w = u[0]
+    fade, start = 0.0, start * math.exp(-alpha * begin_s)
+    if steps.size == 1:
+        for at in range(0, n, CHUNK):
+            m = min(CHUNK, n - at)
+            now, here = u[at:], out[at:]
+            lag[0], fading[0] = A * now[0] + B * u_last, 1.0 if at == 0 else 0.0
+            for j in range(1, m):
+                lag[j], fading[j] = A * now[j] + B * now[j - 1], 0.0
+            w, _, fade = recur(E, 0.0, w, 0.0, fade if fade > FADED else 0.0, lag, none, fading, m)
+            for j in range(m):
+                here[j] = p1 * (now[j] - lag[j]) + p2 * lag[j] + offset + start * fading[j]
+            u_last = now[m - 1]
+    else:
+        for k in range(n):
+            if k > 0:
+                E, A, B, _, _, _ = hold(alpha, steps[k - 1])
+                w = E * w + (A * u[k] + B * u[k - 1])
+            fade = 1.0 if k == 0 else E * fade
+            out[k] = p1 * (u[k] - w) + p2 * w + offset + start * fade

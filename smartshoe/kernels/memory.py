@@ -14,7 +14,7 @@ from numba import njit
 _LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
 _BISECTIONS = 50
 NO_LOAD = 1e30  # stands for a load before the first one
-CYCLE_ENDS = 0.02  # of the cycle's height
+CYCLE_ENDS = 0.05  # of the cycle's height
 
 
 @njit(cache=True)
@@ -71,7 +71,8 @@ def relays_undone(signal, strength, half_widths, closed, open_, levelling, state
         low, high = y - 2.0 * strength, y + 2.0 * strength
         for _ in range(_BISECTIONS):
             f = 0.5 * (low + high)
-            trial[:] = state
+            for i in range(trial.size):
+                trial[i] = state[i]
             if f - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, trial) < y:
                 low = f
             else:
@@ -258,7 +259,7 @@ def _cycle_step(f, least, trough, peak):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def cycles_done(load, least, state, out):  # type: ignore[no-untyped-def]
-    """out (n,): load cycles completed: the load rose by ``least`` and came back but for 2 % of the rise.
+    """out (n,): load cycles completed: the load rose by ``least`` and came back but for 5 % of the rise.
 
     ``state`` (3,): lowest load since the last cycle, highest since then (NO_LOAD before the first sample), count.
     """
@@ -290,21 +291,24 @@ def conditioned_undone(signal, strength, per_cycle, least, state, out):  # type:
 
 @njit(cache=True)
 def rate_undone(signal, strength, exponent, softness, dead_zone, step_s, keep, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 + strength r^exponent) = ``signal`` (n,), r the smoothed rate of what came out before.
+    """out (n,) with out (1 + strength s(r)) = ``signal`` (n,), r the rate that raised the signal's own smoothed rate.
 
-    r^exponent is (r^2 + softness^2)^(exponent/2) - softness^exponent, r a first-order mean with ``keep`` a step.
-    ``state`` (2,): last cleaned out (NO_LOAD before the first sample), r.
+    s(r) = (r^2 + softness^2)^(exponent/2) - softness^exponent; the signal's rate r (1 + strength s(r)), as on a ramp,
+    is a first-order mean with ``keep`` a step of its way through a play of ``dead_zone``. (From the rate of what comes
+    out, unloading would be unstable.) ``state`` (2,): last cleaned signal (NO_LOAD before the first), its rate.
     """
-    last, rate = state
+    last, seen = state
+    floor = softness**exponent
     for k in range(signal.size):
-        size = (rate * rate + softness * softness) ** (0.5 * exponent) - softness**exponent
-        f = signal[k] / (1.0 + strength * size)
-        cleaned = f if last >= NO_LOAD else min(max(last, f - dead_zone), f + dead_zone)
+        cleaned = signal[k] if last >= NO_LOAD else min(max(last, signal[k] - dead_zone), signal[k] + dead_zone)
         moved = 0.0 if last >= NO_LOAD else abs(cleaned - last)
-        rate = keep * rate + (1.0 - keep) * moved / step_s
+        seen = keep * seen + (1.0 - keep) * moved / step_s
         last = cleaned
-        out[k] = f
-    state[0], state[1] = last, rate
+        gain = 1.0
+        for _ in range(8):
+            gain = 1.0 + strength * (((seen / gain) ** 2 + softness * softness) ** (0.5 * exponent) - floor)
+        out[k] = signal[k] / gain
+    state[0], state[1] = last, seen
 
 
 @njit(cache=True)
@@ -352,24 +356,14 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
 
 @njit(cache=True)
 def softened_undone(signal, strength, width, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 + strength tanh((M^2 - out^2)/width)) = ``signal`` (n,), M the largest out so far.
+    """out (n,) = u (1 - strength tanh((M^2 - u^2)/width)) of the ``signal`` u (n,), M the largest out so far.
 
     ``state`` (1,): that largest, less ``dead_zone``.
     """
     largest = state[0]
     for k in range(signal.size):
-        y = signal[k]
-        f = y
-        if 0.0 < y < largest * (1.0 + strength):
-            low, high = y / (1.0 + strength), y
-            for _ in range(_BISECTIONS):
-                f = 0.5 * (low + high)
-                bend = math.tanh(max(largest * largest - f * f, 0.0) / width)
-                if f * (1.0 + strength * bend) < y:
-                    low = f
-                else:
-                    high = f
-            f = 0.5 * (low + high)
+        u = signal[k]
+        f = u * (1.0 - strength * math.tanh(max(largest * largest - u * u, 0.0) / width))
         largest = max(largest, f - dead_zone)
         out[k] = f
     state[0] = largest

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-KERNELS = ("first_order", "shift", "srivc")
+KERNELS = ("first_order", "shift", "srivc", "residual")
 
 
 def begin() -> None:
@@ -29,15 +29,21 @@ def compile_all() -> None:
     """Call each kernel once, on a few numbers of the types that `identify` hands it."""
     import numpy as np
 
-    from smartshoe.kernels.first_order import COLUMNS, inner_products
-    from smartshoe.kernels.shift import weighted_neighbours
-    from smartshoe.kernels.srivc import instrument_products
+    from smartshoe.kernels.first_order import COLUMNS, inner_products, respond
+    from smartshoe.kernels.residual import lagged_products, orthogonalise
+    from smartshoe.kernels.shift import NEIGHBOURS, fill_taps, shift
+    from smartshoe.kernels.srivc import delayed_products, instrument_products
 
-    u, none, every, hold = np.ones(32), np.zeros(0), np.zeros(0, dtype=bool), np.ones((1, 6))
-    weighted_neighbours(u, -7, np.ones(16), np.empty(32))
-    instrument_products(u, u, u, every, hold, 1.0, np.zeros((5, 5)), np.zeros(5))
+    u, none, every, step = np.ones(32), np.zeros(0), np.zeros(0, dtype=bool), np.ones(1)
     products = np.zeros((COLUMNS, COLUMNS))
-    inner_products(u, none, u, every, np.ones(1), hold, 1.0, 1.0, 1.0, 0.0, 0.0, np.arange(COLUMNS), products)
+    delayed_products(u, u, u, u, 1, products)
+    instrument_products(u, u, u, every, step, 1.0, products)
+    respond(u, step, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.empty(32))
+    fill_taps(0.5, np.empty(NEIGHBOURS), np.empty(NEIGHBOURS))
+    shift(u, 0.5, 1.0, np.empty(32), np.empty(32))
+    inner_products(u, none, u, every, step, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.zeros((0, 0)), products)
+    lagged_products(u, np.ones(32, dtype=bool), np.zeros(2), np.zeros(2, dtype=int))
+    orthogonalise(np.ones((2, 32)), 1)
 
 
 if __name__ == "__main__":

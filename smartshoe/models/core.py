@@ -5,11 +5,11 @@ pressure scaled alike. With N = 1 + k1 x0^2/(nRT) (all the spring of wall and ga
 kappa_i and rate a_i, heat of share Gamma and rate b, and omega what has leaked, from the balance of Chinimilli 2016,
 eq. (2):
 
-    (1 + sum kappa + Gamma/N) u = f + sum kappa q + (Gamma/N) r + omega/N
-    q' = a (u - q),   r' = b (u - r),   omega' = lambda p,   p = u - omega + Gamma (u - r)
+    (1 + sum kappa + Gamma/N) u = f + sum kappa q + (Gamma/N) r + (1 + Gamma) omega/N
+    q' = a (u - q),   r' = b (x - r),   omega' = lambda p,   p = x + Gamma (x - r),   x = u - omega
 
 One arm alone is the paper's model: p/f = (s + a)/((1 + kappa) s + a).
-A network of springs and dampers has real poles, so that it runs as a sum of first-order recursions.
+All of it is springs and dampers, so that the poles are real and it runs as a sum of first-order recursions.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from smartshoe.models.effects.effect import Arm, Element, Heat, Leak
 
 Array = NDArray[np.float64]
 
+MOST_SKEWED = 1e9  # condition of the modes' vectors
 USUAL_WALL_RATIO = 1.6  # N of the paper's four units: 1.51 to 1.78 (Table 1)
 
 
@@ -34,18 +35,20 @@ class Core:
         heats = [e for e in elements if isinstance(e, Heat) and e.share != 0.0]
         leak = sum(e.rate_per_s for e in elements if isinstance(e, Leak))
         inner = [*((e.share, e.rate_per_s) for e in arms), *((e.share / wall_ratio, e.rate_per_s) for e in heats)]
-        gain = np.array([share for share, _ in inner] + ([1.0 / wall_ratio] if leak else []))
+        heated = 1.0 + sum(e.share for e in heats)
+        gain = np.array([share for share, _ in inner] + ([heated / wall_ratio] if leak else []))
         # Equal rates would make the modes indistinguishable.
         rate = np.array([value * (1.0 + 1e-7 * k) for k, (_, value) in enumerate(inner)])
-        heat = np.array([0.0] * len(arms) + [e.share for e in heats] + ([1.0] if leak else []))
+        heat = np.array([0.0] * len(arms) + [e.share for e in heats] + ([heated] if leak else []))
         stiffness = 1.0 + sum(share for share, _ in inner)
-        heated = 1.0 + sum(e.share for e in heats)
         to_u = gain / stiffness
         n = gain.size
         matrix, drive = np.zeros((n, n)), np.zeros(n)
         for k, value in enumerate(rate):
             matrix[k] = value * to_u
             matrix[k, k] -= value
+            if leak and k >= len(arms):  # heat is of the gas, whose deformation lacks what has leaked
+                matrix[k, -1] -= value
             drive[k] = value / stiffness
         read = heated * to_u - heat
         direct = heated / stiffness
@@ -74,8 +77,13 @@ class Core:
         if self.drive.size == 1:
             values, vectors, inverse = self.matrix[0], np.ones((1, 1)), np.ones((1, 1))
         else:
-            values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix))
-            inverse = np.linalg.inv(vectors)
+            # Two modes that fall together have no vectors of their own: a millionth apart they have.
+            apart = 1e-6 * np.diag(np.diag(self.matrix) * np.arange(self.drive.size))
+            for shift in (0.0, 1.0, 10.0):
+                values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
+                if np.linalg.cond(vectors) < MOST_SKEWED:
+                    break
+            inverse = np.linalg.pinv(vectors)
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4

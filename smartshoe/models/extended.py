@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 BASELINE = (
     EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),
     EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, 1e-5, 50.0, 0.1),
-    EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 1e-3, 50.0, 0.2),
+    EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
@@ -116,6 +116,8 @@ class ExtendedModel:
         return (*sorted(before, key=order), None, *sorted(after, key=order))
 
     def _run(self, signal: Array, conditions: Conditions, first: int = 0, kept: list[Array] | None = None) -> Array:
+        # Blocks that bend a spring beside the relaxing arm solve the balance of both.
+        conditions.kept["relaxing"] = np.array([self.relaxing_share, self.relaxation_rate_per_s])
         for part in self.chain[first:]:
             if kept is not None:
                 kept.append(signal)
@@ -151,7 +153,7 @@ class ExtendedModel:
     def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
-        The chain is run anew only from the block that a parameter belongs to.
+        The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
         """
         kept: list[Array] = []
         reading = self._run(conditions.load, conditions, 0, kept)
@@ -166,9 +168,9 @@ class ExtendedModel:
             step = derivative_step(parameter, theta[j])
             moved = theta.copy()
             moved[j] += step
-            first = place_of.get(owner, core)
+            first = place_of.get(owner, core) if owner != "baseline" else 0
             trial = self.at(moved)
-            if first != core:
+            if first != core and owner != "baseline":
                 trial.__dict__["core"] = self.core  # not touched by this parameter
             out[:, j] = (trial._run(kept[first], conditions, first) - reading) / step
         return reading, out

@@ -25,7 +25,7 @@ def steps(time_s: Array) -> Steps:
     if step.size == 0:
         return 1.0
     mean = float((time_s[-1] - time_s[0]) / step.size)
-    return mean if np.all(np.abs(step - mean) <= EVEN_TOLERANCE * mean) else step
+    return mean if max(step.max() - mean, mean - step.min()) <= EVEN_TOLERANCE * mean else step
 
 
 def hold_coefficients(x: Any) -> tuple[Any, Any, Any]:
@@ -159,7 +159,10 @@ def interpolation_taps(fraction: float) -> tuple[Array, Array]:
 def interpolation_gain(shift_s: float, time_s: Array, step: Steps) -> tuple[float, float]:
     """The share of white noise's power that `shifted` lets through, and its derivative with respect to the shift."""
     if isinstance(step, float):
-        taps, slopes = interpolation_taps(shift_s / step - np.floor(shift_s / step))
+        from smartshoe.kernels.shift import NEIGHBOURS, fill_taps
+
+        taps, slopes = np.empty(NEIGHBOURS), np.empty(NEIGHBOURS)
+        fill_taps(shift_s / step - math.floor(shift_s / step), taps, slopes)
         return float(taps @ taps), float(2.0 * taps @ slopes) / step
     some = time_s[: 2000 + 2]
     at = np.clip(some[:-1] + shift_s, some[0], some[-1])
@@ -179,13 +182,10 @@ def shifted(u: Array, time_s: Array, step: Steps, shift_s: float) -> tuple[Array
     """
     n = u.size
     if isinstance(step, float):
-        from smartshoe.kernels.shift import weighted_neighbours
+        from smartshoe.kernels.shift import shift
 
-        whole = int(np.floor(shift_s / step))
-        taps, slopes = interpolation_taps(shift_s / step - whole)
         value, slope = np.empty(n), np.empty(n)
-        weighted_neighbours(u, whole + 1 - HALF_WIDTH, taps, value)
-        weighted_neighbours(u, whole + 1 - HALF_WIDTH, slopes / step, slope)
+        shift(u, shift_s / step, 1.0 / step, value, slope)
         return value, slope
     gradient = np.gradient(u, time_s)
     at = np.clip(time_s + shift_s, time_s[0], time_s[-1])

@@ -20,7 +20,6 @@ from threadpoolctl import threadpool_limits
 
 import smartshoe
 from smartshoe.identification.bank import fit_coefficients
-from smartshoe.identification.prediction_error import holds
 from smartshoe.kernels.first_order import COLUMNS, inner_products
 from smartshoe.recording import Recording
 
@@ -125,13 +124,12 @@ def test_speed_of_one_pass(table):
     num, den = cases.hold_filter(*cases.TRUE)
     a1, b0, b1 = cases.TRUE
     step, none, every = np.array([cases.SAMPLE_TIME_S]), np.zeros(0), np.zeros(0, dtype=bool)
-    row, slope, out = holds(a1, cases.SAMPLE_TIME_S), np.gradient(u, cases.SAMPLE_TIME_S), np.zeros((COLUMNS, COLUMNS))
-    three, six = np.array([0, 1, 2, COLUMNS - 1]), np.arange(COLUMNS)
-    rivals = {
-        "scipy": lambda: lfilter(num, den, u),
-        "three": lambda: inner_products(u, none, y, every, step, row, a1, b0, b1 / a1, 0.0, 0.0, three, out),
-        "six": lambda: inner_products(u, slope, y, every, step, row, a1, b0, b1 / a1, 0.0, 0.0, six, out),
-    }
+    slope, stored, out = np.gradient(u, cases.SAMPLE_TIME_S), np.zeros((0, 0)), np.zeros((COLUMNS, COLUMNS))
+
+    def one_pass(delayed: np.ndarray) -> None:
+        inner_products(u, delayed, y, every, step, 0.0, a1, b0, b1 / a1, 0.0, 0.0, stored, out)
+
+    rivals = {"scipy": lambda: lfilter(num, den, u), "three": lambda: one_pass(none), "six": lambda: one_pass(slope)}
     took = quickest_s(rivals, 30)
     label = "one pass for error, gradient and normal matrix, 19,401 samples (peer: one lfilter pass)"
     for name, figure in (("three", "three coefficients"), ("six", "all six columns: delay, offset, start too")):

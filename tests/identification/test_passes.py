@@ -58,6 +58,13 @@ def test_the_pass_gives_what_the_stored_residual_gives(
         jacobian.T @ jacobian / np.outer(scale, scale), abs=1e-9
     )
     assert seen.gradient / scale == pytest.approx(jacobian.T @ residual / scale, abs=1e-8 * np.sqrt(seen.cost))
+    for level in (problem, problem.thinned(3)):  # whose time does not begin at 0
+        error, slopes = level.error_and_slopes(theta, 1)
+        stored_error, stored_slopes = level.model_error_and_slopes(theta, 1)
+        size = np.max(np.abs(slopes), axis=1, keepdims=True) + 1e-30
+        assert stored_slopes / size == pytest.approx(slopes / size, abs=1e-9)
+        assert stored_error == pytest.approx(error, abs=1e-9 * np.max(np.abs(error)))
+        assert level.model_error(theta, 1) == pytest.approx(error, abs=1e-9 * np.max(np.abs(error)))
 
 
 class _Rosenbrock:

@@ -57,23 +57,24 @@ def dropped(view: View) -> Mask:
     lost = np.where(below, view.rest - y, view.expected - y)
     for first, stop in zip(*runs_of(low | below), strict=True):
         ends_open = stop == y.size or bool(gap[stop - 1])
-        # Both edges make up most of what is lost, and not from a spike.
-        falls = first > 0 and jump[first - 1] < 0.0 and _left(y[max(first - BESIDE, 0) : first], y[first], lost[first])
-        rises = not ends_open and jump[stop - 1] > 0.0 and _left(y[stop : stop + BESIDE], y[stop - 1], lost[stop - 1])
+        # Both edges make up most of what is lost.
+        falls = first > 0 and jump[first - 1] < -EDGE * lost[first]
+        rises = not ends_open and jump[stop - 1] > EDGE * lost[stop - 1]
         if falls and rises:
             out[first:stop] = True
         elif falls and (ends_open or not loaded[stop]):
-            # The load went while the reading was gone; a contact that lets go at a low load jumps too.
-            out[first:stop] = above[first] > LET_GO * view.span or below[first]
+            # The load went while the reading was gone. A contact that lets go at a low load jumps too, and a spike
+            # just before seems to fall.
+            before = y[max(first - BESIDE, 0) : first]
+            out[first:stop] = (above[first] > LET_GO * view.span or below[first]) and _stood(
+                before, y[first] + EDGE * lost[first]
+            )
     return out
 
 
-def _left(beside: Array, low: float, lost: float) -> bool:
-    """Whether readings beside a run stand above its ``low`` end by most of what is ``lost`` there.
-
-    The second largest of a few does: one may be a spike, and most may have dropped out.
-    """
-    return bool(np.sort(beside)[max(beside.size - 2, 0)] - low > EDGE * lost)
+def _stood(beside: Array, level: float) -> bool:
+    """Whether readings stood above a level: the second largest did, since one may be a spike and others be gone."""
+    return bool(np.sort(beside)[max(beside.size - 2, 0)] > level)
 
 
 def _also_gone(view: View, at: Mask) -> Mask:

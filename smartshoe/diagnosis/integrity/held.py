@@ -16,7 +16,7 @@ FLOAT_STEP = 1e-9  # of the span: what a noiseless relaxation comes to rest with
 DOUBT = 0.1  # honest repeats among those that are left out, at most
 WINDOW, LEAST_TURNS = 32, 8
 NEIGHBOURS = 40
-BESIDE = 14
+BESIDE, STILL = 14, 3
 CAUGHT = 0.4  # of the slope on either side, that a held run's mean slope up to the next value has at least
 LONG = 8  # repeats; from there on the slopes on both sides say little of what lies between
 SMALLEST_WIDTH = 0.15  # of the lattice step: what noise is taken for at least, where motion is judged
@@ -90,13 +90,20 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
 
 
 def _noise_beside(y: Array, starts: Index, stops: Index) -> Array:
-    """(runs,) the lesser noise of the stretches just before and just after each run, 0 at an end."""
-    second = np.concatenate([[0.0], np.cumsum(np.diff(y, 2) ** 2)])
-    sides = []
+    """(runs,) the lesser noise just before and just after each run; a side that is held itself is left out.
+
+    At either end of the recording it is 0: one side does not tell whether noise was there on the other.
+    """
+    second = np.diff(y, 2)
+    power = np.concatenate([[0.0], np.cumsum(second**2)])
+    moving = np.concatenate([[0], np.cumsum(second != 0.0)])
+    least = np.full(starts.size, np.inf)
     for low, high in ((starts - BESIDE, starts - 1), (stops, stops + BESIDE - 1)):
-        a, b = np.clip(low, 0, y.size - 2), np.clip(high, 0, y.size - 2)
-        sides.append(np.where(b - a >= BESIDE // 2, np.sqrt((second[b] - second[a]) / np.maximum(b - a, 1)), 0.0))
-    out: Array = np.minimum(*sides) / SECOND_DIFFERENCE
+        a, b = np.clip(low, 0, second.size), np.clip(high, 0, second.size)
+        side = np.sqrt((power[b] - power[a]) / np.maximum(b - a, 1)) / SECOND_DIFFERENCE
+        side = np.where(moving[b] - moving[a] < STILL, np.inf, side)
+        least = np.where(b - a < BESIDE // 2, 0.0, np.minimum(least, side))
+    out: Array = np.where(np.isfinite(least), least, 0.0)
     return out
 
 
@@ -148,6 +155,8 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     least = np.minimum(np.minimum(np.abs(before), np.abs(after)), np.abs(caught))
     # What a friction or a dead band has kept is not caught up with.
     kept = np.abs(caught) < CAUGHT * np.minimum(np.abs(before), np.abs(after))
+    jump, onward = y[after_first] - y[stops], y[np.minimum(stops + 2, m - 1)] - y[after_first]
+    kept |= (repeats >= LONG) & (np.abs(jump) < 2.5 * np.abs(onward))
     last = y[starts] - y[np.maximum(starts - 3, 0)]
     agree &= np.sign(last) == np.sign(caught)
     # A quarter is left out at both ends: the reading may follow a step of load a little late.

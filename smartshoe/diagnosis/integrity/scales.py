@@ -111,11 +111,13 @@ def lattice_step(levels: Array, count: NDArray[np.intp]) -> float:
     often_enough = number >= min(OFTEN, int(number.max()))
     offered = np.concatenate([place[often_enough][:CANDIDATES], place[number >= COMMON * number.max()][:CANDIDATES]])
     some = gaps[:: max(1, gaps.size // SAMPLE)]
-    least = FEW_FIT if gaps.size < FEW else MANY_FIT
-    for candidate in np.unique(offered)[::-1]:
-        step = _refined(some, float(np.exp(SAME_GAP * candidate)))
-        if step > 0.0 and _fits(some, step).mean() > least:
-            return step
+    steps = [_refined(some, float(np.exp(SAME_GAP * candidate))) for candidate in np.unique(offered)[::-1]]
+    # A ramp without noise takes every tenth step, say: what fits all gaps comes before what fits most.
+    shares = [float(_fits(some, step).mean()) if step > 0.0 else 0.0 for step in steps]
+    for least in (FEW_FIT,) if gaps.size < FEW else (FEW_FIT, MANY_FIT):
+        for step, share in zip(steps, shares, strict=True):
+            if share > least:
+                return step
     return 0.0
 
 

@@ -23,6 +23,7 @@ Index = NDArray[np.intp]
 CURVE_BINS = 40
 NEAR_S = 0.1  # corners of load and reading this near to each other are taken for one
 NEAR_SAMPLES = 3
+UPPER_QUARTILE = 1.15  # of a normal deviate's absolute value
 LEAST_NOISE = 1e-4  # of the range: less is arithmetic
 DITHERED = 0.7  # of a lattice step: less noise than this may be the toggling between two levels
 
@@ -123,7 +124,7 @@ class View:
 
     @cached_property
     def noise_at_load(self) -> Array:
-        """(m,) the usual noise at each sample's load, by the median: that of a rest that a ramp stands beside."""
+        """(m,) the usual noise at each sample's load, by the upper quartile: also that of a rest beside a ramp."""
         edges = self.curve[0][:-1] + 0.5 * np.diff(self.curve[0])
         place = np.searchsorted(edges, self.load.values)
         second = np.zeros(place.size)
@@ -133,8 +134,9 @@ class View:
         cuts = np.searchsorted(place[order], np.arange(edges.size + 2))
         for i in range(usual.size):
             if cuts[i + 1] > cuts[i]:
-                usual[i] = np.median(second[order[cuts[i] : cuts[i + 1]]])
-        out: Array = usual[place] / (0.6745 * SECOND_DIFFERENCE)
+                part, rank = second[order[cuts[i] : cuts[i + 1]]], 3 * (cuts[i + 1] - cuts[i]) // 4
+                usual[i] = np.partition(part, rank)[rank]
+        out: Array = usual[place] / (UPPER_QUARTILE * SECOND_DIFFERENCE)
         return out
 
     @cached_property

@@ -8,6 +8,7 @@ from smartshoe.models.effects.effect import Array, Conditions
 
 LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
 SAME_AS_TIME = 0.98  # correlation above which a temperature is a clock, and the two have no separate coefficients
+SMOOTHED_S = 3.0  # a sensor's body follows no faster, and a thermometer's noise would come in as noise of the model
 BLOCKS = 50
 
 
@@ -22,26 +23,37 @@ def drift(conditions: Conditions, values: Array) -> Array:
     The coefficient does nothing without a temperature that moves, the rate nothing where that temperature rises as
     evenly as a clock.
     """
-    by_clock, by_temperature = _live(conditions)
+    warmer_k = _warmer_k(conditions)
     moved = np.zeros(conditions.time_s.size)
-    if by_clock:
+    if warmer_k.size:
+        moved += values[1] * warmer_k
+    if not warmer_k.size or conditions.kept["drift_by_clock"][0] > 0.0:
         moved += values[0] * running_time_s(conditions)
-    if by_temperature and conditions.temperature_k is not None:
-        moved += values[1] * conditions.temperature_k
     return moved
 
 
-def _live(conditions: Conditions) -> Array:
-    """(2,) whether the clock and the temperature count; kept, since it depends on the channels alone."""
-    known = conditions.kept.get("drift_by")
+def _warmer_k(conditions: Conditions) -> Array:
+    """The smoothed temperature (n,), or (0,) where none was logged or it stood still; kept from call to call."""
+    known = conditions.kept.get("warmer_k")
     if known is None:
+        known = np.zeros(0)
         temperature = conditions.temperature_k
-        known = np.array([True, False])
         if temperature is not None and temperature.size > BLOCKS:
             # Means over blocks, since a thermometer's noise would pass for movement and hide a straight line.
             whole = temperature.size // BLOCKS * BLOCKS
             means = temperature[:whole].reshape(BLOCKS, -1).mean(axis=1)
             if float(np.ptp(means)) >= LEAST_CHANGE_K:
-                known = np.array([abs(float(np.corrcoef(means, np.arange(BLOCKS))[0, 1])) < SAME_AS_TIME, True])
-        conditions.kept["drift_by"] = known
-    return np.asarray(known)
+                known = _running_mean(temperature, round(0.5 * SMOOTHED_S / conditions.step_s))
+                like_time = abs(float(np.corrcoef(means, np.arange(BLOCKS))[0, 1])) >= SAME_AS_TIME
+                conditions.kept["drift_by_clock"] = np.array([0.0 if like_time else 1.0])
+        conditions.kept["warmer_k"] = known
+    return known
+
+
+def _running_mean(signal: Array, half: int) -> Array:
+    """(n,) means over ``half`` samples on either side, over as many as there are on both near the ends."""
+    n = signal.size
+    k = np.arange(n)
+    reach = np.minimum(np.minimum(k, n - 1 - k), half)
+    summed = np.concatenate([[0.0], np.cumsum(signal)])
+    return np.asarray((summed[k + reach + 1] - summed[k - reach]) / (2 * reach + 1))

@@ -80,7 +80,7 @@ def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> 
         return None
     slope = np.gradient(prediction, sample_time_s)[1:n:3]
     corner = np.abs(_second_difference(prediction[:n].reshape(-1, 3)))
-    smooth = corner < 0.5 * spread
+    smooth = corner <= max(0.5 * spread, 6.0 * float(np.median(corner)))  # the load's noise is no corner
     whole = int(np.count_nonzero(smooth)) // TRIPLETS * TRIPLETS
     if whole < LEAST_SAMPLES // 6:
         return None

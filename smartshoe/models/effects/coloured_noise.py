@@ -30,8 +30,10 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     """Whether what differs between equal load cycles is correlated in time; None without, or without repeats.
 
     ``residual`` and ``prediction`` (n,) in shares of full scale, ``sample_time_s`` apart. Differences between cycles
-    hold neither the model's misfit, which repeats, nor (by regression) drifts of zero, gain and clock. In them, a
-    score test of white noise against first-order noise of several memories, at one false alarm in 1000.
+    hold neither a misfit that repeats nor (by regression) drifts of zero, gain and clock. In them, a score test of
+    white noise against first-order noise of several memories, at one false alarm in 1000. It is meant for the
+    residual of a model that was chosen: a strong cause without a place in it, with a memory of the past, leaves
+    differences as well.
     """
     covariance, pairs, lengths = np.zeros(0), np.zeros(0), []
     for series, bias, counted in _differences(residual, conditions, prediction):
@@ -44,7 +46,7 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     total = round(float(pairs[0])) if lengths else 0
     if total < LEAST_INDEPENDENT * 4 or covariance[0] <= 0.0:
         return None
-    variance = covariance[0] / total
+    variance = float(covariance[0]) / total
     best: tuple[float, float, float, float] | None = None
     for memory in MEMORIES:
         if total < LEAST_INDEPENDENT * memory or max(lengths) < 2 * memory:
@@ -90,6 +92,9 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
             for cycle, peak in zip(group, peaks, strict=True)
             if abs(peak - np.median(peaks)) <= SAME_PEAK * np.median(peaks)
         ]
+        equal.sort(key=lambda cycle: cycle.start)
+        if len(equal) > 2:
+            equal = equal[1:]  # the first of its kind comes after others: a wrong memory would tell it from the rest
         if len(equal) < 2:
             continue
         n = min(cycle.stop - cycle.start for cycle in equal)
@@ -97,12 +102,11 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
             continue
         aligned = np.stack([residual[cycle.start : cycle.start + n] for cycle in equal])
         shape = np.mean([prediction[cycle.start : cycle.start + n] for cycle in equal], axis=0)
-        spread = max(float(np.median(np.abs(np.diff(aligned, axis=1)))), 1e-12)
-        corner = np.abs(np.diff(shape, 2, prepend=shape[0], append=shape[-1])) > CORNER * spread
-        counted = 1.0 - np.minimum(np.convolve(corner, np.ones(7), mode="same"), 1.0)
+        counted = 1.0 - _corners(shape, float(np.median(np.abs(np.diff(aligned, axis=1)))))
         if np.count_nonzero(counted) < 30:
             continue
-        regressors = np.stack([np.ones(n), shape, np.gradient(shape)], axis=1) * counted[:, None]
+        regressors = np.stack([np.ones(n), np.linspace(-1.0, 1.0, n), shape, np.gradient(shape)], axis=1)
+        regressors *= counted[:, None]
         basis = np.linalg.qr(regressors)[0]
         taken = np.sum([_autocovariance(column) for column in basis.T], axis=0)
         pairs = _autocovariance(counted)
@@ -114,6 +118,13 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
             series = counted * (contrast @ aligned) / math.sqrt(row * (row + 1.0))
             series = series - basis @ (basis.T @ series)
             yield series, taken * float(series @ series) / (pairs[0] - basis.shape[1]), pairs
+
+
+def _corners(shape: Array, noise: float) -> Array:
+    """1.0 (n,) within three samples of where ``shape`` (n,) bends by more than its own noise and ``noise`` allow."""
+    bend = np.abs(np.diff(shape, 2, prepend=shape[0], append=shape[-1]))
+    corner = bend > max(CORNER * noise, 6.0 * float(np.median(bend)))
+    return np.asarray(np.minimum(np.convolve(corner, np.ones(7), mode="same"), 1.0))
 
 
 def _autocovariance(series: Array) -> Array:

@@ -21,8 +21,8 @@ class ContactArea(Effect):
     name, family, stage, place = "contact_area", "static_curve", "contact", "contact"
     says = "the contact grows with the load: the reading against load is bent, steepest at low loads"
     parameters = (
-        EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.2, 0.01),
-        EffectParameter("curvature", "1", "q: 0 bends most near zero load, 1 evenly", None, 0.1, 1.5, 0.5),
+        EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.26, 0.01),
+        EffectParameter("curvature", "1", "q: 0 bends most near zero load, 1 evenly", None, 0.1, 1.2, 0.5),
     )
     shapes = ({"curvature": 1.0}, {"curvature": 0.4})
     exposed_by = frozenset({"peaks", "low_loads"})

@@ -52,7 +52,7 @@ class Conditions:
     ``time_s`` (n,) from the session's start, step ``step_s``; ``load`` (n,) the measured load as a share of full
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
     load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
-    ``neighbour`` (n,) another unit's pressure as a share of its largest, are None where they were not logged.
+    ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where they were not logged.
     """
 
     time_s: Array
@@ -70,7 +70,10 @@ class Conditions:
 
     @cached_property
     def kept(self) -> dict[str, Array]:
-        """A place for what blocks derive from the load alone (largest so far, cycles done), by name."""
+        """A place for what blocks derive from the load alone (largest so far, cycles done), by name.
+
+        "relaxing" holds the baseline's share and rate of the run that is under way.
+        """
         return {}
 
 
@@ -83,7 +86,6 @@ class Inverse(ABC):
 
     def reset(self) -> None:
         """Forget the past; a block without memory has none."""
-        return None
 
     @abstractmethod
     def c_step(self, name: str) -> CStep:

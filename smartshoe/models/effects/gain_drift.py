@@ -8,9 +8,11 @@ from smartshoe.models.effects._sensor_clock import drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
 
+LEAST_GAIN = 0.01
+
 
 class GainDrift(Effect):
-    """P exp(g t), close to P (1 + g t) and never of the other sign; with the temperature logged, P exp(g t + g_T dT).
+    """P (1 + g t); with the temperature logged, P (1 + g t + g_T dT).
 
     g_T is inert without a temperature that moves, g where the temperature is a straight line in time.
     """
@@ -23,16 +25,23 @@ class GainDrift(Effect):
     )
     exposed_by = frozenset({"repeats", "peaks", "pauses"})
     separated_by = {
-        "cycle_conditioning": "pauses", "mullins_softening": "pauses", "zero_drift": "rests",
+        "cycle_conditioning": "pauses; a temperature channel", "mullins_softening": "pauses; loads in shuffled order",
+        "zero_drift": "rests", "load_unload_asymmetry": "repeats",
     }  # fmt: skip
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the session's start."""
-        return signal * np.exp(drift(conditions, values))
+        return signal + signal * drift(conditions, values)
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
-        """Divide by the gain; exact. None with a temperature coefficient: a stream carries no temperature."""
+        """Divide by the gain; exact while that stays above a hundredth of its first value.
+
+        None with a temperature coefficient: a stream carries no temperature.
+        """
         rate, coefficient = (float(value) for value in values)
         if coefficient != 0.0:
             return None
-        return Memoryless(lambda signal, time_s: signal * np.exp(-rate * time_s), f"x *= exp(-({c_number(rate)} * t));")
+        return Memoryless(
+            lambda signal, time_s: signal / np.maximum(1.0 + rate * time_s, LEAST_GAIN),
+            f"x /= fmax(1.0 + {c_number(rate)} * t, {c_number(LEAST_GAIN)});",
+        )

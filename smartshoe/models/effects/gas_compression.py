@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects._wall_loop import relaxed, shared
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
 
 
 class GasCompression(Effect):
-    """p (1 - g)/(1 - g p): Boyle's law with the wall in series; zero and full scale stay where they are."""
+    """p + (N - 1) e = f, e = p/(1 + g p): Boyle's gas beside a straight wall, scaled to f = p = 1 at full scale.
+
+    e is the deformation in the linear gas's units, N that of `smartshoe.models.core` (the usual one).
+    """
 
     name, family, stage, place = "gas_compression", "static_curve", "gas", "gas"
     says = "the air stiffens as it is compressed: the reading against load is bent upwards, ever steeper"
     parameters = (
-        EffectParameter("bow", "FS_reading", "below the straight line at half of full scale", 0.0, 0.0, 0.25, 0.01),
+        EffectParameter(
+            "pressure_ratio", "1", "g: gauge pressure at full scale over the ambient one", 0.0, 0.0, 5.0, 0.1
+        ),
     )
     exposed_by = frozenset({"peaks"})
     separated_by = {
@@ -23,18 +31,38 @@ class GasCompression(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure of the stiffer gas."""
-        if values[0] == 0.0:
+        ratio = float(values[0])
+        if ratio == 0.0:
             return signal.copy()
-        g = self._stiffening(values)
-        return signal * ((1.0 - g) / (1.0 - g * signal))
+        wall, whole = _stiffness(ratio)
 
-    @staticmethod
-    def _stiffening(values: Array) -> float:
-        return 4.0 * float(values[0]) / (1.0 + 2.0 * float(values[0]))
+        def pressure(spring: Array) -> Array:
+            b = 1.0 + wall - ratio * whole * spring
+            root = np.sqrt(np.maximum(b * b + 4.0 * ratio * whole * spring, 0.0))
+            p: Array = 2.0 * whole * spring / (b + root)
+            return p
+
+        def static(spring: Array) -> Array:
+            p = pressure(spring)
+            deformation: Array = (1.0 + ratio) * p / (1.0 + ratio * p)
+            return deformation
+
+        # The load of which the linear core made the signal, less what relaxes.
+        return pressure(shared(static, signal + relaxed(signal, conditions), conditions)[0])
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """y/(1 - g + g y)."""
-        g = self._stiffening(values)
+        """f (static) from p, in closed form."""
+        ratio = float(values[0])
+        wall, whole = _stiffness(ratio)
         return Memoryless(
-            lambda signal, time_s: signal / (1.0 - g + g * signal), f"x /= {c_number(1.0 - g)} + {c_number(g)} * x;"
+            lambda signal, time_s: signal * (1.0 + wall / (1.0 + ratio * signal)) / whole,
+            f"x *= (1.0 + {c_number(wall)} / (1.0 + {c_number(ratio)} * x)) / {c_number(whole)};",
         )
+
+
+def _stiffness(ratio: float) -> tuple[float, float]:
+    """The wall's stiffness over the linear gas's, and that of wall and gas from rest to full scale."""
+    from smartshoe.models.core import USUAL_WALL_RATIO
+
+    wall = USUAL_WALL_RATIO - 1.0
+    return wall, 1.0 + wall / (1.0 + ratio)

@@ -17,7 +17,9 @@ HARMONICS = 7
 MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
 NEIGHBOURS = 60  # bins on either side that give the floor
 HANN_CORRELATION = 1.944  # neighbouring bins behind a Hann window are worth half as many independent ones
-STEADY = 0.4  # least median over mean of a tone's power in time: noise has 0.69, ringing after corners far less
+STRETCHES = 30
+STEADY, STEADIER = 0.4, 0.8  # least median over mean of a weak and of a strong tone's power in time; noise has 0.69
+BURST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
@@ -85,16 +87,19 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     well is the load's, and one that comes and goes is ringing.
     """
     best: tuple[float, float, float, float] | None = None
+    levelled = _levelled(residual) if residual.size >= LEAST_SAMPLES else residual
     for length in sorted({residual.size, min(residual.size, 2048)}):
         if length < LEAST_SAMPLES:
             continue
-        found = _line(residual, prediction, length, sample_time_s)
+        found = _line(levelled, prediction, length, sample_time_s)
         if found is not None and (best is None or found[0] < best[0]):
             best = found
     if best is None:
         return None
     _, ratio, threshold, near_hz = best
     frequency = _refined(residual, near_hz, sample_time_s)
+    if not _is_steady(residual, frequency, sample_time_s):
+        return None
     cosine, sine = _amplitudes(residual, frequency, sample_time_s)
     sources = tuple(
         mains * harmonic
@@ -153,23 +158,47 @@ def _line(
     chance = fdtrc(freedom, rest, ratio)
     allowed = 0.5 * FALSE_ALARMS / (bins - first)
     threshold = fdtri(freedom, rest, 1.0 - allowed)
-    found: tuple[float, float, float, float] | None = None
     for k in np.argsort(chance[first:])[:20] + first:
         if ratio[k] <= threshold[k]:
             break
-        if load_ratio[k] > threshold[k] or not _is_steady(residual, k / (length * sample_time_s), sample_time_s):
-            continue
-        found = float(chance[k]), float(ratio[k]), float(threshold[k]), k / (length * sample_time_s)
-        break
-    return found
+        near_hz = k / (length * sample_time_s)
+        if load_ratio[k] <= 0.5 * threshold[k] and _is_steady(residual, near_hz, sample_time_s):
+            return float(chance[k]), float(ratio[k]), float(threshold[k]), near_hz
+    return None
 
 
 def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bool:
-    """Whether the tone's power in stretches of a thirtieth of the record is much the same throughout."""
-    length = residual.size // 30
-    window = np.exp(-2j * np.pi * frequency_hz * sample_time_s * np.arange(length)) * np.hanning(length)
-    power = np.abs(residual[: 30 * length].reshape(30, length) @ window) ** 2
-    return bool(np.median(power) > STEADY * np.mean(power))
+    """Whether the tone's power in stretches of a thirtieth of the record is much the same throughout.
+
+    The stronger the tone above the floor beside it, the steadier it has to be.
+    """
+    length = residual.size // STRETCHES
+    parts = residual[: STRETCHES * length].reshape(STRETCHES, length)
+    turns = -2j * np.pi * sample_time_s * np.arange(length)
+    window = np.hanning(length)
+
+    def powers(at_hz: float) -> Array:
+        return np.asarray(np.abs(np.sum(parts * (np.exp(turns * at_hz) * window), axis=1)) ** 2)
+
+    beside = 4.0 / (length * sample_time_s)
+    power = powers(frequency_hz)
+    floor = 0.5 * float(np.mean(powers(frequency_hz - beside)) + np.mean(powers(frequency_hz - 1.5 * beside)))
+    over = max(float(np.mean(power)) / max(floor, 1e-300) - 1.0, 0.0)
+    if frequency_hz > 0.5 / sample_time_s - beside:
+        # Half the sampling rate shows of a tone what its phase leaves, which turns slowly.
+        return bool(np.median(power) > 0.5 * STEADY * np.mean(power))
+    return bool(np.median(power) > (STEADY + (STEADIER - STEADY) * over / (over + 3.0)) * np.mean(power))
+
+
+def _levelled(residual: Array) -> Array:
+    """The residual (n,) over its own size nearby: noise that comes in bursts has no lines, but uneven bins."""
+    length = BURST_SAMPLES
+    count = residual.size // length
+    centred = residual - residual.mean()
+    # Differences, so that a slow misfit does not count for noise.
+    rough = np.abs(np.diff(centred, append=centred[-1]))[: count * length].reshape(count, length).mean(axis=1)
+    size = np.interp(np.arange(residual.size), (np.arange(count) + 0.5) * length, rough)
+    return np.asarray(centred / np.maximum(size, 0.1 * float(np.median(rough)) + 1e-300))
 
 
 def _refined(residual: Array, near_hz: float, sample_time_s: float) -> float:

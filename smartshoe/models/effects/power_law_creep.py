@@ -17,7 +17,7 @@ class PowerLawCreep(CoreEffect):
     says = "the wall creeps over all times alike: in holds the reading rises by the same amount in each decade of time"
     parameters = (
         EffectParameter(
-            "creep_per_decade", "1", "relative creep over the decade about 1 s, small creep", 0.0, 0.0, 0.3, 0.01
+            "creep_per_decade", "1", "relative creep over the decade about 1 s, small creep", 0.0, 0.0, 2.0, 0.01
         ),
         EffectParameter("exponent", "1", "alpha: how much slower times weigh less, per decade", None, 0.02, 0.8, 0.2),
     )

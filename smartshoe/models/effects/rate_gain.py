@@ -42,32 +42,32 @@ class RateGain(Effect):
         return signal * factor
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Divide by the gain at the rate of the loads so far: to first order of the step and of the window."""
+        """Divide by the gain at the output's own smoothed rate: exact on ramps, late by the window after corners."""
         from smartshoe.kernels.memory import rate_undone
 
         gain, exponent = (float(value) for value in values)
         keep = math.exp(-step_s / HALF_WINDOW_S)
 
         def body(of: Mapping[str, str]) -> str:
-            zone, half = c_number(LEAST_DEAD_ZONE), c_number(0.5 * exponent)
+            zone = c_number(LEAST_DEAD_ZONE)
             return f"""{{
-    const double square = {of["rate"]} * {of["rate"]} + {c_number(SLOW_PER_S**2)};
-    const double known = {of["last"]} < {NO_LOAD} ? {of["last"]} : x;
-    double cleaned = known;
-    x /= 1.0 + {c_number(gain)} * (pow(square, {half}) - {c_number(SLOW_PER_S**exponent)});
-    if ({of["last"]} >= {NO_LOAD}) {{
+    double cleaned = {of["last"]}, moved = 0.0, ratio = 1.0;
+    int k;
+    if (cleaned >= {NO_LOAD}) {{
         cleaned = x;
-    }} else if (cleaned < x - {zone}) {{
-        cleaned = x - {zone};
-    }} else if (cleaned > x + {zone}) {{
-        cleaned = x + {zone};
-    }}
-    if ({of["last"]} < {NO_LOAD}) {{
-        {of["rate"]} = {c_number(keep)} * {of["rate"]} + {c_number((1.0 - keep) / step_s)} * fabs(cleaned - known);
     }} else {{
-        {of["rate"]} *= {c_number(keep)};
+        cleaned = cleaned < x - {zone} ? x - {zone} : cleaned;
+        cleaned = cleaned > x + {zone} ? x + {zone} : cleaned;
+        moved = fabs(cleaned - {of["last"]});
     }}
+    {of["rate"]} = {c_number(keep)} * {of["rate"]} + {c_number(1.0 - keep)} * moved / {c_number(step_s)};
     {of["last"]} = cleaned;
+    for (k = 0; k < 8; k++) {{
+        const double rate = {of["rate"]} / ratio;
+        ratio = 1.0 + {c_number(gain)} * (pow(rate * rate + {c_number(SLOW_PER_S**2)}, {c_number(0.5 * exponent)})
+            - {c_number(SLOW_PER_S**exponent)});
+    }}
+    x /= ratio;
 }}"""
 
         constants = (gain, exponent, SLOW_PER_S, LEAST_DEAD_ZONE, step_s, keep)
@@ -76,9 +76,17 @@ class RateGain(Effect):
 
 def _rate(conditions: Conditions) -> Array:
     """Way of the cleaned load over a window about each sample, over its length: a rate that noise does not raise."""
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(cleaned_load(conditions))))])[: conditions.load.size]
+    way = np.zeros(conditions.load.size)
+    np.cumsum(np.abs(np.diff(cleaned_load(conditions))), out=way[1:])
     half_s = max(HALF_WINDOW_S, conditions.step_s)
-    place = np.arange(way.size)
-    shift = half_s / conditions.step_s
-    gone: Array = np.interp(place + shift, place, way) - np.interp(place - shift, place, way)
+    early, late = (_later(way, side * half_s / conditions.step_s) for side in (-1.0, 1.0))
+    gone: Array = late - early
     return gone / (2.0 * half_s)
+
+
+def _later(way: Array, samples: float) -> Array:
+    """``way`` (n,) at places ``samples`` later, linear between samples, its end values beyond its ends."""
+    whole = math.floor(samples)
+    places = np.clip(np.arange(whole, whole + way.size + 1), 0, way.size - 1)
+    at: Array = way[places]
+    return at[:-1] + (samples - whole) * np.diff(at)

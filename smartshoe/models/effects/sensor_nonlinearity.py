@@ -53,9 +53,9 @@ class SensorNonlinearity(Effect):
     )
     exposed_by = frozenset({"peaks"})
     separated_by = {
-        "gas_compression": "pressure applied directly to the sensor",
-        "wall_hardening": "pressure applied directly to the sensor",
-        "contact_area": "displacement",
+        "gas_compression": "displacement; pressure applied directly to the sensor",
+        "wall_hardening": "displacement; pressure applied directly to the sensor",
+        "contact_area": "displacement; pressure applied directly to the sensor",
         "saturation": "peaks",
         "dead_band": "low_loads",
     }

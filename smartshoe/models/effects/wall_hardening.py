@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects._wall_loop import shared
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
 
-NEWTON_STEPS = 12
+NEWTON_STEPS = 5
 
 
 class WallHardening(Effect):
-    """f (1 + h)/(1 + h |f|^(m - 1)): k1 grows with |u|^(m - 1), so that the gas takes less and less of the load.
+    """(1 + h) f = u + h [(1 - s) u^3 + s u^5]: k1 grows with strain, the gas takes less and less of the load.
 
-    An odd curve (m = 3 for k1 (1 + beta u^2)); zero and full scale stay where they are.
+    An odd curve, from k1 (1 + beta u^2) to beyond the sinh of long chains; zero and full scale stay where they are.
     """
 
     name, family, stage, place = "wall_hardening", "static_curve", "wall", "wall"
@@ -21,10 +20,10 @@ class WallHardening(Effect):
         "the wall stiffens with deformation: the reading against load is straight at first and flattens at high loads"
     )
     parameters = (
-        EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.15, 0.01),
-        EffectParameter("exponent", "1", "m: 3 for a stiffness that grows with strain squared", None, 2.4, 4.0, 1.0),
+        EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.25, 0.01),
+        EffectParameter("steepness", "1", "s: share of the fifth power, which comes late", None, -0.3, 1.0, 0.3),
     )
-    shapes = ({"exponent": 3.0},)
+    shapes = ({"steepness": 0.1},)
     exposed_by = frozenset({"peaks", "low_loads"})
     separated_by = {
         "gas_compression": "sign; displacement",
@@ -36,35 +35,39 @@ class WallHardening(Effect):
         """The load that a wall without hardening would need."""
         if values[0] == 0.0:
             return signal.copy()
-        h, m = self._stiffening(values)
-        size = np.maximum(np.abs(signal), 1e-300)
-        return signal * (1.0 + h) / (1.0 + h * np.exp((m - 1.0) * np.log(size)))
+        cubic, fifth = _coefficients(values)
+        whole = 1.0 + cubic + fifth
 
-    @staticmethod
-    def _stiffening(values: Array) -> tuple[float, float]:
-        bow, m = (float(value) for value in values)
-        return 2.0 * bow / (1.0 - 0.5 ** (m - 1.0) * (1.0 + 2.0 * bow)), m
+        def static(spring: Array) -> Array:
+            load = whole * spring
+            square = spring * spring
+            u = load * (1.0 + cubic / whole * (1.0 - square)) / (1.0 + cubic + fifth * square)
+            for _ in range(NEWTON_STEPS):
+                square = u * u
+                bent = square * (2.0 * cubic + 4.0 * fifth * square)
+                u = (load + u * bent) / (1.0 + square * (3.0 * cubic + 5.0 * fifth * square))
+            return u
+
+        spring, arm = shared(static, signal, conditions)
+        return static(spring) + arm
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Newton on y (1 + h |f|^(m - 1)) = f (1 + h)."""
-        h, m = self._stiffening(values)
+        """f (static) from u, in closed form."""
+        cubic, fifth = _coefficients(values)
+        whole = 1.0 + cubic + fifth
 
         def undo(signal: Array, time_s: Array) -> Array:
-            y = np.abs(signal)
-            f = y / (1.0 + h)
-            for _ in range(NEWTON_STEPS):
-                bent = h * y * f ** (m - 2.0)
-                f = (y - (m - 2.0) * bent * f) / (1.0 + h - (m - 1.0) * bent)
-            return np.copysign(f, signal)
+            square = signal * signal
+            load: Array = signal * (1.0 + square * (cubic + fifth * square)) / whole
+            return load
 
-        body = f"""{{
-    const double y = fabs(x);
-    double v = y / {c_number(1.0 + h)};
-    int k;
-    for (k = 0; k < {NEWTON_STEPS}; k++) {{
-        const double bent = {c_number(h)} * y * pow(v, {c_number(m - 2.0)});
-        v = (y - {c_number(m - 2.0)} * bent * v) / ({c_number(1.0 + h)} - {c_number(m - 1.0)} * bent);
-    }}
-    x = x < 0.0 ? -v : v;
-}}"""
+        body = f"x *= (1.0 + x * x * ({c_number(cubic)} + {c_number(fifth)} * x * x)) / {c_number(whole)};"
         return Memoryless(undo, body)
+
+
+def _coefficients(values: Array) -> tuple[float, float]:
+    """Of u^3 and u^5."""
+    bow, steepness = (float(value) for value in values)
+    middle = 0.5 + bow
+    hardening = bow / (0.5 - (1.0 - steepness) * middle**3 - steepness * middle**5)
+    return hardening * (1.0 - steepness), hardening * steepness

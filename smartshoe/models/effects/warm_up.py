@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from smartshoe.models.effects._sensor_clock import running_time_s
@@ -10,21 +12,22 @@ from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectPar
 
 
 class WarmUp(Effect):
-    """+ w (1 - exp(-(t/tau)^stretch)), t from the session's start: w is the whole change, of either sign.
+    """+ w (1 - exp(-(t/T)^stretch)), t from the session's start: w is the whole change, of either sign.
 
-    Die, package and board settle at different speeds; together they look like one that is stretched (below 1).
+    Die, package and board settle at different speeds; together they look like one that is stretched (below 1). The
+    time constant is the mean time of settling, T Gamma(1 + 1/stretch), which is T at stretch 1.
     """
 
     name, family, stage, place = "warm_up", "zero", "sensor", "sensor"
     says = "the reading's zero moves once after the start and settles, loaded or not"
     parameters = (
         EffectParameter("change", "FS_reading", "change of the zero once settled", 0.0, -0.5, 0.5, 0.01),
-        EffectParameter("time_constant", "s", "time constant of the settling", None, 5.0, 2000.0, 60.0),
+        EffectParameter("time_constant", "s", "mean time of settling", None, 5.0, 2000.0, 60.0),
         EffectParameter("stretch", "1", "exponent of the settling, 1 for a single time constant", None, 0.6, 1.4, 0.2),
     )
     shapes = tuple({"time_constant": tau, "stretch": 1.0} for tau in (10.0, 30.0, 100.0, 300.0))
     exposed_by = frozenset({"rests", "idle"})
-    separated_by = {"zero_drift": "idle", "linear_leak": "idle", "power_law_creep": "idle", "zero_offset": "idle"}
+    separated_by = {"zero_drift": "idle", "linear_leak": "idle", "permanent_set": "pauses", "zero_offset": "idle"}
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and what the zero has moved."""
@@ -33,11 +36,16 @@ class WarmUp(Effect):
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Subtract it; exact."""
         change, tau, stretch = (float(value) for value in values)
+        scale = c_number(_scale(tau, stretch))
         return Memoryless(
             lambda signal, time_s: signal - change * _settled(time_s, tau, stretch),
-            f"x += {c_number(change)} * expm1(-pow(t / {c_number(tau)}, {c_number(stretch)}));",
+            f"x += {c_number(change)} * expm1(-pow(t / {scale}, {c_number(stretch)}));",
         )
 
 
+def _scale(tau: float, stretch: float) -> float:
+    return tau / math.gamma(1.0 + 1.0 / stretch)
+
+
 def _settled(time_s: Array, tau: float, stretch: float) -> Array:
-    return -np.expm1(-((time_s / tau) ** stretch))
+    return -np.expm1(-((time_s / _scale(tau, stretch)) ** stretch))

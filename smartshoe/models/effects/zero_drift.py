@@ -21,7 +21,8 @@ class ZeroDrift(Effect):
     )
     exposed_by = frozenset({"rests", "idle", "pauses"})
     separated_by = {
-        "linear_leak": "idle", "orifice_leak": "idle", "permanent_set": "pauses", "warm_up": "idle",
+        "linear_leak": "idle; a temperature channel", "orifice_leak": "idle; a temperature channel",
+        "permanent_set": "pauses", "warm_up": "idle",
         "gain_drift": "peaks",
     }  # fmt: skip
 

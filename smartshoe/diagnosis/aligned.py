@@ -1,0 +1,76 @@
+"""Recordings put right before any model sees them: on one clock, with the reading's sign and zero taken from the data.
+
+What is put right here is a fault of the data that `smartshoe.diagnosis.integrity` has told of, or a convention of a
+sensor that is no pressure. It must not be left to a model: a lag or a relaxation would be named in its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.integrity import Integrity
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+REST_QUANTILE = 0.05  # of the load: what counts as unloaded
+FOREIGN_ZERO = 0.3  # of the reading's span: a zero beyond it is the sensor's convention, no offset
+
+
+def put_right(recordings: Sequence[Recording], integrity: Integrity) -> tuple[list[Recording], list[Mask], list[str]]:
+    """The recordings, sensors aligned, turned and zeroed where they must be; usable samples; a sentence for each."""
+    made: list[Recording] = []
+    usable: list[Mask] = []
+    said: list[str] = []
+    for recording, mask, offset_s, rate in zip(
+        recordings, integrity.usable, integrity.clock_offset_s, integrity.clock_rate, strict=True
+    ):
+        if offset_s or rate:
+            recording, mask = _on_one_clock(recording, mask, offset_s, rate)
+            way = "earlier" if offset_s > 0 else "later"
+            said.append(
+                f"{recording.label}: the reading was moved {abs(offset_s):.3g} s {way}"
+                " to the load's clock before anything else: nothing is said of delays in it"
+            )
+        recording, sentence = _turned_and_zeroed(recording, mask)
+        if sentence:
+            said.append(sentence)
+        made.append(recording)
+        usable.append(mask)
+    return made, usable, said
+
+
+def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:
+    time_s = recording.time_s
+    middle = 0.5 * (time_s[0] + time_s[-1])
+    source_s = time_s + offset_s + rate * (time_s - middle)
+    sensor = recording.sensor
+    values = np.interp(source_s, time_s, sensor.values)
+    inside = (source_s >= time_s[0]) & (source_s <= time_s[-1])
+    nearest = np.clip(np.searchsorted(time_s, source_s), 0, time_s.size - 1)
+    return recording.with_channel(replace(sensor, values=values, missing=None)), inside & usable[nearest]
+
+
+def _turned_and_zeroed(recording: Recording, usable: Mask) -> tuple[Recording, str]:
+    """A reading that falls with the load is turned; one that is no gauge pressure, or far from zero, is zeroed."""
+    sensor, load_n = recording.sensor, recording.force_n
+    if usable.sum() < 10:
+        return recording, ""
+    values, load = sensor.values[usable], load_n[usable]
+    span = float(np.percentile(values, 99) - np.percentile(values, 1))
+    rest = float(np.median(values[load <= np.quantile(load, REST_QUANTILE)]))
+    falls = float(np.corrcoef(values, load)[0, 1]) < -0.5 if span > 0 else False
+    foreign = sensor.unit.quantity != "pressure" or abs(rest) > FOREIGN_ZERO * span
+    if not (falls or (foreign and span > 0 and abs(rest) > 0.02 * span)):
+        return recording, ""
+    zero = rest if foreign else 0.0
+    turned = -(sensor.values - zero) if falls else sensor.values - zero
+    what = [f"zeroed at its rest, {rest:.4g} {sensor.unit.symbol}"] if foreign else []
+    what += ["turned, since it falls with the load"] if falls else []
+    sentence = f"{recording.label}: the reading was {' and '.join(what)}: nothing is said of its zero"
+    return recording.with_channel(replace(sensor, values=turned)), sentence

@@ -1,0 +1,165 @@
+"""Effects with memory of the load: loops, turning points, cycles, largest load; what noise and pauses leave alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.models.effects.catalogue import effect
+from smartshoe.models.effects.effect import Array, Conditions
+
+STEP_S = 0.02
+PLAY = np.array([0.02, 0.06, 0.5, 0.6, 0.0])
+STOPS = np.array([0.02, 0.06, 0.8, 0.6, 1.0])
+BOUC_WEN = np.array([0.02, 0.08, 1.5, 0.5])
+LOOPS = (("play_hysteresis", PLAY), ("play_hysteresis", STOPS), ("bouc_wen_hysteresis", BOUC_WEN))
+MEMORIES = (
+    *LOOPS,
+    ("load_unload_asymmetry", np.array([0.02, 0.005])),
+    ("mullins_softening", np.array([0.03, 0.3])),
+    ("cycle_conditioning", np.array([0.03, 3.0])),
+)
+turning_points = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=8)
+
+
+def between(loads: list[float], samples: int = 200) -> Array:
+    """Straight lines between ``loads``, ``samples`` each, from zero."""
+    return np.interp(np.arange(len(loads) * samples + 1) / samples, np.arange(len(loads) + 1), [0.0, *loads])
+
+
+def run(name: str, values: Array, load: Array, noise: float = 0.0, **before: float) -> Array:
+    """The block's output (n,) for a load (n,)."""
+    return effect(name).apply(
+        load, Conditions(STEP_S * np.arange(load.size), load, STEP_S, noise, before=before), values
+    )
+
+
+@pytest.mark.parametrize(("name", "values"), LOOPS)
+def test_half_of_the_major_loop_is_the_strength(name: str, values: Array) -> None:
+    load = between([1.0, 0.0, 1.0, 0.0], 1000)
+    out = run(name, values, load)
+    up, down = out[2000:3001], out[3000:][::-1]
+    height = 0.5 * np.max(down - up)
+    # Bouc-Wen and the widest stops do not come to their end value within full scale.
+    assert height == pytest.approx(values[0], rel=2e-3 if name == "play_hysteresis" and values[4] == 0.0 else 0.1)
+    assert np.all(down - up >= -1e-12)
+
+
+@pytest.mark.parametrize(("name", "values"), LOOPS)
+@given(loads=turning_points, pace=st.integers(2, 9))
+@settings(max_examples=10)
+def test_loops_do_not_depend_on_rate(name: str, values: Array, loads: list[float], pace: int) -> None:
+    slow, fast = between(loads, 180), between(loads, 180 // pace)
+    corners = np.arange(len(loads) + 1)
+    at_slow, at_fast = run(name, values, slow)[180 * corners], run(name, values, fast)[(180 // pace) * corners]
+    assert np.max(np.abs(at_slow - at_fast)) <= 1e-12
+
+
+@pytest.mark.parametrize(("name", "values"), LOOPS)
+@given(loads=turning_points)
+@settings(max_examples=10)
+def test_friction_takes_work_over_any_closed_path(name: str, values: Array, loads: list[float]) -> None:
+    # Twice round, so that the second round begins and ends in the same state.
+    path = between([*loads, 0.0, *loads, 0.0], 400)
+    friction = path - run(name, values, path)
+    second = slice(path.size // 2, None)
+    work = np.sum(0.5 * (friction[second][1:] + friction[second][:-1]) * np.diff(path[second]))
+    assert work >= -1e-9
+
+
+@pytest.mark.parametrize("values", [PLAY, STOPS])
+@given(high=st.floats(0.4, 1.0), share=st.floats(0.1, 0.9))
+@settings(max_examples=10)
+def test_a_minor_loop_of_plays_closes_and_is_forgotten(values: Array, high: float, share: float) -> None:
+    low = share * high
+    with_loop = run("play_hysteresis", values, between([high, low, high, 0.3 * low], 300))
+    without = run("play_hysteresis", values, between([high, 0.3 * low], 300))
+    assert with_loop[900] == pytest.approx(with_loop[300], abs=1e-12)
+    assert with_loop[-1] == pytest.approx(without[-1], abs=1e-12)
+
+
+def test_a_closed_loop_reads_zero_without_load_and_an_open_one_keeps_friction() -> None:
+    path = between([1.0, 0.0])
+    assert run("play_hysteresis", PLAY, path)[-1] == pytest.approx(0.0, abs=1e-12)
+    assert run("play_hysteresis", STOPS, path)[-1] == pytest.approx(STOPS[0], rel=0.02)
+    assert run("bouc_wen_hysteresis", BOUC_WEN, path)[-1] == pytest.approx(BOUC_WEN[0], rel=0.02)
+
+
+@pytest.mark.parametrize(("name", "values"), MEMORIES)
+def test_noise_at_rest_and_in_a_hold_moves_no_memory(name: str, values: Array) -> None:
+    noise = 0.001
+    quiet = between([0.0, 0.0, 0.7, 0.7, 0.7, 0.7, 0.7, 0.3, 0.3, 0.3, 0.3, 0.0, 0.5], 800)
+    noisy = quiet + noise * np.random.default_rng(2).standard_normal(quiet.size)
+    # The noise that passes straight through is not the memory's: take the load off.
+    with_noise = run(name, values, noisy, noise) - noisy
+    for hold in (slice(2600, 5600), slice(6600, 8800)):
+        late, early = with_noise[hold][-600:].mean(), with_noise[hold][:600].mean()
+        assert abs(late - early) <= 0.02 * values[0]
+    without = run(name, values, quiet, noise) - quiet
+    spread = float(np.max(np.abs(without)))
+    assert np.sqrt(np.mean((with_noise - without) ** 2)) <= 0.15 * spread
+
+
+@pytest.mark.parametrize(("name", "values"), MEMORIES)
+@given(loads=turning_points, pause=st.integers(1, 500))
+@settings(max_examples=8)
+def test_a_pause_changes_nothing(name: str, values: Array, loads: list[float], pause: int) -> None:
+    load = between(loads, 100)
+    at = 100 * (len(loads) // 2)
+    paused = np.concatenate([load[:at], np.full(pause, load[at]), load[at:]])
+    out = run(name, values, paused)
+    assert np.array_equal(np.concatenate([out[:at], out[at + pause :]]), run(name, values, load))
+
+
+def test_unloading_lacks_the_gain_it_is_said_to_lack() -> None:
+    out = run("load_unload_asymmetry", np.array([0.1, 0.005]), between([1.0, 0.0], 1000))
+    load = between([1.0, 0.0], 1000)
+    assert out[500] == pytest.approx(load[500], rel=1e-12)
+    assert out[1500] == pytest.approx(0.9 * load[1500], rel=1e-9)
+
+
+def test_size_grows_with_rate_in_both_directions() -> None:
+    values = np.array([0.1, 1.0])
+    for rate_per_s in (0.1, 0.5, 1.0):
+        samples = round(1.0 / rate_per_s / STEP_S)
+        load = between([1.0, 0.0], samples)
+        out = run("rate_gain", values, load)
+        for at in (samples // 2, 3 * samples // 2):
+            # Below 1 % of full scale a second the power is rounded off, which takes that much from every rate.
+            assert out[at] / load[at] == pytest.approx(1.0 + 0.1 * rate_per_s, abs=1.1e-3)
+
+
+def test_only_the_first_loading_to_a_level_is_stiff() -> None:
+    values = np.array([0.05, 0.3])
+    load = between([0.5, 0.0, 0.5, 1.0, 0.0, 1.0], 500)
+    out = run("mullins_softening", values, load)
+    assert out[250] == pytest.approx(load[250], abs=1e-12)  # virgin
+    assert out[1250] > load[1250] + 1e-3  # half of the level, again
+    assert out[1250] == pytest.approx(out[750], abs=1e-12)  # as it was on the way down
+    assert out[1900] == pytest.approx(load[1900], abs=1e-12)  # beyond the largest so far: virgin again
+    assert out[2250] / load[2250] == pytest.approx(1.05, abs=1e-3)  # half of full scale after full scale
+
+
+def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not() -> None:
+    values = np.array([0.1, 2.0])
+    load = between([0.3, 0.0, 1.0, 0.0, 0.5, 0.49, 0.5, 0.0, 0.2, 0.0, 0.03, 0.0, 0.5], 137)
+    out = run("cycle_conditioning", values, load)
+    assert out[-1] / load[-1] == pytest.approx(1.0 + 0.1 * -np.expm1(-4.0 / 2.0), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "key"),
+    [
+        ("mullins_softening", np.array([0.05, 0.3]), "largest_load"),
+        ("cycle_conditioning", np.array([0.05, 3.0]), "cycles"),
+        ("permanent_set", np.array([1e-3, 1.0]), "dose"),
+    ],
+)
+def test_a_recording_that_continues_another_begins_where_it_ended(name: str, values: Array, key: str) -> None:
+    first, second = between([0.8, 0.0, 0.6, 0.0]), between([0.5, 0.0, 1.0])
+    whole = run(name, values, np.concatenate([first, second[1:]]))
+    left_behind = {"largest_load": 0.8, "cycles": 2.0, "dose": float(np.trapezoid(first, dx=STEP_S))}
+    continued = run(name, values, second, **{key: left_behind[key]})
+    assert np.max(np.abs(continued[1:] - whole[first.size :])) <= 1e-12

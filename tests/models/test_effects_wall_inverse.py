@@ -1,0 +1,167 @@
+"""Inverses of the effects of contact, wall and gas: what went in comes back, for any chunking, and the same in C."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.models.effects.catalogue import effect
+from smartshoe.models.effects.effect import Array, Conditions, CoreEffect, Effect
+
+EXACT = (
+    "gas_compression", "wall_hardening", "contact_area", "orifice_leak", "permanent_set", "mullins_softening",
+    "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry", "cycle_conditioning",
+)  # fmt: skip
+INVERTED = (*EXACT, "dead_band", "rate_gain")
+STEP_S = 0.02
+COMPILER = shutil.which("gcc") or shutil.which("cc")
+FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]
+seeds = st.integers(0, 10_000)
+
+
+def loading(seed: int, count: int = 16) -> Conditions:
+    """Ramps between random loads, rests among them, at random rates."""
+    generator = np.random.default_rng(seed)
+    loads = generator.uniform(0.0, 1.0, count) * (generator.random(count) < 0.7)
+    loads[0] = 0.0
+    corners_s = np.concatenate([[0.0], np.cumsum(generator.uniform(0.3, 3.0, count - 1))])
+    time_s = np.arange(0.0, corners_s[-1], STEP_S)
+    return Conditions(time_s, np.interp(time_s, corners_s, loads), STEP_S)
+
+
+def drawn(made: Effect, seed: int) -> Array:
+    """Strengths of 0.3 to 3 sizes, shapes of the grid moved a little."""
+    generator = np.random.default_rng(seed)
+    values = made.start(made.shapes[int(generator.integers(len(made.shapes)))])
+    for k, parameter in enumerate(made.parameters):
+        if parameter.null is None:
+            values[k] *= generator.uniform(0.8, 1.25)
+        else:
+            values[k] = parameter.null + parameter.size * generator.uniform(0.3, 3.0)
+        values[k] = min(max(values[k], parameter.lower), parameter.upper)
+    if made.name == "bouc_wen_hysteresis":  # more friction than this lets no load through after a reversal
+        values[0] = min(values[0], 0.5 * values[1] / (1.0 + values[3]))
+    return values
+
+
+@pytest.mark.parametrize("name", EXACT)
+@given(seed=seeds)
+@settings(max_examples=6)
+def test_what_went_in_comes_back(name: str, seed: int) -> None:
+    made, given_ = effect(name), loading(seed)
+    values = drawn(made, seed)
+    out = made.apply(given_.load, given_, values)
+    inverse = made.inverse(values, STEP_S)
+    assert inverse is not None
+    # 50 halvings of a bracket of the strength's size; or a cycle that counts a sample early or late, when the load is
+    # within a sample's move of 5 % of the cycle's height.
+    tolerance = 1e-9
+    if name == "cycle_conditioning":
+        tolerance = 1.2 * abs(values[0]) * (0.05 + float(np.max(np.abs(np.diff(given_.load)))))
+    assert np.max(np.abs(inverse.push(out, given_.time_s) - given_.load)) <= tolerance
+
+
+@given(seed=seeds)
+@settings(max_examples=10)
+def test_dead_band_gives_back_every_load_that_it_lets_through(seed: int) -> None:
+    made, given_ = effect("dead_band"), loading(seed)
+    values = drawn(made, seed)
+    out = made.apply(given_.load, given_, values)
+    inverse = made.inverse(values, STEP_S)
+    assert inverse is not None
+    back = inverse.push(out, given_.time_s)
+    through = given_.load > 1.5 * values[0]
+    assert np.max(np.abs(back - given_.load)[through]) <= 1e-9
+    assert np.max(np.abs(back - given_.load)) <= values[0]
+
+
+@given(seed=seeds, rate_per_s=st.floats(0.06, 1.0))
+@settings(max_examples=10)
+def test_rate_gain_gives_back_triangles_but_for_their_corners(seed: int, rate_per_s: float) -> None:
+    # The inverse knows the rate of the loads before only: within 0.2 s of a corner it has the old rate in part.
+    made = effect("rate_gain")
+    values = drawn(made, seed)
+    corners_s = np.array([0.0, 1.0, 1.0 + 1.0 / rate_per_s, 1.0 + 2.0 / rate_per_s, 2.0 + 2.0 / rate_per_s])
+    time_s = np.arange(0.0, corners_s[-1], STEP_S)
+    given_ = Conditions(time_s, np.interp(time_s, corners_s, [0.0, 0.0, 1.0, 0.0, 0.0]), STEP_S)
+    inverse = made.inverse(values, STEP_S)
+    assert inverse is not None
+    left = inverse.push(made.apply(given_.load, given_, values), time_s) - given_.load
+    far = np.min(np.abs(time_s[:, None] - corners_s), axis=1) > 0.25
+    assert np.max(np.abs(left)) <= abs(values[0])
+    assert np.max(np.abs(left[far])) <= 0.01 * abs(values[0])
+
+
+@pytest.mark.parametrize("name", INVERTED)
+@given(seed=seeds, cuts=st.lists(st.floats(0.0, 1.0), max_size=6))
+@settings(max_examples=6)
+def test_any_chunking_gives_the_same_numbers(name: str, seed: int, cuts: list[float]) -> None:
+    made, given_ = effect(name), loading(seed, 6)
+    values = drawn(made, seed)
+    out = made.apply(given_.load, given_, values)
+    inverse = made.inverse(values, STEP_S)
+    assert inverse is not None
+    whole = inverse.push(out, given_.time_s)
+    inverse.reset()
+    at = sorted(int(cut * out.size) for cut in cuts)
+    blocks = zip(np.split(out, at), np.split(given_.time_s, at), strict=True)
+    assert np.array_equal(np.concatenate([inverse.push(*block) for block in blocks]), whole)
+
+
+@pytest.mark.parametrize("name", INVERTED)
+def test_nothing_is_undone_where_nothing_was_done(name: str) -> None:
+    made, given_ = effect(name), loading(5)
+    inverse = made.inverse(made.start(), STEP_S)
+    assert inverse is not None
+    assert np.max(np.abs(inverse.push(given_.load, given_.time_s) - given_.load)) <= 1e-12
+
+
+def test_the_linear_network_is_inverted_as_a_whole() -> None:
+    for name in ("second_relaxation", "power_law_creep", "linear_leak", "gas_heat"):
+        assert isinstance(effect(name), CoreEffect)
+        assert effect(name).inverse(effect(name).start(), STEP_S) is None
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or cc) on the path")
+def test_c_agrees_with_push() -> None:
+    cases = {name: drawn(effect(name), 11) for name in INVERTED}
+    given_ = loading(7)
+    outs = {name: effect(name).apply(given_.load, given_, values) for name, values in cases.items()}
+    source = ["#include <math.h>"]
+    for name, values in cases.items():
+        inverse = effect(name).inverse(values, STEP_S)
+        assert inverse is not None
+        step = inverse.c_step(f"b_{name}")
+        members = "".join(f"    double {member};\n" for member in step.states)
+        starts = ", ".join(map(repr, step.states.values()))
+        source += [
+            f"typedef struct {{\n{members or '    double unused;'}\n}} {name}_filter;",
+            f"void {name}(const double *from, double *out, long count);",
+            f"void {name}(const double *from, double *out, long count)\n{{",
+            f"    {name}_filter filter = {{{starts or '0.0'}}}, *f = &filter;\n    long row;",
+            "    for (row = 0; row < count; row++) {\n    double x = from[row];\n    (void)f;",
+            f"{step.body}\n    out[row] = x;\n    }}\n}}",
+        ]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "steps.c"
+        file.write_text("\n".join(source) + "\n")
+        library = Path(folder) / "steps.so"
+        command = [str(COMPILER), *FLAGS, "-shared", "-fPIC", str(file), "-o", str(library), "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        loaded = ctypes.CDLL(str(library))
+        for name, values in cases.items():
+            inverse = effect(name).inverse(values, STEP_S)
+            assert inverse is not None
+            y, in_c = np.ascontiguousarray(outs[name]), np.empty(given_.load.size)
+            pointers = (ctypes.c_void_p(array.ctypes.data) for array in (y, in_c))
+            getattr(loaded, name)(*pointers, ctypes.c_long(y.size))
+            assert np.max(np.abs(in_c - inverse.push(y, given_.time_s))) <= 1e-12, name
