@@ -13,7 +13,12 @@ import numpy as np
 
 from smartshoe.atomic import write_text
 from smartshoe.compensation.compensator import Compensator
+from smartshoe.compensation.extended import ExtendedCompensator
+from smartshoe.compensation.filter import Array, ForceFilter
+from smartshoe.compensation.reader import Reader, parsed
 from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.first_order import simulate, steps
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.recording import Channel, Recording
@@ -21,6 +26,7 @@ from smartshoe.units import NEWTON, Unit, declared, find_unit
 
 SCHEMA = "smartshoe.calibration/1"
 ESTIMATE_NAME = "force_estimate"
+USUAL_FULL_SCALE_N = 800.0  # of the paper's protocols
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,9 @@ class Calibration:
 
     ``offset`` in ``reading_unit``; ``parameters`` and ``covariance`` (in their order) as identified; ``scale`` in N
     per reading unit; ``load_range_n`` and ``rate_range_n_per_s`` what was seen; ``sources`` name and sha256 of the
-    files; ``created`` an ISO date that the caller gives, '' where not known.
+    files; ``created`` an ISO date that the caller gives, '' where not known. ``unit`` is where the unit sits
+    ("left_toe"), ``serial_number`` which one it is, '' where not known. ``extended`` is the model with effects, whose
+    linear part the coefficients are; where there is one, it gives the force.
     """
 
     a1: float
@@ -48,6 +56,8 @@ class Calibration:
     sources: tuple[Mapping[str, str | None], ...] = ()
     created: str = ""
     smartshoe_version: str = ""
+    serial_number: str = ""
+    extended: ExtendedModel | None = None
 
     def __post_init__(self) -> None:
         for key in ("a1", "b0", "b1", "offset", "scale", "delay_s", "sample_rate_hz"):
@@ -60,20 +70,43 @@ class Calibration:
                 " identify the unit anew"
             )
 
-    def compensator(self, sample_rate_hz: float | None = None) -> Compensator:
-        """The filter at ``sample_rate_hz``; the calibration's own rate where none is given."""
+    def compensator(self, sample_rate_hz: float | None = None) -> ForceFilter:
+        """The filter at ``sample_rate_hz``, the calibration's own rate where none is given.
+
+        A `Compensator`, or an `ExtendedCompensator` where there is an extended model.
+        """
+        rate_hz = self.sample_rate_hz if sample_rate_hz is None else sample_rate_hz
+        if self.extended is not None:
+            return ExtendedCompensator(self.extended, rate_hz, reading_unit=self.reading_unit)
         return Compensator(
-            self.a1,
-            self.b0,
-            self.b1,
-            offset=self.offset,
-            sample_rate_hz=self.sample_rate_hz if sample_rate_hz is None else sample_rate_hz,
-            reading_unit=self.reading_unit,
+            self.a1, self.b0, self.b1, offset=self.offset, sample_rate_hz=rate_hz, reading_unit=self.reading_unit
         )
 
+    def model(self) -> ExtendedModel:
+        """The model that simulates this unit forward: the extended one, or the linear part as one.
+
+        Raises `InputError` where the coefficients are no passive solid.
+        """
+        if self.extended is not None:
+            return self.extended
+        if not (self.b1 > 0.0 and self.b0 * self.a1 > 0.0):
+            raise InputError(
+                f"calibration of {self.unit or 'a unit'}: b0 and b1 must be above 0 to simulate it: identify it anew"
+            )
+        load_n = (self.load_range_n or (0.0, 0.0))[1] or USUAL_FULL_SCALE_N
+        reading = load_n * self.a1 / self.b1
+        share = self.b0 * self.a1 / self.b1 - 1.0
+        linear = ExtendedModel(1.0, share, self.a1, load_n, reading, self.reading_unit.symbol)
+        if self.offset == 0.0:
+            return linear
+        return linear.with_part(effect("zero_offset"), np.array([self.offset / reading]))
+
     def to_dict(self) -> dict[str, Any]:
-        """The file's object, schema smartshoe.calibration/1; no NaN, no infinity."""
-        return {
+        """The file's object, schema smartshoe.calibration/1; no NaN, no infinity.
+
+        The keys ``serial_number`` and ``extended`` stand there only where the calibration has them.
+        """
+        found: dict[str, Any] = {
             "schema": SCHEMA,
             "unit": self.unit,
             "reading_unit": self.reading_unit.symbol,
@@ -90,6 +123,11 @@ class Calibration:
             "created": self.created,
             "smartshoe_version": self.smartshoe_version,
         }
+        if self.serial_number:
+            found["serial_number"] = self.serial_number
+        if self.extended is not None:
+            found["extended"] = self.extended.to_dict()
+        return found
 
     def save(self, path: Path | str) -> None:
         """Write the calibration as JSON, whole or not at all."""
@@ -98,22 +136,10 @@ class Calibration:
     @classmethod
     def load(cls, path: Path | str) -> Calibration:
         """Read a calibration; raises `InputError` naming file and key where it is none or is damaged."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except UnicodeDecodeError as error:
-            raise InputError(f"{path} is no calibration (not text): give a file that identify wrote") from error
-        except OSError as error:
-            raise InputError(f"{path} cannot be read ({error.strerror}): give a calibration file") from error
-        try:
-            found = json.loads(text, parse_constant=_refuse_constant)
-        except (ValueError, RecursionError) as error:
-            raise InputError(
-                f"{path} is truncated or no JSON ({error}): write it anew with identify --calibration"
-            ) from error
-        return cls._from_object(found, _Reader(str(path)))
+        return cls._from_object(parsed(path), Reader(str(path)))
 
     @classmethod
-    def _from_object(cls, found: Any, read: _Reader) -> Calibration:
+    def _from_object(cls, found: Any, read: Reader) -> Calibration:
         if not isinstance(found, dict) or found.get("schema") != SCHEMA:
             said = found.get("schema") if isinstance(found, dict) else None
             raise InputError(
@@ -153,71 +179,11 @@ class Calibration:
                 sources=tuple(sources),
                 created=read.text(found, "created"),
                 smartshoe_version=read.text(found, "smartshoe_version"),
+                serial_number=read.text(found, "serial_number") if "serial_number" in found else "",
+                extended=read.extended(found),
             )
         except InputError as error:
             raise error if str(error).startswith(read.path) else InputError(f"{read.path}: {error}") from error
-
-
-@dataclass(frozen=True)
-class _Reader:
-    """Takes typed values out of a JSON object; a fault names file and key."""
-
-    path: str
-
-    def fault(self, key: str, what: str) -> InputError:
-        return InputError(f"{self.path}: key '{key}' {what}: write the file anew with identify --calibration")
-
-    def _get(self, found: Mapping[str, Any], key: str, above: str) -> Any:
-        if key not in found:
-            raise self.fault(above + key, "is missing")
-        return found[key]
-
-    def number(self, found: Mapping[str, Any], key: str, above: str = "") -> float:
-        value = self._get(found, key, above)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.fault(above + key, f"is {value!r}, not a finite number")
-        return float(value)
-
-    def maybe(self, value: Any, key: str) -> float:
-        if value is None:
-            return math.nan
-        return self.number({key: value}, key)
-
-    def text(self, found: Mapping[str, Any], key: str) -> str:
-        value = self._get(found, key, "")
-        if not isinstance(value, str):
-            raise self.fault(key, f"is {value!r}, not a text")
-        return value
-
-    def mapping(self, found: Mapping[str, Any], key: str, above: str = "") -> Mapping[str, Any]:
-        value = self._get(found, key, above)
-        if not isinstance(value, dict):
-            raise self.fault(above + key, f"is {value!r}, not an object")
-        return value
-
-    def pair(self, found: Mapping[str, Any], key: str) -> tuple[float, float] | None:
-        value = found.get(key)
-        if value is None:
-            return None
-        if not isinstance(value, list) or len(value) != 2:
-            raise self.fault(key, f"is {value!r}, not two numbers")
-        return self.number({key: value[0]}, key), self.number({key: value[1]}, key)
-
-    def parameter(self, found: Mapping[str, Any], name: str, above: str) -> Parameter:
-        item = self.mapping(found, name, above)
-        key = f"{above}{name}."
-        interval = item.get("ci95")
-        if not isinstance(interval, list) or len(interval) != 2:
-            raise self.fault(key + "ci95", f"is {interval!r}, not two numbers")
-        unit = item.get("unit")
-        if not isinstance(unit, str):
-            raise self.fault(key + "unit", f"is {unit!r}, not a text")
-        low, high = (self.maybe(bound, key + "ci95") for bound in interval)
-        return Parameter(self.number(item, "value", key), self.maybe(item.get("sd"), key + "sd"), (low, high), unit)
-
-
-def _refuse_constant(text: str) -> float:
-    raise ValueError(f"it holds {text}")
 
 
 def _sensor_for(recording: Recording, calibration: Calibration) -> Channel:
@@ -253,6 +219,11 @@ def compensate(recording: Recording, calibration: Calibration) -> Recording:
     if isinstance(step, float):
         rate_hz = 1.0 / step if len(recording) > 1 else calibration.sample_rate_hz
         force_n = calibration.compensator(rate_hz).apply(readings)
+    elif calibration.extended is not None:
+        force_n, rate_hz = _on_even_steps(recording.time_s, readings, calibration)
+        notes.append(
+            f"the steps are uneven: readings were set on an even grid of {rate_hz:.6g} Hz, and forces back from it"
+        )
     else:
         force_n = simulate(
             calibration.a1, calibration.b0, calibration.b1, readings - calibration.offset, recording.time_s
@@ -261,5 +232,76 @@ def compensate(recording: Recording, calibration: Calibration) -> Recording:
     missing = int(np.count_nonzero(~channel.present))
     if missing:
         notes.append(f"{missing} missing readings of {channel.name} were held at the last value for {ESTIMATE_NAME}")
+    if calibration.extended is not None:
+        notes += _limits(calibration, rate_hz)
     estimate = Channel.from_values(ESTIMATE_NAME, force_n, NEWTON, "auxiliary")
     return recording.with_channel(estimate).noted(*notes)
+
+
+def _limits(calibration: Calibration, rate_hz: float) -> list[str]:
+    """What the extended filter leaves in the force, a sentence an effect."""
+    filter_ = calibration.compensator(rate_hz)
+    if not isinstance(filter_, ExtendedCompensator):
+        return []
+    return [f"{name} is not compensated: {says}" for name, says in filter_.not_inverted.items()] + [
+        f"{name}: {says}" for name, says in filter_.cautions.items()
+    ]
+
+
+def _on_even_steps(time_s: Array, readings: Array, calibration: Calibration) -> tuple[Array, float]:
+    """Force (n,) at uneven ``time_s`` (n,), by way of an even grid as fine as the median step; and the grid's rate."""
+    step_s = float(np.median(np.diff(time_s)))
+    even_s = time_s[0] + step_s * np.arange(int(np.ceil((time_s[-1] - time_s[0]) / step_s)) + 1)
+    present = np.isfinite(readings)
+    if not present.any():
+        return np.zeros(readings.size), 1.0 / step_s
+    held = np.interp(even_s, time_s[present], readings[present])
+    force_n = calibration.compensator(1.0 / step_s).apply(held)
+    return np.interp(time_s, even_s, force_n), 1.0 / step_s
+
+
+def extended_calibration(
+    model: ExtendedModel,
+    *,
+    unit: str = "",
+    serial_number: str = "",
+    parameters: Mapping[str, Parameter] | None = None,
+    covariance: tuple[tuple[float, ...], ...] = (),
+    scale: float | None = None,
+    load_range_n: tuple[float, float] | None = None,
+    rate_range_n_per_s: tuple[float, float] | None = None,
+    sample_rate_hz: float = 100.0,
+    sources: tuple[Mapping[str, str | None], ...] = (),
+    created: str = "",
+) -> Calibration:
+    """The calibration that holds ``model``, and its linear part as a1, b0, b1, offset and delay.
+
+    From p/f = (s + a)/((1 + kappa) s + a) of the model and reading = gain p: a1 = a, b0 = (1 + kappa) F/(G R) and
+    b1 = a F/(G R), with F/(G R) full-scale load over gain times full-scale reading in N per reading unit. ``scale``
+    is that number where none is given. ``parameters`` and ``covariance`` go together, as in `Calibration`.
+    """
+    from smartshoe import __version__
+
+    newton_per_reading = model.full_scale_load_n / (model.gain * model.full_scale_reading)
+    values = {part.name: part.values for part in model.parts}
+    offset = float(values["zero_offset"][0]) * model.gain * model.full_scale_reading if "zero_offset" in values else 0.0
+    return Calibration(
+        a1=model.relaxation_rate_per_s,
+        b0=(1.0 + model.relaxing_share) * newton_per_reading,
+        b1=model.relaxation_rate_per_s * newton_per_reading,
+        reading_unit=find_unit(model.reading_unit) or declared(model.reading_unit),
+        offset=offset,
+        unit=unit,
+        parameters=dict(parameters or {}),
+        covariance=covariance,
+        scale=newton_per_reading if scale is None else scale,
+        delay_s=float(values["delay"][0]) if "delay" in values else 0.0,
+        load_range_n=load_range_n or (0.0, model.full_scale_load_n),
+        rate_range_n_per_s=rate_range_n_per_s,
+        sample_rate_hz=sample_rate_hz,
+        sources=sources,
+        created=created,
+        smartshoe_version=__version__,
+        serial_number=serial_number,
+        extended=model,
+    )

@@ -19,7 +19,21 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 REST_QUANTILE = 0.05  # of the load: what counts as unloaded
+SAME_LAG = 0.25
+LARGEST_DELAY_S = 1.9
 FOREIGN_ZERO = 0.3  # of the reading's span: a zero beyond it is the sensor's convention, no offset
+
+
+def common_delay_s(integrity: Integrity) -> float:
+    """The one delay of all readings, where two clocks are a constant apart in every recording; 0 where they are not.
+
+    Such a delay is a cause like any other, and the model bears it.
+    """
+    lags = np.array(integrity.clock_offset_s)
+    if not lags.any() or any(integrity.clock_rate) or np.ptp(lags) > SAME_LAG * np.max(np.abs(lags)):
+        return 0.0
+    mean = float(np.mean(lags))
+    return mean if abs(mean) <= LARGEST_DELAY_S else 0.0
 
 
 def put_right(recordings: Sequence[Recording], integrity: Integrity) -> tuple[list[Recording], list[Mask], list[str]]:
@@ -27,10 +41,11 @@ def put_right(recordings: Sequence[Recording], integrity: Integrity) -> tuple[li
     made: list[Recording] = []
     usable: list[Mask] = []
     said: list[str] = []
+    borne = common_delay_s(integrity) != 0.0
     for recording, mask, offset_s, rate in zip(
         recordings, integrity.usable, integrity.clock_offset_s, integrity.clock_rate, strict=True
     ):
-        if offset_s or rate:
+        if (offset_s or rate) and not borne:
             recording, mask = _on_one_clock(recording, mask, offset_s, rate)
             way = "earlier" if offset_s > 0 else "later"
             said.append(

@@ -18,17 +18,20 @@ POLES_PER_S = np.geomspace(0.01, 20.0, 31)
 LEAST_SHARE = 1e-3  # of the load that relaxes: below it the pole means nothing
 
 
-def global_baseline(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
+def global_baseline(sessions: Sequence[Session], scale: Scale, delay_s: float = 0.0) -> ExtendedModel:
     """Gain, relaxing share and rate with the least squared error: linear in two numbers for each pole of a grid.
 
+    ``delay_s`` is by how much the readings are late.
     y = c (f - w) + d w with w = pole/(s + pole) f; the wall is passive where d >= c > 0 (the pressure creeps up).
     """
     kept = [session.fitted for session in sessions]
     reading = np.concatenate([s.reading[k] for s, k in zip(sessions, kept, strict=True)])
-    load = np.concatenate([s.conditions.load[k] for s, k in zip(sessions, kept, strict=True)])
+    loads = [_late(s.conditions.load, delay_s / s.conditions.step_s) for s in sessions]
+    load = np.concatenate([f[k] for f, k in zip(loads, kept, strict=True)])
     best: tuple[float, float, float, float] | None = None
     for pole in POLES_PER_S:
-        lag = np.concatenate([_lag(s, float(pole))[k] for s, k in zip(sessions, kept, strict=True)])
+        lags = [_lag(f, s.conditions.step_s, float(pole)) for f, s in zip(loads, sessions, strict=True)]
+        lag = np.concatenate([w[k] for w, k in zip(lags, kept, strict=True)])
         columns = np.column_stack([load - lag, lag, np.ones(load.size)])
         (fast, slow, _), *_ = np.linalg.lstsq(columns, reading, rcond=None)
         if slow <= 0:
@@ -55,10 +58,17 @@ def global_baseline(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     )
 
 
-def _lag(session: Session, pole: float) -> Array:
+def _late(load: Array, steps: float) -> Array:
+    """The load as it was ``steps`` before; the first one lasted for ever."""
+    if steps == 0.0:
+        return load
+    place = np.arange(load.size)
+    return np.asarray(np.interp(place - steps, place, load), dtype=np.float64)
+
+
+def _lag(load: Array, step_s: float, pole: float) -> Array:
     """pole/(s + pole) of the load, from what an arm of share one adds: f/2 + lag/2."""
-    load = session.conditions.load
-    return 2.0 * Core([Arm(1.0, 2.0 * pole)]).simulate(load, session.conditions.step_s) - load
+    return 2.0 * Core([Arm(1.0, 2.0 * pole)]).simulate(load, step_s) - load
 
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:

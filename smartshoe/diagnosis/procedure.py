@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
-from smartshoe.diagnosis.aligned import put_right
+from smartshoe.diagnosis.aligned import common_delay_s, put_right
 from smartshoe.diagnosis.baseline import global_baseline
 from smartshoe.diagnosis.confidence import confidence, inseparable
 from smartshoe.diagnosis.force import force_rmse_n
@@ -104,7 +104,10 @@ def _diagnosed(
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
     sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
     traits = traits_of(sessions)
-    start = global_baseline(sessions, scale)
+    delay_s = common_delay_s(integrity)
+    start = global_baseline(sessions, scale, delay_s)
+    if delay_s:
+        start = start.with_part(effect("delay"), np.array([delay_s]))
     choice = choose(start, sessions, rest_loads(sessions), material, progress)
     before = leftover_of(sessions, choice.evidence.residuals(choice.baseline.model))
     after = leftover_of(sessions, choice.evidence.residuals(choice.fit.model))

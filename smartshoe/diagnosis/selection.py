@@ -141,7 +141,9 @@ def choose(
     words = dictionary(start, evidence.fitted)
     evidence = replace(evidence, noise=noise_of(words))
     current = fit(evidence, start)
-    baseline = current.model
+    baseline = start
+    for name in start.names:
+        baseline = baseline.without(name)
     screening: Screening | None = None
     settled: Settled | None = None
     seen: set[frozenset[str]] = set()

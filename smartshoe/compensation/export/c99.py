@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.compensation.export.model import FilterModel
+from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
 from smartshoe.compensation.export.rendering import finite_or, render, vector_csv
 from smartshoe.errors import UsageError
 
@@ -17,20 +17,26 @@ def c_files(model: FilterModel, precision: str) -> dict[str, str]:
     1 + den1 would keep four, and what each sum rounds away is carried to the next. Raises `UsageError` where a
     coefficient is beyond single precision.
     """
+    if isinstance(model, ExtendedFilterModel):
+        return _files(model, precision, **_extended(model, precision))
     n0, n1 = model.numerator
     values = {"n0": n0, "n1": n1, "d1": model.denominator[1], "leak": model.leak, "feed": model.feed}
     values |= {"state_gain": model.state_gain, "offset": model.calibration.offset}
     literals = {name: _literal(value, precision, name) for name, value in values.items()}
+    return _files(model, precision, c=literals)
+
+
+def _files(model: FilterModel, precision: str, **values: object) -> dict[str, str]:
     readings = [
         finite_or(value, "NAN", "INFINITY", "" if not np.isfinite(value) else _literal(value, precision, "reading"))
         for value in model.test_readings.tolist()
     ]
     shared = {
         "real": precision,
-        "c": literals,
         "readings": readings,
         "forces_n": [repr(value) for value in model.test_forces_n.tolist()],
         "tolerance_n": repr(model.tolerance_n(precision)),
+        **values,
     }
     return {
         "smartshoe_filter.h": render(f"{model.kind}.h.j2", model, **shared),
@@ -38,6 +44,30 @@ def c_files(model: FilterModel, precision: str) -> dict[str, str]:
         "smartshoe_filter_test.c": render("filter_test.c.j2", model, **shared),
         "smartshoe_filter_test.csv": vector_csv(model),
     }
+
+
+def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, object]:
+    """What the templates of the extended filter need beside the shared values."""
+    if precision != "double":
+        raise UsageError(
+            "an extended model is written in double only: its bisections stop at double precision and its memory of"
+            " leaks and drifts is lost in single; export with --precision double"
+        )
+    filter_ = model.filter
+    blocks = filter_.c_steps()
+    states = {name: _initial(value) for _, step in blocks for name, value in step.states.items()}
+    return {
+        "states": states,
+        "blocks": [{"name": name, "body": step.body} for name, step in blocks if step.body],
+        "reading_per_share": repr(filter_.reading_per_share),
+        "full_scale_load_n": repr(filter_.model.full_scale_load_n),
+        "step_s": repr(filter_.step_s),
+        "started_s": repr(filter_.started_s),
+    }
+
+
+def _initial(value: float) -> str:
+    return finite_or(value, "NAN", "INFINITY", repr(float(value)))
 
 
 def _literal(value: float, precision: str, name: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from smartshoe.compensation.export.model import FilterModel
+from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
 from smartshoe.models.parameter import finite_or_none
 
 SCHEMA = "smartshoe.export/1"
@@ -47,4 +47,30 @@ def json_files(model: FilterModel) -> dict[str, str]:
             "tolerance_n": model.tolerance_n("double"),
         },
     }
+    if isinstance(model, ExtendedFilterModel):
+        found["extended"] = _extended(model)
     return {"smartshoe_filter.json": json.dumps(found, indent=1, allow_nan=False, ensure_ascii=False) + "\n"}
+
+
+def _extended(model: ExtendedFilterModel) -> dict[str, Any]:
+    """The whole model, and its linear network's inverse at the sample rate."""
+    filter_ = model.filter
+    core = filter_.core
+    return {
+        "model": filter_.model.to_dict(),
+        "inverse_network": {
+            "transition": core.transition.tolist(),
+            "drive": core.drive.tolist(),
+            "read": core.read.tolist(),
+            "direct": core.direct,
+            "start": core.start.tolist(),
+            "is_exact": core.is_exact,
+            "says": "p = pressure as a share of full scale; state starts at start*p; load = (p - read.state)/direct;"
+            " then state = transition state + drive load",
+        },
+        "order": [name for name, _ in filter_.blocks],
+        "not_inverted": dict(filter_.not_inverted),
+        "cautions": dict(filter_.cautions),
+        "says": "reading/(gain full_scale_reading), then the blocks' inverses in this order, then full_scale_load_n;"
+        " the forms above are the linear part's, the test vector is the extended filter's",
+    }

@@ -2,19 +2,58 @@
 
 from __future__ import annotations
 
-from smartshoe.compensation.export.model import FilterModel
+import numpy as np
+
+from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
 from smartshoe.compensation.export.rendering import finite_or, render, vector_csv
+from smartshoe.errors import UsageError
+
+SHIFTS = ("zero_offset", "load_cell_tare")
 
 
 def matlab_files(model: FilterModel) -> dict[str, str]:
-    """smartshoe_filter.m, smartshoe_filter_test.m and the test vector, file name to text; double precision."""
-    shared = {
+    """smartshoe_filter.m, smartshoe_filter_test.m and the test vector, file name to text; double precision.
+
+    Of an extended model, the linear network (relaxation, heat, linear leak) and constant shifts of load and reading
+    are written; raises `UsageError` naming the other effects.
+    """
+    shared: dict[str, object] = {
         "readings": [finite_or(value, "NaN", "Inf", repr(value)) for value in model.test_readings.tolist()],
         "forces_n": [repr(value) for value in model.test_forces_n.tolist()],
         "tolerance_n": repr(model.tolerance_n("double")),
     }
+    if isinstance(model, ExtendedFilterModel):
+        shared |= _extended(model)
     return {
         "smartshoe_filter.m": render(f"{model.kind}.m.j2", model, **shared),
         "smartshoe_filter_test.m": render("filter_test.m.j2", model, **shared),
         "smartshoe_filter_test.csv": vector_csv(model),
     }
+
+
+def _extended(model: ExtendedFilterModel) -> dict[str, object]:
+    filter_ = model.filter
+    others = [name for name, _ in filter_.blocks if name not in ("core", *SHIFTS)]
+    if others:
+        raise UsageError(
+            f"the inverses of {', '.join(others)} are not written in MATLAB: export with --to c, which has every block"
+        )
+    shift = {part.name: float(part.values[0]) for part in filter_.model.parts if part.name in SHIFTS}
+    core = filter_.core
+    return {
+        "core": {
+            "transition": _matrix(core.transition),
+            "drive": _matrix(core.drive[:, None]),
+            "read": _matrix(core.read[None, :]),
+            "start": _matrix(core.start[:, None]),
+            "direct": repr(core.direct),
+        },
+        "reading_per_share": repr(filter_.reading_per_share),
+        "full_scale_load_n": repr(filter_.model.full_scale_load_n),
+        **{name: repr(shift.get(name, 0.0)) for name in SHIFTS},
+    }
+
+
+def _matrix(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    rows = [", ".join(repr(float(value)) for value in row) for row in values]
+    return f"[{'; '.join(rows)}]" if values.size else f"zeros({values.shape[0]}, {values.shape[1]})"

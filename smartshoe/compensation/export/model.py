@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.compensation.calibration import Calibration
+from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models import discretise
 
@@ -45,7 +46,8 @@ class FilterModel:
                 " give the rate at which the firmware samples"
             )
         n0, n1 = (float(value) for value in numerator)
-        return cls(calibration, float(rate_hz), (n0, n1), (1.0, float(denominator[1])))
+        model = cls if calibration.extended is None else ExtendedFilterModel
+        return model(calibration, float(rate_hz), (n0, n1), (1.0, float(denominator[1])))
 
     @property
     def static_gain(self) -> float:
@@ -136,6 +138,51 @@ class FilterModel:
                 f"{source.get('name') or '(unnamed)'}, sha256 {source.get('sha256') or 'not known'}"
             )
         return {key: _one_safe_line(text) for key, text in said.items()}
+
+
+@dataclass(frozen=True)
+class ExtendedFilterModel(FilterModel):
+    """The inverse of an extended model's chain; numerator and denominator are its linear part's."""
+
+    kind: str = "extended"
+
+    @cached_property
+    def filter(self) -> ExtendedCompensator:
+        """The filter that is written, without a past."""
+        found = self.calibration.compensator(self.sample_rate_hz)
+        if not isinstance(found, ExtendedCompensator):
+            raise UsageError(f"calibration of {self.calibration.unit or 'a unit'} holds no extended model")
+        return found
+
+    def tolerance_n(self, precision: str) -> float:
+        """Bound in N on what rounding may do to `test_forces_n`: a billionth of the largest force.
+
+        Each block is run in the order of operations of the filter. What is left comes from the library's exp and pow
+        and is some 1e-14 of full scale; a wrong constant shows in the fourth digit.
+        """
+        return float(1e-9 * max(np.abs(self.test_forces_n).max(), self.filter.model.full_scale_load_n))
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """As the plain filter's, with the effects."""
+        filter_ = self.filter
+        found = super().provenance
+        found["reading"] = _one_safe_line(self.calibration.reading_unit.symbol)
+        found["model"] = _one_safe_line(
+            "the standard linear solid with effects, undone last block first; relaxation"
+            f" {filter_.model.relaxing_share:.6g} of the load at {filter_.model.relaxation_rate_per_s:.6g} 1/s"
+        )
+        for part in filter_.model.parts:
+            values = ", ".join(
+                f"{p.name} = {float(value)!r} {p.unit}"
+                for p, value in zip(part.effect.parameters, part.values, strict=True)
+            )
+            found[f"effect {part.name}"] = _one_safe_line(values or "no parameter")
+        for name, says in filter_.not_inverted.items():
+            found[f"not compensated, {name}"] = _one_safe_line(says)
+        for name, says in filter_.cautions.items():
+            found[f"caution, {name}"] = _one_safe_line(says)
+        return found
 
 
 def _one_safe_line(text: str) -> str:

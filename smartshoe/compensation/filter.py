@@ -1,0 +1,102 @@
+"""What every filter from readings to force has in common: whole signals, streams, and missing readings."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Self, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from smartshoe.errors import InputError
+from smartshoe.recording import Channel, Recording
+from smartshoe.units import Unit
+
+Array = NDArray[np.float64]
+
+
+class ForceFilter(ABC):
+    """Readings in ``reading_unit`` to force in N, compression positive, at ``sample_rate_hz``.
+
+    The filter starts as if the first reading had lasted for ever, so that a static load has no transient. A reading
+    that is not finite repeats the last one (force 0 before the first); the output is always finite.
+    """
+
+    sample_rate_hz: float
+    reading_unit: Unit | None
+
+    @abstractmethod
+    def _copy(self) -> Self:
+        """The same filter without a past."""
+
+    @abstractmethod
+    def _begin(self, first: float) -> None:
+        """Take ``first`` as having lasted for ever."""
+
+    @abstractmethod
+    def _advance(self, readings: Array, count: int) -> Array:
+        """Force (n,) of finite ``readings`` (n,), the first of which is number ``count`` since `reset`."""
+
+    def reset(self) -> None:
+        """Forget the past: the next reading counts as having lasted for ever."""
+        self._last: float | None = None
+        self._missing = 0
+        self._count = 0
+
+    @property
+    def missing_count(self) -> int:
+        """How many readings since `reset` were not finite."""
+        return self._missing
+
+    def apply(self, readings: ArrayLike | Channel | Recording) -> Array:
+        """Force (n,) in N of a whole signal (n,), from a fresh start; the state of `push` stays as it is.
+
+        A `Channel`, or the one sensor of a `Recording`, is converted to ``reading_unit``; raises `UnitError` where
+        that cannot be.
+        """
+        if isinstance(readings, Recording):
+            readings = readings.sensor
+        if isinstance(readings, Channel):
+            values = readings.values if self.reading_unit is None else readings.in_unit(self.reading_unit)
+        else:
+            values = np.asarray(readings, dtype=float)
+        if values.ndim != 1:
+            raise InputError(f"readings have shape {values.shape}: give one number per sample")
+        return self._copy()._push_block(values)
+
+    @overload
+    def push(self, readings: float) -> float: ...
+    @overload
+    def push(self, readings: Array) -> Array: ...
+    def push(self, readings: Any) -> Any:
+        """Force in N of the next reading (float in, float out) or block (n,): the same numbers as `apply`."""
+        block = np.asarray(readings, dtype=float)
+        if block.ndim == 0:
+            return float(self._push_block(block.reshape(1))[0])
+        if block.ndim != 1:
+            raise InputError(f"readings have shape {block.shape}: give a number or one number per sample")
+        return self._push_block(block)
+
+    def _push_block(self, block: Array) -> Array:
+        finite = np.isfinite(block)
+        self._missing += int(block.size - np.count_nonzero(finite))
+        count, self._count = self._count, self._count + block.size
+        force_n = np.zeros(block.size)
+        start = 0
+        if self._last is None:
+            if not finite.any():
+                return force_n
+            start = int(np.argmax(finite))
+            self._last = float(block[start])
+            self._begin(self._last)
+        kept = block[start:]
+        if not kept.size:
+            return force_n
+        if not finite[start:].all():
+            index = np.where(finite[start:], np.arange(kept.size), -1)
+            np.maximum.accumulate(index, out=index)
+            kept = np.where(index >= 0, kept[index], self._last)
+        self._last = float(kept[-1])
+        # One code path for floats and blocks, so that any chunking gives the same bits.
+        force_n[start:] = self._advance(kept, count + start)
+        return force_n

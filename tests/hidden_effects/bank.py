@@ -1,0 +1,209 @@
+"""The bank: hidden-effect cases drawn from (set, index), diagnosed in a pool of processes, one row each.
+
+A case is fixed by its set and its index; nothing else is drawn. Sets and their seeds, none of which the development
+of the diagnosis used (that took 0-50 and 1000-1400):
+
+========== ======= =========================================================================
+grid       500,000 one effect at 0.05, 0.1, 0.3, 1 or 3 % of full scale: the table by effect
+single     520,000 one effect, strength log-uniform from 0.1 to 10 %
+pair       540,000 two effects of different families, physical ones, each 0.3 to 3 %
+none       560,000 no effect
+outside    580,000 one effect that the catalogue does not have, 0.3 to 10 %
+calibrate  900,000 a mixture of these: what the confidence is calibrated on, and never judged by
+========== ======= =========================================================================
+
+Every case has noise of 0.1-0.3 % of full scale, partly coloured, and two nuisances (`simulators.hidden`). An effect is
+drawn with a protocol that can show it, and tell it from its neighbours as far as any load history does: `SHOWN_BY`
+follows the last column of the catalogue. No effect is asked for more than it can have: `STRONGEST`, from
+docs/simulated_effects.md.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+import traceback
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from bank_scoring import Score, score
+
+from simulators.hidden import HiddenCase, hide
+from simulators.hidden_effects import EFFECTS
+from smartshoe.diagnosis import diagnose
+from smartshoe.models.effects import catalogue
+
+GRID_PERCENT = (0.05, 0.1, 0.3, 1.0, 3.0)
+SEEDS = {
+    "grid": 500_000, "single": 520_000, "pair": 540_000, "none": 560_000, "outside": 580_000, "calibrate": 900_000,
+}  # fmt: skip
+SETS = ("grid", "single", "pair", "none", "outside")
+MIXTURE = ("single", "grid", "pair", "single", "none", "outside", "single", "pair")
+PLAIN = ("rates_and_holds", "rates", "shuffled")
+HELD = ("rates_and_holds", "static")
+SHOWN_BY: dict[str, tuple[str, ...]] = {
+    "second_relaxation": (*HELD, "step"), "power_law_creep": (*HELD, "step"),
+    "linear_leak": (*HELD, "long_hold"), "orifice_leak": HELD, "permanent_set": (*HELD, "shuffled"),
+    "gas_heat": ("rates_and_holds", "rates", "step"),
+    "gas_compression": (*PLAIN, "static"), "wall_hardening": (*PLAIN, "static"), "contact_area": (*PLAIN, "static"),
+    "sensor_nonlinearity": (*PLAIN, "static"), "dead_band": (*PLAIN, "static"),
+    "play_hysteresis": ("rates_and_holds", "shuffled", "minor_loops"),
+    "bouc_wen_hysteresis": ("rates_and_holds", "shuffled", "minor_loops"),
+    "load_unload_asymmetry": (*PLAIN, "minor_loops"),
+    "sensor_lag": (*PLAIN, "step", "multisine"), "delay": (*PLAIN, "step", "multisine"),
+    "gain_drift": (*PLAIN, "idle"), "zero_drift": ("rates_and_holds", "shuffled", "idle"),
+    "warm_up": ("rates_and_holds", "shuffled", "idle"),
+    "zero_offset": (*PLAIN, "static", "idle"), "load_cell_tare": (*PLAIN, "static"),
+    "heteroscedastic_noise": ("rates_and_holds", "static"), "timing_jitter": ("rates", "shuffled"),
+    "quantisation": ("rates_and_holds", "static"),
+}  # fmt: skip
+STRONGEST = {
+    "second_relaxation": 1.0, "power_law_creep": 2.0, "gas_heat": 0.8, "gas_compression": 1.6, "sensor_lag": 0.8,
+    "sensor_nonlinearity": 2.5, "held_samples": 1.0,
+}  # fmt: skip
+USUALLY_STRONGEST = 4.0
+INSIDE = tuple(name for name, effect in EFFECTS.items() if effect.inside)
+OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.inside)
+PHYSICAL = tuple(name for name in INSIDE if catalogue()[name].is_physical)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One case before it is made: ``effects`` by name with the strength asked for in percent of full scale."""
+
+    kind: str
+    index: int
+    seed: int
+    protocol: str
+    effects: dict[str, float]
+
+    def hidden(self) -> HiddenCase:
+        """The recordings."""
+        return hide(self.effects, protocol=self.protocol, seed=self.seed)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case and what became of it. ``reached`` are the strengths the effects have; ``cpu_s`` of the diagnosis."""
+
+    kind: str
+    index: int
+    seed: int
+    protocol: str
+    asked: dict[str, float]
+    reached: dict[str, float]
+    nuisances: dict[str, float]
+    noise_percent_fs: float
+    samples: int
+    verdict: str
+    score: Score | None
+    seconds: float
+    cpu_s: float
+    log: tuple[str, ...]
+    error: str = ""
+
+    @property
+    def label(self) -> str:
+        """What to call it in a report."""
+        hidden = " + ".join(f"{name} {percent:.2g} %" for name, percent in self.reached.items()) or "no effect"
+        return f"{hidden}, {self.protocol}, seed {self.seed}"
+
+
+def drawn(kind: str, index: int) -> Drawn:
+    """Case ``index`` of the set ``kind``: the same for ever."""
+    seed = SEEDS[kind] + index
+    rng = np.random.default_rng([seed, 77])
+    like = MIXTURE[index % len(MIXTURE)] if kind == "calibrate" else kind
+    names: tuple[str, ...]
+    match like:
+        case "grid":
+            name, percent = _cell(index if kind == "grid" else int(rng.integers(10_000)))
+            return Drawn(kind, index, seed, str(rng.choice(protocols_of(name))), {name: percent})
+        case "single":
+            # In turn, so that a short bank has every effect once.
+            name = INSIDE[index % len(INSIDE)] if kind == "single" else str(rng.choice(INSIDE))
+            names, low, high = (name,), 0.1, 10.0
+        case "pair":
+            names, low, high = _pair(rng), 0.3, 3.0
+        case "none":
+            return Drawn(kind, index, seed, str(rng.choice(PLAIN)), {})
+        case "outside":
+            names, low, high = (OUTSIDE[index % len(OUTSIDE)],), 0.3, 10.0
+        case _:
+            raise ValueError(f"there is no set {kind!r} in the bank: use one of {', '.join(SEEDS)}")
+    together = [protocol for protocol in protocols_of(names[0]) if protocol in protocols_of(names[-1])]
+    asked = {name: float(np.exp(rng.uniform(np.log(low), np.log(min(high, strongest(name)))))) for name in names}
+    return Drawn(kind, index, seed, str(rng.choice(together)), asked)
+
+
+def protocols_of(name: str) -> tuple[str, ...]:
+    """The protocols that show the effect ``name``."""
+    return SHOWN_BY.get(name, PLAIN)
+
+
+def strongest(name: str) -> float:
+    """What the effect ``name`` may be asked for, percent of full scale; outside the catalogue there is no end."""
+    return STRONGEST.get(name, USUALLY_STRONGEST if name in INSIDE else 10.0)
+
+
+def _cell(index: int) -> tuple[str, float]:
+    """The grid's cells in turn: all effects at one strength, then at the next, leaving out what cannot be reached."""
+    cells = [(name, percent) for percent in GRID_PERCENT for name in INSIDE if percent <= strongest(name)]
+    return cells[index % len(cells)]
+
+
+def _pair(rng: np.random.Generator) -> tuple[str, str]:
+    while True:
+        one, other = (str(name) for name in rng.choice(PHYSICAL, 2, replace=False))
+        shared = set(protocols_of(one)) & set(protocols_of(other))
+        if shared and EFFECTS[one].family != EFFECTS[other].family:
+            return one, other
+
+
+def run(case: Drawn) -> Row:
+    """Make the case, diagnose it, score it. What goes wrong is the row's ``error``: one case does not end a bank."""
+    log: list[str] = []
+    hidden = case.hidden()
+    reached = {effect.name: effect.strength_percent_fs for effect in hidden.effects}
+    nuisances = {name: effect.strength_percent_fs for name, effect in hidden.nuisances.items()}
+    samples = sum(len(recording) for recording in hidden.recordings + hidden.hold_out)
+    verdict, found, error = "", None, ""
+    began, cpu = time.perf_counter(), time.process_time()
+    try:
+        diagnosis = diagnose(hidden.recordings, hidden.hold_out, progress=log.append)
+        seconds, cpu_s = time.perf_counter() - began, time.process_time() - cpu
+        verdict, found = diagnosis.verdict, score(hidden, diagnosis)
+    except Exception:  # kept in the row, and asserted to be none by the bank
+        seconds, cpu_s = time.perf_counter() - began, time.process_time() - cpu
+        error = traceback.format_exc()
+    return Row(
+        case.kind, case.index, case.seed, case.protocol, case.effects, reached, nuisances, hidden.noise_percent_fs,
+        samples, verdict, found, seconds, cpu_s, tuple(log), error,
+    )  # fmt: skip
+
+
+def run_all(cases: Iterable[Drawn], workers: int) -> Iterator[Row]:
+    """Rows as they come, from ``workers`` processes of one thread each."""
+    from joblib import Parallel, delayed
+
+    pool = Parallel(n_jobs=workers, return_as="generator_unordered", inner_max_num_threads=1, backend="loky")
+    yield from pool(delayed(run)(case) for case in cases)
+
+
+def write(rows: Iterable[Row], path: Path) -> None:
+    """One JSON object a line."""
+    with path.open("w", encoding="utf-8") as file:
+        for row in rows:
+            file.write(json.dumps(asdict(row)) + "\n")
+
+
+def read(path: Path) -> list[Row]:
+    """What `write` wrote."""
+    rows = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        held = json.loads(line)
+        held["score"] = Score.from_dict(held["score"]) if held["score"] else None
+        rows.append(Row(**{**held, "log": tuple(held["log"])}))
+    return rows

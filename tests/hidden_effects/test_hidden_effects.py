@@ -1,0 +1,156 @@
+"""Hide an effect and require its name, its parameter and the gain on held-out data.
+
+Hypothesis draws the cases: effect, strength from 0.3 % of full scale to what the effect can have, protocol, noise and
+seed (which draws the effect's further parameters, the unit and two nuisances). The requirement is on counts over
+the drawn set, not on every example: the figure asked for is 92 % of names and 97 % of families, so that one example in
+twelve may go wrong by right, and a search for a counterexample would find one. A set is drawn anew only when this file
+changes (derandomised), and nothing that fails is taken out of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+from bank import GRID_PERCENT, INSIDE, PHYSICAL, PLAIN, drawn, protocols_of, strongest
+from bank_scoring import Score, score
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from simulators.hidden import HiddenCase, hide
+from simulators.hidden_effects import EFFECTS
+from smartshoe.diagnosis import Diagnosis, diagnose
+
+SEEDS = st.integers(1_000_000, 2**31 - 1)
+GROUPS = {
+    "load and wall": ("machine", "contact", "wall"),
+    "gas and sensor": ("gas", "sensor"),
+    "logger": ("logger",),
+}
+CASES = {"load and wall": 12, "gas and sensor": 12, "logger": 8}
+MISSES = 1  # of twelve: 92 %
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One drawn case."""
+
+    name: str
+    percent: float
+    protocol: str
+    noise_percent: float
+    seed: int
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.percent:.2f} %, {self.protocol}, noise {self.noise_percent:.2f} %, seed {self.seed}"
+
+    def case(self) -> HiddenCase:
+        return hide(
+            {self.name: self.percent},
+            protocol=self.protocol,
+            noise_percent_fs=self.noise_percent,
+            seed=self.seed,
+            recordings=2,
+        )
+
+
+@st.composite
+def cases(draw: st.DrawFn, names: list[str]) -> Asked:
+    name = draw(st.sampled_from(names))
+    percent = draw(st.floats(0.3, strongest(name)))
+    return Asked(name, percent, draw(st.sampled_from(protocols_of(name))), draw(st.floats(0.1, 0.3)), draw(SEEDS))
+
+
+def drawn_cases(group: str) -> list[Asked]:
+    """What Hypothesis draws for a group: the same until this file changes."""
+    found: list[Asked] = []
+    names = [name for name in INSIDE if EFFECTS[name].stage in GROUPS[group]]
+
+    @settings(max_examples=CASES[group], phases=[Phase.generate], database=None, derandomize=True, deadline=None)
+    @given(asked=cases(names))
+    def collect(asked: Asked) -> None:
+        found.append(asked)
+
+    collect()
+    return found
+
+
+def diagnosed(case: HiddenCase) -> tuple[Diagnosis, Score]:
+    diagnosis = diagnose(case.recordings, case.hold_out)
+    return diagnosis, score(case, diagnosis)
+
+
+def told(asked: object, diagnosis: Diagnosis, one: Score) -> str:
+    causes = ", ".join(f"{n.effect} ({n.confidence:.2f})" for n in one.named) or "nothing"
+    return f"{asked}: {diagnosis.verdict}: {causes}; faults: {', '.join(one.faults) or 'none'}"
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_hidden_effects_are_named_with_their_parameters_and_a_gain(group):
+    unnamed, other_family, off, without_gain = [], [], [], []
+    asked_cases = drawn_cases(group)
+    for asked in asked_cases:
+        diagnosis, one = diagnosed(asked.case())
+        says = told(asked, diagnosis, one)
+        if not one.within_equivalents:
+            unnamed.append(says)
+        if not one.family:
+            other_family.append(says)
+        wrong = [p for p in one.parameters if not p.right]
+        if wrong:
+            off.append(f"{asked}: " + ", ".join(f"{p.parameter} {p.fitted:.4g}, not {p.truth:.4g}" for p in wrong))
+        if any(cause.name == asked.name for cause in diagnosis.causes) and one.gain_percent <= 0:
+            without_gain.append(says)
+    of = f"of {len(asked_cases)}"
+    assert len(other_family) <= MISSES, f"{len(other_family)} {of} families: " + "\n".join(other_family)
+    assert len(unnamed) <= MISSES, f"{len(unnamed)} {of} names: " + "\n".join(unnamed)
+    assert len(off) <= MISSES, f"{len(off)} {of} parameters: " + "\n".join(off)
+    assert not without_gain, "\n".join(without_gain)
+
+
+@pytest.mark.parametrize("protocol", PLAIN)
+def test_no_effect_gets_no_wrong_name(protocol):
+    case = hide({}, protocol=protocol, seed=drawn("none", 1000).seed, recordings=2)
+    diagnosis, one = diagnosed(case)
+    assert not one.wrong, told("no effect", diagnosis, one)
+    assert not one.false_faults, told("no effect", diagnosis, one)
+
+
+@pytest.mark.parametrize("name", [name for name in EFFECTS if not EFFECTS[name].inside])
+def test_an_effect_that_the_catalogue_does_not_have_gets_no_name(name):
+    case = hide({name: 2.0}, protocol="rates", seed=drawn("outside", 1000).seed, recordings=2)
+    diagnosis, one = diagnosed(case)
+    assert not one.wrong, told(name, diagnosis, one)
+    assert not one.false_faults, told(name, diagnosis, one)
+    assert diagnosis.verdict in ("unexplained", "partly_explained"), told(name, diagnosis, one)
+
+
+@pytest.mark.parametrize(
+    ("effects", "protocol"),
+    [
+        ({"linear_leak": 0.8, "play_hysteresis": 1.2}, "rates_and_holds"),
+        ({"dead_band": 0.6, "zero_drift": 0.9}, "shuffled"),
+    ],
+)
+def test_two_effects_are_both_named(effects, protocol):
+    case = hide(effects, protocol=protocol, seed=drawn("pair", 1000).seed, recordings=2)
+    diagnosis, one = diagnosed(case)
+    assert one.within_equivalents, told(effects, diagnosis, one)
+    assert one.gain_percent > 0
+    assert one.removed is not None
+    assert one.removed > 0.9
+
+
+@pytest.mark.parametrize("kind", ["grid", "single", "pair", "none", "outside", "calibrate"])
+def test_the_bank_draws_the_same_for_ever_and_within_its_bounds(kind):
+    drawn_now = [drawn(kind, index) for index in range(60)]
+    assert drawn_now == [drawn(kind, index) for index in range(60)]
+    assert len({case.seed for case in drawn_now}) == 60
+    for case in drawn_now:
+        assert len({EFFECTS[name].family for name in case.effects}) == len(case.effects)
+        for name, percent in case.effects.items():
+            assert min(GRID_PERCENT) <= percent <= strongest(name)
+            assert case.protocol in protocols_of(name)
+            assert EFFECTS[name].inside or kind in ("outside", "calibrate")
+        if kind == "pair":
+            assert set(case.effects) <= set(PHYSICAL)
