@@ -15,8 +15,11 @@ With every effect off this is eq. (2)-(4):  P/f = (s + k2/c) / ([1 + K1 + K2] s 
 The scheme is exact for a deformation that is linear within a step (the arm, the heat), two-step Adams-Bashforth for
 the slow leak, and a safeguarded Newton iteration for the balance: second order, stable at any step for the wall.
 
+More of the wall, the air and the contact stands in `simulators.effects`, one file a family, and is stepped by
+`simulators.wall_stepping` once a unit has any of it.
+
 *Left out:* inertia and the tube's acoustics (both far above 1 kHz), buckling and contact of the tube's own walls
-(bottoming out), a wall spectrum wider than one relaxation time, temperature of the wall, humidity, shear, neighbours.
+(bottoming out), temperature of the wall, humidity, shear.
 """
 
 from __future__ import annotations
@@ -27,10 +30,14 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from simulators.preisach import MEMORY, loop_shape
-from simulators.stepping import STATE_SIZE, advance
+from simulators.bounds import STRICT_KEYS, Finite, NotNegative, Positive
+from simulators.effects.contact import Contact
+from simulators.effects.damage import PermanentSet
+from simulators.effects.friction import BoucWen, StickSlip
+from simulators.effects.outside import Odd
+from simulators.effects.relaxation import PowerLawCreep, SecondRelaxation
 from smartshoe.devices.base import Bladder
 from smartshoe.errors import UsageError
 
@@ -42,11 +49,7 @@ HEAT_RATIO = 1.4  # of air
 X_OVER_NRT = 0.38113  # x0^2/(nRT) in m/N, Chinimilli 2016, below eq. (4)
 TUBE_DIAMETER_M = 2e-3
 LOWEST_STEP_HZ = 1000.0
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-_STRICT_KEYS = ConfigDict(extra="forbid")
+BESSEL_ZEROS = np.array([2.404826, 5.520078, 8.653728, 11.791534, 14.930918, 18.071064])  # of J0
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,7 @@ class Hysteresis:
     is ``half_width_n`` (1 +- ``spread``).
     """
 
-    __pydantic_config__ = _STRICT_KEYS
+    __pydantic_config__ = STRICT_KEYS
     kind: Literal["preisach"] = "preisach"
     strength: Annotated[float, Field(ge=0, le=0.2)] = 0.0
     half_width_n: Positive = 40.0
@@ -66,27 +69,44 @@ class Hysteresis:
 
 @dataclass(frozen=True, slots=True)
 class Leak:
-    """Air that leaves the tube: ``linear_per_s`` at p/p0 each, ``orifice_per_s`` at sqrt(p/p0) (turbulent)."""
+    """Air that leaves the tube: ``linear_per_s`` at p/p0 each, ``orifice_per_s`` at sqrt(p/p0) (turbulent).
 
-    __pydantic_config__ = _STRICT_KEYS
+    Or by compressible flow: ``capillary_per_s`` through a narrow channel (Poiseuille, ((1 + p)^2 - 1)/2 for p/p0),
+    ``nozzle_per_s`` through a hole (Saint-Venant and Wantzel, laminar near zero), about sqrt(p/p0) too.
+    """
+
+    __pydantic_config__ = STRICT_KEYS
     linear_per_s: Annotated[float, Field(ge=0, le=5)] = 0.0
     orifice_per_s: Annotated[float, Field(ge=0, le=1)] = 0.0
+    capillary_per_s: Annotated[float, Field(ge=0, le=5)] = 0.0
+    nozzle_per_s: Annotated[float, Field(ge=0, le=1)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class GasHeat:
-    """Heat of compression that has not yet left the air: ``fraction`` of the adiabatic rise, ``time_constant_s``."""
+    """Heat of compression that has not yet left the air: ``fraction`` of the adiabatic rise, ``time_constant_s``.
 
-    __pydantic_config__ = _STRICT_KEYS
+    ``modes`` above one conduct it away through a cylinder of air: Fourier's series with the Bessel function's zeros
+    j_n, shares 4/j_n^2 and rates j_n^2 (Carslaw and Jaeger 1959, 7.6); the time constant is the slowest mode's.
+    """
+
+    __pydantic_config__ = STRICT_KEYS
     fraction: Annotated[float, Field(ge=0, le=1)] = 0.0
     time_constant_s: Positive = 1.0
+    modes: Annotated[int, Field(ge=1, le=6)] = 1
+
+    def spread(self) -> tuple[Array, Array]:
+        """Each mode's share of the heat (they sum to one) and rate in 1/s."""
+        zeros = BESSEL_ZEROS[: self.modes]
+        share = 1.0 / zeros**2
+        return share / share.sum(), (zeros / zeros[0]) ** 2 / self.time_constant_s
 
 
 @dataclass(frozen=True, slots=True)
 class Temperature:
     """Temperature of the sealed air above that of the reset: a drift, and a warming that settles."""
 
-    __pydantic_config__ = _STRICT_KEYS
+    __pydantic_config__ = STRICT_KEYS
     drift_k_per_s: Finite = 0.0
     warming_k: Finite = 0.0
     warming_time_constant_s: Positive = 300.0
@@ -100,7 +120,7 @@ class Softening:
     tanh((e_max^2 - e^2)/(``width`` e_fullscale^2)).
     """
 
-    __pydantic_config__ = _STRICT_KEYS
+    __pydantic_config__ = STRICT_KEYS
     strength: Annotated[float, Field(ge=0, lt=1)] = 0.0
     width: Positive = 0.3
 
@@ -109,7 +129,7 @@ class Softening:
 class Conditioning:
     """Gain that settles over load cycles: 1 + ``gain`` (1 - exp(-n/``cycles``)), n the cycles completed."""
 
-    __pydantic_config__ = _STRICT_KEYS
+    __pydantic_config__ = STRICT_KEYS
     gain: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0
     cycles: Positive = 3.0
 
@@ -120,10 +140,11 @@ class BladderParameters:
 
     ``k1``, ``k2`` in N/m and ``c`` in N s/m as in Table 1 of Chinimilli 2016; ``x_over_nrt`` is x0^2/(nRT) in m/N.
     ``static_exponent`` m passes the load as full_scale (F/full_scale)^m (contact that grows with load);
-    ``wall_hardening`` beta stiffens k1 by 1 + beta (e/e_fullscale)^2.
+    ``wall_hardening`` beta stiffens k1 by 1 + beta (e/e_fullscale)^2, ``wall_stiffening`` kappa makes its force
+    sinh(kappa x)/kappa, x = e/e_fullscale (Fung 1967). The nested effects stand in `simulators.effects`.
     """
 
-    __pydantic_config__ = _STRICT_KEYS
+    __pydantic_config__ = STRICT_KEYS
     k1: NotNegative
     k2: Positive
     c: Positive = 1.0
@@ -139,6 +160,14 @@ class BladderParameters:
     temperature: Temperature = field(default_factory=Temperature)
     softening: Softening = field(default_factory=Softening)
     conditioning: Conditioning = field(default_factory=Conditioning)
+    wall_stiffening: Annotated[float, Field(ge=0, le=6)] = 0.0
+    second_relaxation: SecondRelaxation = field(default_factory=SecondRelaxation)
+    power_law_creep: PowerLawCreep = field(default_factory=PowerLawCreep)
+    stick_slip: StickSlip = field(default_factory=StickSlip)
+    bouc_wen: BoucWen = field(default_factory=BoucWen)
+    permanent_set: PermanentSet = field(default_factory=PermanentSet)
+    contact: Contact = field(default_factory=Contact)
+    odd: Odd = field(default_factory=Odd)
 
     @property
     def static_gain_pa_per_n(self) -> float:
@@ -160,18 +189,17 @@ class SimulatedBladder(Bladder):
     """A bladder that keeps its memory from one `press` to the next; see the module for what it leaves out."""
 
     def __init__(self, parameters: BladderParameters) -> None:
+        from simulators.steppers import stepper
+
         self.parameters = parameters
-        friction = parameters.hysteresis
-        self._shape, loop = loop_shape(friction.half_width_n, friction.spread, parameters.full_scale_n)
-        self._loop_n = friction.strength * parameters.full_scale_n / loop if friction.strength else 0.0
-        self._constants = self._pack()
+        self._stepper = stepper(parameters)
+        self._session = -1
         self.reset()
 
     def reset(self) -> None:
         """Back to rest: unloaded for ever, memory forgotten, at the reset's temperature."""
-        self._state = np.zeros(STATE_SIZE)
-        self._turning = np.zeros(MEMORY)
-        self._partial = np.zeros(MEMORY)
+        self._session += 1
+        self._stepper.reset(self._session)
         self.deformation = np.zeros(0)
 
     def press(self, load_n: Array, sample_rate_hz: float) -> Array:
@@ -186,37 +214,5 @@ class SimulatedBladder(Bladder):
             at = int(np.argmin(np.isfinite(load)))
             raise UsageError(f"load sample {at + 1} of {load.size} is not finite: fill gaps before pressing")
         finer = max(1, ceil(LOWEST_STEP_HZ / sample_rate_hz - 1e-9))
-        pressure = np.empty(load.size)
-        self.deformation = np.empty(load.size)
-        advance(
-            load, finer, 1.0 / (sample_rate_hz * finer), self._constants, self._shape,
-            self._state, self._turning, self._partial, pressure, self.deformation,
-        )  # fmt: skip
+        pressure, self.deformation = self._stepper.advance(load, finer, 1.0 / (sample_rate_hz * finer))
         return pressure * AMBIENT_PA
-
-    def _pack(self) -> Array:
-        """The kernel's constants, in the order in which `simulators.stepping.advance` unpacks them."""
-        p = self.parameters
-        return np.array([
-            p.k1 * p.x_over_nrt,
-            p.k2 * p.x_over_nrt,
-            p.k2 / p.c,
-            1.0 / (p.effective_area_m2 * AMBIENT_PA),
-            p.full_scale_n,
-            p.full_scale_deformation,
-            1.0 if p.gas == "boyle" else 0.0,
-            p.static_exponent,
-            p.wall_hardening,
-            self._loop_n,
-            p.leak.linear_per_s,
-            p.leak.orifice_per_s,
-            p.gas_heat.fraction * (HEAT_RATIO - 1.0),
-            1.0 / p.gas_heat.time_constant_s,
-            p.temperature.drift_k_per_s / AMBIENT_K,
-            p.temperature.warming_k / AMBIENT_K,
-            1.0 / p.temperature.warming_time_constant_s,
-            p.softening.strength,
-            p.softening.width,
-            p.conditioning.gain,
-            1.0 / p.conditioning.cycles,
-        ])  # fmt: skip

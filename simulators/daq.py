@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from simulators.effects.logging import ReadingChannel
 
 Array = NDArray[np.float64]
 
@@ -23,7 +25,8 @@ class MyRioParameters:
     Both ``..._error_v`` are a channel's absolute error in volt, or "drawn": uniform within +-50 mV at construction.
     0, the default, is a channel that was zeroed before the test. Load: ``load_full_scale_n`` over the 5 V, zero load
     at ``load_zero_v``, so that noise about zero is not clipped. The true time of sample k is
-    clock_offset_s + (k/sample_rate_hz)(1 + clock_skew) + jitter; the log says k/sample_rate_hz.
+    clock_offset_s + (k/sample_rate_hz)(1 + clock_skew) + jitter; the log says k/sample_rate_hz. ``reading`` is what
+    the sensor's channel alone suffers.
     """
 
     sample_rate_hz: float = 100.0
@@ -36,6 +39,7 @@ class MyRioParameters:
     clock_offset_s: float = 0.0
     clock_skew: float = 0.0
     jitter_s: float = 0.0
+    reading: ReadingChannel = field(default_factory=ReadingChannel)
 
     @property
     def step_v(self) -> float:

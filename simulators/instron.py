@@ -6,13 +6,15 @@ corners of the commanded load are rounded by a short average, which bounds the a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.bladder import TUBE_DIAMETER_M, SimulatedBladder
 from simulators.daq import MyRioParameters, SimulatedMyRio, sampled
+from simulators.effects.room import Neighbour, Room
 from simulators.sensor import SimulatedHdiSensor
 from smartshoe.devices.base import ChannelDescription, TestMachine
 from smartshoe.errors import LimitError
@@ -20,24 +22,30 @@ from smartshoe.protocol import MachineLimits, Protocol
 from smartshoe.recording import Channel, Recording, Role
 from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
 
+if TYPE_CHECKING:
+    from simulators.twin import SimulatedTwin
+
 Array = NDArray[np.float64]
 
 LOAD_LIMIT_N = 2000.0  # Instron 5944
-MILLIMETRE = unit("mm")
+MILLIMETRE, CELSIUS = unit("mm"), unit("°C")
 
 
 @dataclass(frozen=True)
 class SensingUnit:
-    """A bladder with its sensor: what the machine presses."""
+    """A bladder, or a twin in its place, with its sensor: what the machine presses."""
 
     name: str
-    bladder: SimulatedBladder
+    bladder: SimulatedBladder | SimulatedTwin
     sensor: SimulatedHdiSensor
 
 
 @dataclass(frozen=True, slots=True)
 class InstronParameters:
-    """The machine: noise is a standard deviation a sample; the corner's rounding spans ``corner_s`` (0: sharp)."""
+    """The machine: noise is a standard deviation a sample; the corner's rounding spans ``corner_s`` (0: sharp).
+
+    ``load_cell_tare_n`` is what the load cell shows when nothing presses, in both logs.
+    """
 
     fine_rate_hz: float = 1000.0
     corner_s: float = 0.04
@@ -46,6 +54,9 @@ class InstronParameters:
     extension_noise_m: float = 2e-7
     bluehill_rate_hz: float = 100.0
     bluehill_clock_offset_s: float = 0.35
+    load_cell_tare_n: float = 0.0
+    room: Room = field(default_factory=Room)
+    neighbour: Neighbour = field(default_factory=Neighbour)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +69,7 @@ class Truth:
     pressure_pa: Array
     reading_v: Array
     deformation: Array
+    neighbour_pa: Array | None = None
 
 
 class SimulatedInstron(TestMachine):
@@ -80,6 +92,7 @@ class SimulatedInstron(TestMachine):
         self.daq = SimulatedMyRio(daq or MyRioParameters(), rng)
         self.truth: Truth | None = None
         self._rng = rng
+        self._channel_rng, self._room_rng = rng.spawn(2)
         self._seed = seed
         self._logs: tuple[Recording, ...] = ()
 
@@ -104,14 +117,19 @@ class SimulatedInstron(TestMachine):
         step_pa = np.diff(self.specimen.sensor.to_pressure_pa(np.array([0.0, daq.step_v])))[0]
         span_n = self.daq.to_load_n(np.array([0.0, daq.full_scale_v]))
         rate = daq.sample_rate_hz
-        return (
+        described = [
             ChannelDescription(
                 "force", "force", NEWTON, (float(span_n[0]), float(span_n[1])), daq.step_v * daq.newton_per_volt, rate
             ),
             ChannelDescription("pressure", "pressure", MILLIBAR, span_mbar, float(MILLIBAR.from_si(step_pa)), rate),
             ChannelDescription("command", "force", NEWTON, (0.0, LOAD_LIMIT_N), None, rate),
             ChannelDescription("displacement", "length", MILLIMETRE, None, None, rate),
-        )
+        ]
+        if self.parameters.room.logged:
+            described.append(ChannelDescription("temperature", "temperature", CELSIUS, None, None, rate))
+        if self.parameters.neighbour.logged:
+            described.append(ChannelDescription("neighbour", "pressure", MILLIBAR, None, None, rate))
+        return tuple(described)
 
     def _check_internal(self, protocol: Protocol) -> None:
         expected_pa = self.specimen.bladder.parameters.nominal_pressure_pa(protocol.peak_load_n)
@@ -143,14 +161,20 @@ class SimulatedInstron(TestMachine):
         bladder.reset()
         sensor.reset()
         pressure_pa = bladder.press(load_n, rate)
-        reading_v = sensor.read(pressure_pa, rate)
-        truth = Truth(time_s, command_n, load_n, pressure_pa, reading_v, bladder.deformation)
+        felt_pa, neighbour_pa = pressure_pa, None
+        neighbour = self.parameters.neighbour
+        if neighbour.logged or neighbour.cross_talk != 0:
+            neighbour_pa = neighbour.pressure_pa(time_s, self._room_rng)
+            felt_pa = pressure_pa + neighbour.cross_talk * neighbour_pa
+        reading_v = sensor.read(felt_pa, rate, self.parameters.room.warmer_k(time_s))
+        truth = Truth(time_s, command_n, load_n, pressure_pa, reading_v, bladder.deformation, neighbour_pa)
         self.truth = truth
         metadata = {
             "machine": str(self),
             "protocol": protocol.name,
             "effective_area_m2": repr(bladder.parameters.effective_area_m2),
             "seed": self._seed,
+            **getattr(bladder, "metadata", {}),
         }
         # One load cell, one amplifier: both logs see the same electrical noise only where they sample together,
         # which two free clocks do not.
@@ -166,7 +190,7 @@ class SimulatedInstron(TestMachine):
         extension_m = TUBE_DIAMETER_M * sampled(ticks_s, p.fine_rate_hz, truth.deformation)
         extension_m += load_n / p.frame_stiffness_n_per_m
         extension_m += p.extension_noise_m * self._rng.standard_normal(ticks_s.size)
-        load_n = load_n + p.load_noise_n * self._rng.standard_normal(ticks_s.size)
+        load_n = load_n + p.load_cell_tare_n + p.load_noise_n * self._rng.standard_normal(ticks_s.size)
         channels = {
             "extension": Channel.from_values("extension", MILLIMETRE.from_si(extension_m), MILLIMETRE),
             "force": Channel.from_values("force", load_n, NEWTON, "load"),
@@ -179,8 +203,18 @@ class SimulatedInstron(TestMachine):
         p = self.parameters
         logged_s, true_s = self.daq.ticks(protocol.duration_s)
         load_n = sampled(true_s, p.fine_rate_hz, truth.load_n)
-        load_n = load_n + p.load_noise_n * self._rng.standard_normal(logged_s.size)
-        pressure_v = self.daq.convert(sampled(true_s, p.fine_rate_hz, truth.reading_v))
+        load_n = load_n + p.load_cell_tare_n + p.load_noise_n * self._rng.standard_normal(logged_s.size)
+        reading, sensor = self.daq.parameters.reading, self.specimen.sensor.parameters
+        read_s = reading.times(true_s, self._channel_rng)
+        if read_s is true_s:
+            voltage_v = sampled(true_s, p.fine_rate_hz, truth.reading_v)
+        else:
+            white_v = self.specimen.sensor.white_v
+            nearest = np.clip(np.rint(read_s * p.fine_rate_hz), 0, white_v.size - 1).astype(np.intp)
+            voltage_v = sampled(read_s, p.fine_rate_hz, truth.reading_v - white_v) + white_v[nearest]
+        if reading.hum_percent > 0:
+            voltage_v = voltage_v + reading.hum(true_s, sensor.span_v, self._channel_rng)
+        pressure_v = reading.logged(self.daq.convert(voltage_v), sensor.unloaded_v, sensor.span_v, self._channel_rng)
         channels = {
             "pressure": Channel.from_values("pressure", pressure_v, VOLT, "sensor"),
             "load": Channel.from_values("load", self.daq.convert_load(load_n), VOLT),
@@ -192,7 +226,7 @@ class SimulatedInstron(TestMachine):
     ) -> Recording:
         """Load and reading as the myRIO sampled them; the crosshead from Bluehill's log, set back to the start."""
         time_s = voltages.time_s
-        pressure_pa = self.specimen.sensor.to_pressure_pa(voltages["pressure"].values)
+        pressure_pa = self.specimen.sensor.to_pressure_pa(voltages["pressure"].with_nan())
         extension = machine["extension"]
         start_s = self.parameters.bluehill_clock_offset_s
         values: dict[str, tuple[Array, Role]] = {
@@ -201,6 +235,7 @@ class SimulatedInstron(TestMachine):
             "command": (protocol.load_at(time_s), "command"),
             "displacement": (np.interp(time_s, machine.time_s - start_s, extension.values), "auxiliary"),
         }
+        values.update(self._around(time_s))
         channels = {
             d.name: replace(
                 Channel.from_values(d.name, values[d.name][0], d.unit, values[d.name][1]),
@@ -219,3 +254,16 @@ class SimulatedInstron(TestMachine):
         return Recording(
             time_s, channels, protocol.name, self.specimen.name, metadata, source=str(self), notes=tuple(notes)
         )
+
+    def _around(self, time_s: Array) -> dict[str, tuple[Array, Role]]:
+        """The room's temperature and the neighbour's reading, where they are logged."""
+        p = self.parameters
+        found: dict[str, tuple[Array, Role]] = {}
+        if p.room.logged:
+            noise_k = p.room.thermometer_noise_k * self._room_rng.standard_normal(time_s.size)
+            found["temperature"] = (p.room.start_c + p.room.warmer_k(time_s) + noise_k, "auxiliary")
+        if p.neighbour.logged and self.truth is not None and self.truth.neighbour_pa is not None:
+            noise_mbar = p.neighbour.noise_mbar * self._room_rng.standard_normal(time_s.size)
+            heard_pa = sampled(time_s, p.fine_rate_hz, self.truth.neighbour_pa)
+            found["neighbour"] = (MILLIBAR.from_si(heard_pa) + noise_mbar, "auxiliary")
+        return found

@@ -11,8 +11,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from simulators import presets
-from simulators.bladder import X_OVER_NRT, BladderParameters, Finite, NotNegative, Positive
+from simulators.bladder import X_OVER_NRT, BladderParameters
+from simulators.bounds import Finite, NotNegative, Positive
 from simulators.daq import LARGEST_ERROR_V, MyRioParameters
+from simulators.effects.logging import ReadingChannel
+from simulators.effects.outside import Wander
+from simulators.effects.room import Neighbour, Room
+from simulators.effects.sensing import Curve, Drift, Limit, Noise
 from simulators.instron import InstronParameters
 from simulators.profiles import BODY_WEIGHT_N, Gait
 from simulators.sensor import HdiParameters
@@ -51,6 +56,13 @@ class SensorOptions(_Options):
     zero_drift_mbar_per_s: Finite = 0.0
     gain_error_percent: Annotated[float, Field(gt=-50, lt=50)] = 0.0
     over_range_percent: Annotated[float, Field(ge=0, le=12.5)] = 1.0
+    bidirectional: bool = False
+    second_lag_s: NotNegative = 0.0
+    curve: Curve = Curve()
+    drift: Drift = Drift()
+    limit: Limit = Limit()
+    noise: Noise = Noise()
+    wander: Wander = Wander()
 
     def parameters(self) -> HdiParameters:
         """The same in SI."""
@@ -62,6 +74,13 @@ class SensorOptions(_Options):
             zero_drift_pa_per_s=self.zero_drift_mbar_per_s * MBAR_PA,
             gain_error_fraction=self.gain_error_percent / 100.0,
             over_range_fraction=self.over_range_percent / 100.0,
+            bidirectional=self.bidirectional,
+            second_lag_s=self.second_lag_s,
+            curve=self.curve,
+            drift=self.drift,
+            limit=self.limit,
+            noise=self.noise,
+            wander=self.wander,
         )
 
 
@@ -77,10 +96,11 @@ class DaqOptions(_Options):
     clock_offset_s: NotNegative = 0.0
     clock_skew: Annotated[float, Field(gt=-0.1, lt=0.1)] = 0.0
     jitter_s: NotNegative = 0.0
+    reading: ReadingChannel = ReadingChannel()
 
     def parameters(self) -> MyRioParameters:
         """The same as the simulator takes it."""
-        return MyRioParameters(**self.model_dump())
+        return MyRioParameters(**dict(self))
 
 
 class MachineOptions(_Options):
@@ -97,10 +117,25 @@ class MachineOptions(_Options):
     extension_noise_m: NotNegative = 2e-7
     bluehill_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 100.0
     bluehill_clock_offset_s: NotNegative = 0.35
+    load_cell_tare_n: Finite = 0.0
+    room: Room = Room()
+    neighbour: Neighbour = Neighbour()
 
     def parameters(self) -> InstronParameters:
         """The machine's own part."""
-        return InstronParameters(**self.model_dump(exclude={"unit", "bladder", "sensor", "daq"}))
+        return InstronParameters(**{k: v for k, v in self if k not in ("unit", "bladder", "sensor", "daq")})
+
+
+class TwinOptions(_Options):
+    """A unit's own calibration in the bladder's place; see `simulators.twin`."""
+
+    twin: str
+
+
+class TwinMachineOptions(MachineOptions):
+    """An Instron with a twin on its anvil."""
+
+    bladder: TwinOptions  # type: ignore[assignment]
 
 
 class UnitOptions(_Options):
@@ -137,6 +172,12 @@ class ShoeOptions(_Options):
         return Gait(**self.model_dump(include=set(Gait.__dataclass_fields__)))
 
 
+def is_twin(options: Any) -> bool:
+    """Whether a unit's options ask for its twin: ``bladder = {twin = "unit.json"}``."""
+    bladder = options.get("bladder") if isinstance(options, dict) else None
+    return isinstance(bladder, dict) and "twin" in bladder
+
+
 def with_preset(unit: Any, options: Any) -> Any:
     """A unit's ``options`` with its preset's bladder and sensor under them; what is no table is left to pydantic.
 
@@ -146,6 +187,10 @@ def with_preset(unit: Any, options: Any) -> Any:
         return options
     unit = str(unit)
     base, sensor = presets.bladder(unit), options.get("sensor", {})
+    if is_twin(options) and isinstance(sensor, dict):
+        # Lag, membrane and offset are in what was fitted.
+        sensor = {"lag_s": 0.0, "bidirectional": True, **sensor}
+        return {**options, "sensor": {"range_mbar": presets.sensor_range_pa(unit) / MBAR_PA, **sensor}}
     if isinstance(sensor, dict):
         sensor = {"range_mbar": presets.sensor_range_pa(unit) / MBAR_PA, **sensor}
     bladder = options.get("bladder", {})

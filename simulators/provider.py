@@ -28,24 +28,33 @@ class Provider:
         """A machine (closed, to be used in a with block) for ``target`` 'instron'.
 
         ``options`` are `simulators.options.MachineOptions`; what they leave out comes from the preset of their
-        ``unit`` (default left_toe). Raises `pydantic.ValidationError` on wrong options, `UsageError` on a wrong
-        target. Without ``rng`` the seed is 0.
+        ``unit`` (default left_toe). ``bladder = {twin = "unit.json"}`` presses the unit's own calibration instead
+        (`simulators.twin`). Raises `pydantic.ValidationError` on wrong options, `UsageError` on a wrong target,
+        `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
         """
         _require(target, MACHINES, "machine")
         import numpy as np
 
         from simulators.bladder import SimulatedBladder
         from simulators.instron import SensingUnit, SimulatedInstron
-        from simulators.options import MachineOptions, with_preset
+        from simulators.options import MachineOptions, TwinMachineOptions, is_twin, with_preset
         from simulators.sensor import SimulatedHdiSensor
 
         given = {"unit": DEFAULT_UNIT, **(options or {})}
-        checked = MachineOptions.model_validate(with_preset(given["unit"], given))
+        kind = TwinMachineOptions if is_twin(given) else MachineOptions
+        checked = kind.model_validate(with_preset(given["unit"], given))
         rng = rng if rng is not None else np.random.default_rng(0)
         sequence: Any = rng.bit_generator.seed_seq  # numpy's own has these; its protocol does not say so
         seed = "/".join(str(key) for key in (sequence.entropy, *sequence.spawn_key))
         sensor = SimulatedHdiSensor(checked.sensor.parameters(), rng)
-        unit = SensingUnit(checked.unit, SimulatedBladder(checked.bladder), sensor)
+        bladder: Any
+        if isinstance(checked, TwinMachineOptions):
+            from simulators.twin import twin_of
+
+            bladder = twin_of(checked.bladder.twin)
+        else:
+            bladder = SimulatedBladder(checked.bladder)
+        unit = SensingUnit(checked.unit, bladder, sensor)
         return SimulatedInstron(unit, rng, checked.parameters(), checked.daq.parameters(), seed)
 
     def open_shoe(

@@ -6,11 +6,13 @@ thermal gain within the data sheet's 0.1 % typical, the sensor's own update cloc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.effects.outside import Wander
+from simulators.effects.sensing import Curve, Drift, Limit, Noise
 from smartshoe.devices.base import ChannelDescription, Sensor
 from smartshoe.units import VOLT
 
@@ -21,7 +23,11 @@ LOW_V, SPAN_V = 0.5, 4.0
 
 @dataclass(frozen=True, slots=True)
 class HdiParameters:
-    """A sensor: noise, margins and errors are fractions of ``range_pa`` (noise: standard deviation a sample)."""
+    """A sensor: noise, margins and errors are fractions of ``range_pa`` (noise: standard deviation a sample).
+
+    ``bidirectional`` is the kind that goes as far below zero gauge pressure as above, with zero at 2.5 V.
+    ``second_lag_s`` is a slow port: two further poles, at this time constant and at a quarter of it.
+    """
 
     range_pa: float = 20_000.0
     noise_fraction: float = 0.0005
@@ -32,6 +38,29 @@ class HdiParameters:
     over_range_fraction: float = 0.01
     proof_pressure_pa: float = 1e5
     burst_pressure_pa: float = 1.5e5
+    bidirectional: bool = False
+    second_lag_s: float = 0.0
+    curve: Curve = field(default_factory=Curve)
+    drift: Drift = field(default_factory=Drift)
+    limit: Limit = field(default_factory=Limit)
+    noise: Noise = field(default_factory=Noise)
+    wander: Wander = field(default_factory=Wander)
+
+    @property
+    def unloaded_v(self) -> float:
+        """The output at zero gauge pressure."""
+        return LOW_V + 0.5 * SPAN_V if self.bidirectional else LOW_V
+
+    @property
+    def span_v(self) -> float:
+        """From there to the range's end."""
+        return 0.5 * SPAN_V if self.bidirectional else SPAN_V
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether lag, membrane, gain, zero and white noise are all there is."""
+        effects = (self.curve, self.drift, self.limit, self.noise, self.wander)
+        return self.second_lag_s == 0 and not any(effect.is_on for effect in effects)
 
 
 class SimulatedHdiSensor(Sensor):
@@ -44,6 +73,8 @@ class SimulatedHdiSensor(Sensor):
     def __init__(self, parameters: HdiParameters, rng: np.random.Generator) -> None:
         self.parameters = parameters
         self._rng = rng
+        # Streams of their own, so that switching one effect on leaves every other number as it was.
+        self._noise_rng, self._wander_rng = rng.spawn(2)
         self.reset()
 
     def reset(self) -> None:
@@ -51,11 +82,14 @@ class SimulatedHdiSensor(Sensor):
         self._lagged_pa = 0.0
         self._last_pa = 0.0
         self._time_s = 0.0
+        self._slow = np.zeros((2, 2))
+        self.white_v = np.zeros(0)
 
     @property
     def range_pa(self) -> tuple[float, float]:
-        """From zero gauge pressure to the range."""
-        return 0.0, self.parameters.range_pa
+        """From zero gauge pressure, or from as far below, to the range."""
+        p = self.parameters
+        return -p.range_pa if p.bidirectional else 0.0, p.range_pa
 
     @property
     def proof_pressure_pa(self) -> float:
@@ -66,31 +100,76 @@ class SimulatedHdiSensor(Sensor):
         """The reading in volt."""
         return ChannelDescription("reading", "voltage", VOLT, (LOW_V, LOW_V + SPAN_V))
 
-    def read(self, pressure_pa: Array, sample_rate_hz: float) -> Array:
-        """The reading (n,) in volt for the pressure (n,) in Pa; the lag's memory carries on."""
-        from scipy.signal import lfilter
+    def read(self, pressure_pa: Array, sample_rate_hz: float, warmer_k: Array | float = 0.0) -> Array:
+        """The reading (n,) in volt for the pressure (n,) in Pa; the lag's memory carries on.
 
+        ``warmer_k`` (n,) is the room's temperature above that of the session's start. ``white_v`` (n,) then holds
+        the part of the reading that is white noise, which must not be averaged where it is read between two steps.
+        """
         p = self.parameters
         pressure = np.asarray(pressure_pa, dtype=float)
         if pressure.size == 0:
             return np.zeros(0)
-        if p.lag_s > 0:  # exact for a pressure that is linear within a step, as the bladder's is
-            z = 1.0 / (sample_rate_hz * p.lag_s)
-            keep, mean = np.exp(-z), -np.expm1(-z) / z
-            start = [keep * self._lagged_pa + (mean - keep) * self._last_pa]
-            lagged, _ = lfilter([1.0 - mean, mean - keep], [1.0, -keep], pressure, zi=start)
-        else:
-            lagged = pressure
-        self._lagged_pa, self._last_pa = float(lagged[-1]), float(pressure[-1])
+        lagged = self._lag(pressure, sample_rate_hz)
         time_s = self._time_s + np.arange(1, pressure.size + 1) / sample_rate_hz
         self._time_s = float(time_s[-1])
-        share = np.maximum(lagged, 0.0) * ((1.0 + p.gain_error_fraction) / p.range_pa)
+        felt = lagged if p.bidirectional else np.maximum(lagged, 0.0)
+        if p.is_plain:
+            share = felt * ((1.0 + p.gain_error_fraction) / p.range_pa)
+        else:
+            share = self._disturbed(felt / p.range_pa, time_s, sample_rate_hz, warmer_k)
         share += (p.zero_offset_pa + p.zero_drift_pa_per_s * time_s) / p.range_pa
-        if p.noise_fraction > 0:
-            share += p.noise_fraction * self._rng.standard_normal(pressure.size)
-        np.clip(share, -p.over_range_fraction, 1.0 + p.over_range_fraction, out=share)
-        return np.asarray(LOW_V + SPAN_V * share)
+        white = p.noise_fraction * self._rng.standard_normal(pressure.size) if p.noise_fraction > 0 else 0.0
+        if p.noise.growing_percent > 0:
+            white = white + p.noise.growing(share, self._noise_rng)
+        share += white
+        noisy = share.copy()
+        if not p.is_plain:
+            share = p.limit(share)
+        lowest = -1.0 - p.over_range_fraction if p.bidirectional else -p.over_range_fraction
+        np.clip(share, lowest, 1.0 + p.over_range_fraction, out=share)
+        self.white_v = np.where(share == noisy, p.span_v * white, 0.0)
+        return np.asarray(p.unloaded_v + p.span_v * share)
+
+    def _lag(self, pressure: Array, sample_rate_hz: float) -> Array:
+        """Through the sensor's lag and its slow port: exact for a pressure that is linear within a step."""
+        p = self.parameters
+        lagged = pressure
+        if p.lag_s > 0:
+            lagged, self._lagged_pa = _first_order(pressure, sample_rate_hz * p.lag_s, self._lagged_pa, self._last_pa)
+        else:
+            self._lagged_pa = float(pressure[-1])
+        self._last_pa = float(pressure[-1])
+        if p.second_lag_s > 0:
+            for number, time_s in enumerate((p.second_lag_s, 0.25 * p.second_lag_s)):
+                before, last = self._slow[number]
+                self._slow[number, 1] = lagged[-1]
+                lagged, self._slow[number, 0] = _first_order(lagged, sample_rate_hz * time_s, before, last)
+        return lagged
+
+    def _disturbed(self, share: Array, time_s: Array, rate_hz: float, warmer_k: Array | float) -> Array:
+        """The reading's share (n,) of the range, with all but offset, drift and white noise."""
+        p = self.parameters
+        share = p.curve(share) * (1.0 + p.gain_error_fraction)
+        share = share * p.drift.gain(time_s, warmer_k) * p.wander.gain(time_s)
+        share += p.drift.zero(time_s, warmer_k)
+        share += p.noise.coloured(share.size, rate_hz, self._noise_rng)
+        if p.wander.is_on:
+            share += p.wander.zero(time_s, self._wander_rng)
+        return share
 
     def to_pressure_pa(self, reading_v: Array) -> Array:
         """Pressure (n,) in Pa by the nominal characteristic."""
-        return (np.asarray(reading_v, dtype=float) - LOW_V) * (self.parameters.range_pa / SPAN_V)
+        p = self.parameters
+        return (np.asarray(reading_v, dtype=float) - p.unloaded_v) * (p.range_pa / p.span_v)
+
+
+def _first_order(signal: Array, steps: float, output: float, last: float) -> tuple[Array, float]:
+    """Through a lag of ``steps`` samples, linear within a step, from its ``output`` and ``last`` input; its end too."""
+    from scipy.signal import lfilter
+
+    z = 1.0 / steps
+    keep, mean = np.exp(-z), -np.expm1(-z) / z
+    start = [keep * output + (mean - keep) * last]
+    lagged, _ = lfilter([1.0 - mean, mean - keep], [1.0, -keep], signal, zi=start)
+    return lagged, float(lagged[-1])

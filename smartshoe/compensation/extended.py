@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.compensation.beside_arm import BesideArm, GasBesideArm
 from smartshoe.compensation.core_inverse import CoreInverse
 from smartshoe.compensation.filter import ForceFilter
 from smartshoe.compensation.noise_limit import MOST, NoiseLimit, noise_gain
@@ -21,6 +22,8 @@ LEAK_CAUTION = (
     "the air that is gone is summed up from the readings, so that an error of their zero grows with time: reset the"
     " filter at rest"
 )
+BENDS_BESIDE_ARM = ("wall_hardening", "mullins_softening")
+"""Blocks of the wall that solve the balance of their spring and the relaxing arm (`shared` in the effects)."""
 
 
 class ExtendedCompensator(ForceFilter):
@@ -72,7 +75,7 @@ class ExtendedCompensator(ForceFilter):
         if inverse is None:
             self._passed_over[part.name] = _why_not(part)
             return
-        self._blocks.append((part.name, inverse))
+        self._blocks.append((part.name, self._beside_arm(part, inverse)))
         if part.effect.family != "timing":
             return
         raised = noise_gain(inverse)
@@ -85,6 +88,15 @@ class ExtendedCompensator(ForceFilter):
             f"undoing it would raise fast noise of the readings {raised:.3g} times: smoothed to {MOST:g} times, which"
             f" leaves a lag of {1e3 * limit.lag_steps * self.step_s:.3g} ms"
         )
+
+    def _beside_arm(self, part: Part, inverse: Inverse) -> Inverse:
+        """``inverse``, with the relaxing arm set apart where the block has it beside the spring that bends."""
+        share, rate_per_s = self.model.relaxing_share, self.model.relaxation_rate_per_s
+        if part.name in BENDS_BESIDE_ARM:
+            return BesideArm(inverse, share, rate_per_s, self.step_s)
+        if part.name == "gas_compression":
+            return GasBesideArm(inverse, float(part.values[0]), share, rate_per_s, self.step_s)
+        return inverse
 
     def _undo_core(self) -> None:
         self._blocks.append(("core", self.core))

@@ -19,8 +19,13 @@ KINDS = {
 IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"})
 
 
-def noise_kinds(fine: Sequence[Session], model: ExtendedModel, known: Sequence[DataFault]) -> list[DataFault]:
-    """What the residual at the full rate shows, for recordings in which no fault of the data would imitate it."""
+def noise_kinds(
+    fine: Sequence[Session], model: ExtendedModel, known: Sequence[DataFault], explained: bool
+) -> list[DataFault]:
+    """What the residual at the full rate shows, for recordings in which no fault of the data would imitate it.
+
+    Where structure is left that no effect has ``explained``, it would be taken for coloured noise.
+    """
     found = []
     for session in fine:
         faults = {fault.kind for fault in known if fault.recording == session.index}
@@ -30,7 +35,7 @@ def noise_kinds(fine: Sequence[Session], model: ExtendedModel, known: Sequence[D
         prediction = model.simulate(conditions)
         residual = session.reading - prediction
         for kind, evidence in KINDS.items():
-            if kind in faults:
+            if kind in faults or (kind == "coloured_noise" and not explained):
                 continue
             one = evidence(residual, conditions, prediction, conditions.step_s)
             if one is not None:

@@ -29,7 +29,6 @@ MOST_PARTS = 6
 QUICK_STEPS = 8
 FIRST_STEPS = 2
 CLOSE = 0.1  # of what the best candidate takes off the cost
-WORTH_A_MERGER = 0.8
 MOST_MERGED = 4
 WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
@@ -300,7 +299,7 @@ def _merged(evidence: Evidence, current: Fit, without: dict[str, Fit], tried: se
         less = fit(evidence, current.model.without(pair[0]).without(pair[1]), QUICK_STEPS)
         whole = less.cost - current.cost
         looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
-        worth = [one for one in _newcomers(looked, less, pair) if one.fall >= WORTH_A_MERGER * whole][:BEST_SWAPS]
+        worth = _newcomers(looked, less, pair)[:BEST_SWAPS]
         saved = penalty(pair[0]) + penalty(pair[1]) + MERGED_SHAPE_ERROR**2 * whole
         for one in _raced(evidence, less, worth):
             worse = one.cost - current.cost + penalty(one.model.names[-1])
@@ -345,7 +344,9 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival
     looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
     others = _newcomers(looked, less, (name,))
     whole = less.cost - current.cost
-    near = [one for k, one in enumerate(others) if k < 2 or one.fall >= WORTH_A_SWAP * whole][:BEST_SWAPS]
+    # The screen is linear: what it promises is held against what it promises for the effect itself.
+    own_fall = max((one.fall for one in looked.ranked if one.candidate.effect.name == name), default=0.0)
+    near = [one for one in others if one.fall >= WORTH_A_SWAP * own_fall][:BEST_SWAPS]
     raced = _raced(evidence, less, near)
     own = replace(
         current, model=current.model.without(name).with_part(effect(name), part_of(current.model, name).values)
@@ -353,13 +354,14 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival
     rivals = [Rival(one.model.names[-1], float(margin(evidence, one, own, less)), one) for one in raced]
     rivals.sort(key=lambda rival: rival.margin)
     far = [one for one in others[:BEST_SWAPS] if one not in near]
-    return rivals + [Rival(one.candidate.effect.name, float(whole - one.fall), None) for one in far]
+    share = whole / max(own_fall, 1e-9)
+    return rivals + [Rival(one.candidate.effect.name, float(share * (own_fall - one.fall)), None) for one in far]
 
 
 def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:
     current = settled.fit
     sizes = {name: visible(evidence, less.model, current.model) for name, less in settled.without.items()}
-    alone = [visible(evidence, current.model.without(name), current.model) for name in current.model.names]
-    named = {name: size for name, size in sizes.items() if size >= max(material, NAMED_OF_LARGEST * max(alone))}
+    least = max(material, NAMED_OF_LARGEST * max(sizes.values(), default=0.0))
+    named = {name: size for name, size in sizes.items() if size >= least}
     falls = {name: less.cost - current.cost for name, less in settled.without.items()}
     return Choice(current, baseline, evidence, screening, settled.rivals, settled.without, named, falls)

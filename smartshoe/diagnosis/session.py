@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SAMPLES_A_RAMP = 12  # of the fastest ramp from 10 to 90 % of the load
+LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 1.35  # times: for the sake of speed
 # Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
@@ -179,7 +180,8 @@ def _session(
         displacement = None if displacement is None else np.interp(even, time_s, displacement)
         time_s = even
     noise = _noise(load_n) / scale.load_n
-    weights = kernel(factor)
+    # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
+    weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
     load = load_n / scale.load_n
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)

@@ -75,7 +75,8 @@ class Core:
     def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
         """decay, before, after (p,), the matrix from modes to states and that from states to modes."""
         if self.drive.size == 1:
-            values, vectors, inverse = self.matrix[0], np.ones((1, 1)), np.ones((1, 1))
+            values: Array = self.matrix[0]
+            vectors: Array = np.ones((1, 1))
         else:
             # Two modes that fall together have no vectors of their own: a millionth apart they have.
             apart = 1e-6 * np.diag(np.diag(self.matrix) * np.arange(self.drive.size))
@@ -83,7 +84,7 @@ class Core:
                 values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
                 if np.linalg.cond(vectors) < MOST_SKEWED:
                     break
-            inverse = np.linalg.pinv(vectors)
+        inverse = np.linalg.pinv(vectors)
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4

@@ -21,6 +21,7 @@ BASELINE = (
     EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, 1e-5, 50.0, 0.1),
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
+TAKEN_BY_WALL = ("static_curve", "leak")
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 
@@ -138,16 +139,18 @@ class ExtendedModel:
     def deformation(self, conditions: Conditions) -> Array:
         """The wall's deformation (n,), scaled as the load: what a displacement channel follows.
 
-        A gas that stiffens beyond the linear one takes load off the wall.
+        A gas that stiffens beyond the linear one takes load off the wall, one that leaks leaves it to the wall: from
+        u = f + omega/N and p = f - omega (1 - 1/N) of `smartshoe.models.core`.
         """
         kept: list[Array] = []
         self._run(conditions.load, conditions, 0, kept)
         core = self.chain.index(None)
         load = kept[core]
         for k, part in enumerate(self.chain):
-            if part is not None and part.effect.family == "static_curve" and part.effect.place == "gas":
+            if part is not None and part.effect.family in TAKEN_BY_WALL and part.effect.place == "gas":
                 pressure = kept[k]
-                load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / self.wall_ratio
+                share = self.wall_ratio - (1.0 if part.effect.family == "leak" else 0.0)
+                load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / share
         return self.core.deformation(load, conditions.step_s)
 
     def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:

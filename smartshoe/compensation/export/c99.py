@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
@@ -58,12 +60,21 @@ def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, object]:
     states = {name: _initial(value) for _, step in blocks for name, value in step.states.items()}
     return {
         "states": states,
-        "blocks": [{"name": name, "body": step.body} for name, step in blocks if step.body],
+        "blocks": [
+            {"name": name, "body": step.body, "needs_time": _needs_time(step.body)}
+            for name, step in blocks
+            if step.body
+        ],
         "reading_per_share": repr(filter_.reading_per_share),
         "full_scale_load_n": repr(filter_.model.full_scale_load_n),
         "step_s": repr(filter_.step_s),
         "started_s": repr(filter_.started_s),
     }
+
+
+def _needs_time(body: str) -> bool:
+    """Whether a block reads the time ``t``; one may have a local of that name instead."""
+    return re.search(r"\bt\b", body) is not None and re.search(r"\bdouble t\b", body) is None
 
 
 def _initial(value: float) -> str:

@@ -7,13 +7,14 @@ import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
+from typing import Any
 
 from smartshoe.errors import UsageError
 from smartshoe.models import effects
 from smartshoe.models.effects.effect import Effect
 
 
-def _concrete(kind: type[Effect]) -> list[type[Effect]]:
+def _concrete(kind: Any) -> list[type[Effect]]:
     below = [leaf for child in kind.__subclasses__() for leaf in _concrete(child)]
     return below if getattr(kind, "__abstractmethods__", None) else [kind, *below]
 

@@ -52,7 +52,7 @@ class Conditions:
     ``time_s`` (n,) from the session's start, step ``step_s``; ``load`` (n,) the measured load as a share of full
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
     load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
-    ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where they were not logged.
+    ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
     """
 
     time_s: Array
@@ -84,8 +84,8 @@ class Inverse(ABC):
     def push(self, signal: Array, time_s: Array) -> Array:
         """What went into the block (n,) from what came out of it (n,), at ``time_s`` (n,) since the session began."""
 
-    def reset(self) -> None:
-        """Forget the past; a block without memory has none."""
+    def reset(self) -> None:  # noqa: B027 - a block without memory has nothing to forget
+        """Forget the past."""
 
     @abstractmethod
     def c_step(self, name: str) -> CStep:

@@ -1,0 +1,23 @@
+"""Wall: a permanent set that grows with the dose of load.
+
+The wall's unloaded place moves with the load's creep damage, (f/f_fullscale)^exponent, so that pressure stays when
+the load goes (a power above one: Findley's stress exponent), where a leak would take it away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from simulators.bounds import STRICT_KEYS
+
+
+@dataclass(frozen=True, slots=True)
+class PermanentSet:
+    """``rate_per_s`` is the set gained in a second of full-scale load, in units of the full-scale deformation."""
+
+    __pydantic_config__ = STRICT_KEYS
+    rate_per_s: Annotated[float, Field(ge=0, le=0.1)] = 0.0
+    exponent: Annotated[float, Field(ge=1, le=4)] = 1.25

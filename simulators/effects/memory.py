@@ -1,0 +1,22 @@
+"""A state that turns over with the way gone, compiled: for senses of motion that change gradually."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def follow(step: Array, width: Array, start: float, out: Array) -> None:
+    """Fill ``out`` (n,) with s, ds = (sgn(dx) - s) |dx|/``width``, exact for each ``step`` and width (n,)."""
+    s = start
+    for i in range(step.size):
+        if step[i] != 0.0:
+            sense = 1.0 if step[i] > 0.0 else -1.0
+            s = sense + (s - sense) * math.exp(-abs(step[i]) / width[i])
+        out[i] = s

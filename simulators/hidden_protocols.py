@@ -1,0 +1,134 @@
+"""Load histories for hiding effects, beyond the paper's two: what a diagnosis may be given or may ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from smartshoe.protocol import DYNAMIC_RATES_N_PER_S, Protocol, Segment, dynamic_protocol, static_protocol
+
+PEAK_N = 800.0
+SINE_STEP_S = 0.05
+
+
+def _hold(load_n: float, hold_s: float, rest_s: float, rate_n_per_s: float = 200.0) -> list[Segment]:
+    ramp_s = load_n / rate_n_per_s
+    return [
+        Segment("ramp", load_n, ramp_s),
+        Segment("hold", load_n, hold_s),
+        Segment("ramp", 0.0, ramp_s),
+        Segment("rest", 0.0, rest_s),
+    ]
+
+
+def _triangles(peaks_n: list[float], rate_n_per_s: float, rest_s: float) -> list[Segment]:
+    segments = [Segment("rest", 0.0, rest_s)]
+    for peak_n in peaks_n:
+        ramp_s = peak_n / rate_n_per_s
+        segments += [Segment("ramp", peak_n, ramp_s), Segment("ramp", 0.0, ramp_s), Segment("rest", 0.0, rest_s)]
+    return segments
+
+
+def rates(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Three triangles at each rate of the paper; ``other``: the rates in another order, a little lower."""
+    order = rng.permutation(DYNAMIC_RATES_N_PER_S) if other else DYNAMIC_RATES_N_PER_S
+    peak_n = 0.9 * PEAK_N if other else PEAK_N
+    return list(dynamic_protocol([float(r) for r in order], peak_n=peak_n, repeats=3, rest_s=4.0).segments)
+
+
+def rates_and_holds(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """The rates, then a minute's hold at three loads and a minute's idleness."""
+    segments = rates(rng, other)
+    for load_n in (650.0, 150.0, 350.0) if other else (200.0, 500.0, 800.0):
+        segments += _hold(load_n, 60.0, 15.0)
+    return [*segments, Segment("rest", 0.0, 60.0)]
+
+
+def static(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """The paper's staircase; ``other``: its loads in another order."""
+    loads = np.arange(50.0, 801.0, 50.0)
+    return list(static_protocol([float(x) for x in (rng.permutation(loads) if other else loads)]).segments)
+
+
+def single_rate(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Twelve triangles at 200 N/s."""
+    return _triangles([0.9 * PEAK_N if other else PEAK_N] * 12, 200.0, 3.0)
+
+
+def shuffled(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Triangles at mixed rates to loads in random order, so that earlier maxima and cycles part."""
+    segments = [Segment("rest", 0.0, 3.0)]
+    for load_n in rng.permutation(np.repeat(np.arange(100.0, 801.0, 100.0), 3)):
+        ramp_s = float(load_n) / float(rng.choice(DYNAMIC_RATES_N_PER_S))
+        segments += [Segment("ramp", float(load_n), ramp_s), Segment("ramp", 0.0, ramp_s), Segment("rest", 0.0, 3.0)]
+    return segments
+
+
+def long_hold(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Five minutes at one load and as long at none, then three triangles."""
+    return [
+        Segment("rest", 0.0, 10.0),
+        *_hold(400.0 if other else 600.0, 300.0, 300.0),
+        *_triangles([PEAK_N] * 3, 200.0, 4.0),
+    ]
+
+
+def step(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Steps of 0.1 s up and down between random loads, held for some seconds."""
+    segments = [Segment("rest", 0.0, 3.0)]
+    for load_n in rng.uniform(100.0, PEAK_N, 14):
+        segments += [Segment("ramp", float(load_n), 0.1), Segment("hold", float(load_n), float(rng.uniform(2, 6)))]
+        if rng.random() < 0.4:
+            segments += [Segment("ramp", 0.0, 0.1), Segment("rest", 0.0, float(rng.uniform(2, 4)))]
+    return [*segments, Segment("ramp", 0.0, 0.5), Segment("rest", 0.0, 5.0)]
+
+
+def multisine(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Sines from 0.02 to 4 Hz, evenly in log frequency, about half load, for two minutes."""
+    time_s = np.arange(SINE_STEP_S, 120.0 + 1e-9, SINE_STEP_S)
+    frequency_hz = np.geomspace(0.02, 4.0, 16)
+    wave = np.sum(np.cos(2 * np.pi * np.outer(time_s, frequency_hz) + rng.uniform(0, 2 * np.pi, 16)), axis=1)
+    load_n = 0.5 * PEAK_N * (1.0 + 0.95 * wave / np.abs(wave).max())
+    start = [Segment("rest", 0.0, 3.0), Segment("ramp", float(load_n[0]), 2.0)]
+    return [
+        *start,
+        *(Segment("ramp", float(x), SINE_STEP_S) for x in load_n[1:]),
+        Segment("ramp", 0.0, 2.0),
+        Segment("rest", 0.0, 5.0),
+    ]
+
+
+def minor_loops(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Loops of several widths at several loads, within a large one, at 100 N/s and again at 400 N/s."""
+    segments = [Segment("rest", 0.0, 3.0)]
+    load = 0.0
+    for rate in (100.0, 400.0):
+        for centre in (600.0, 400.0, 200.0) if other else (200.0, 400.0, 600.0):
+            for half in (50.0, 100.0, 190.0):
+                for to_n in (centre + half, centre - half, centre + half, centre - half):
+                    segments.append(Segment("ramp", to_n, max(abs(to_n - load), 1.0) / rate))
+                    load = to_n
+        segments += [Segment("ramp", PEAK_N, (PEAK_N - load) / rate), Segment("ramp", 0.0, PEAK_N / rate)]
+        segments.append(Segment("rest", 0.0, 4.0))
+        load = 0.0
+    return segments
+
+
+def idle(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Two minutes of nothing, three triangles, two minutes of nothing."""
+    triangles = _triangles([PEAK_N] * 3, 200.0, 4.0)
+    return [Segment("rest", 0.0, 120.0), *triangles, Segment("rest", 0.0, 120.0)]
+
+
+PROTOCOLS: dict[str, Callable[[np.random.Generator, bool], list[Segment]]] = {
+    f.__name__: f
+    for f in (
+        rates, rates_and_holds, static, single_rate, shuffled, long_hold, step, multisine, minor_loops, idle,
+    )
+}  # fmt: skip
+
+
+def build(name: str, rng: np.random.Generator, other: bool = False) -> Protocol:
+    """The named protocol; ``other`` is its variant for holding out."""
+    return Protocol(name, tuple(PROTOCOLS[name](rng, other)))

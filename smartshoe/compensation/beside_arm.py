@@ -1,0 +1,121 @@
+"""Inverses of springs that bend inside the loop of wall and gas: what the relaxing arm bears is set apart first.
+
+The blocks solve f = phi(u) + kappa (u - q), q' = a (u - q) with u the deformation (`smartshoe.models.effects`). Given
+u, the load follows without a loop.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.models.effects.effect import CStep, Inverse
+from smartshoe.models.first_order import hold_coefficients
+
+Array = NDArray[np.float64]
+
+
+class _Lag:
+    """w = alpha/(s + alpha) u on a stream of straight lines, as if the first value had lasted for ever."""
+
+    def __init__(self, alpha: float, step_s: float) -> None:
+        self.decay, self.now, self.before = (float(value) for value in hold_coefficients(alpha * step_s))
+        self.reset()
+
+    def reset(self) -> None:
+        self._state: Array | None = None
+
+    def push(self, u: Array) -> Array:
+        from scipy.signal import lfilter
+
+        if not u.size:
+            return u.copy()
+        if self._state is None:
+            self._state = np.array([u[0] - self.now * u[0]])
+        w, self._state = lfilter([self.now, self.before], [1.0, -self.decay], u, zi=self._state)
+        return np.asarray(w)
+
+    def c_lines(self, state: str, begun: str, into: str, given: str) -> str:
+        """C that declares ``into``, the lag of the double ``given``; ``state`` and ``begun`` are members."""
+        return f"""    if (!({begun} > 0.0)) {{
+        {state} = {given} - {self.now!r} * {given};
+    }}
+    const double {into} = {self.now!r} * {given} + {state};
+    {state} = {self.before!r} * {given} + {self.decay!r} * {into};
+"""
+
+
+class BesideArm(Inverse):
+    """A block of the wall: the core is given u + kappa (u - q), of which kappa (u - q) is the arm's.
+
+    ``spring`` turns u into phi(u); ``share`` kappa and ``rate_per_s`` a are the baseline's.
+    """
+
+    def __init__(self, spring: Inverse, share: float, rate_per_s: float, step_s: float) -> None:
+        self.spring = spring
+        self.part = share / (1.0 + share)
+        self.lag = _Lag(rate_per_s / (1.0 + share), step_s)
+
+    def reset(self) -> None:
+        """The next value counts as having lasted for ever."""
+        self.spring.reset()
+        self.lag.reset()
+
+    def push(self, signal: Array, time_s: Array) -> Array:
+        """Load (n,) on spring and arm together."""
+        arm = self.part * (signal - self.lag.push(signal))
+        return np.asarray(self.spring.push(signal - arm, time_s) + arm)
+
+    def c_step(self, name: str) -> CStep:
+        """The same, around the spring's own."""
+        step = self.spring.c_step(name)
+        kept, begun, arm = f"{name}_lag", f"{name}_begun", f"{name}_arm"
+        lagged = self.lag.c_lines(f"f->{kept}", f"f->{begun}", f"{name}_lagged", "x")
+        body = f"""{{
+{lagged}    const double {arm} = {self.part!r} * (x - {name}_lagged);
+    f->{begun} = 1.0;
+    x -= {arm};
+    {step.body}
+    x += {arm};
+}}"""
+        return CStep({**step.states, kept: 0.0, begun: 0.0}, body)
+
+
+class GasBesideArm(Inverse):
+    """The gas's own block: pressure in, out comes what the linear core would have given.
+
+    ``spring`` turns the pressure into the load on wall spring and gas, whose deformation is (1 + g) p/(1 + g p) with
+    ``ratio`` g.
+    """
+
+    def __init__(self, spring: Inverse, ratio: float, share: float, rate_per_s: float, step_s: float) -> None:
+        self.spring, self.ratio, self.share = spring, ratio, share
+        self.part = share / (1.0 + share)
+        self.arm = _Lag(rate_per_s, step_s)
+        self.core = _Lag(rate_per_s / (1.0 + share), step_s)
+
+    def reset(self) -> None:
+        """The next value counts as having lasted for ever."""
+        self.spring.reset()
+        self.arm.reset()
+        self.core.reset()
+
+    def push(self, signal: Array, time_s: Array) -> Array:
+        """The linear core's pressure (n,)."""
+        deformation = (1.0 + self.ratio) * signal / (1.0 + self.ratio * signal)
+        arm = self.share * (deformation - self.arm.push(deformation))
+        load = self.spring.push(signal, time_s) + arm
+        return np.asarray(load - self.part * (load - self.core.push(load)))
+
+    def c_step(self, name: str) -> CStep:
+        """The same, around the spring's own."""
+        step = self.spring.c_step(name)
+        arm, core, begun, bent = (f"{name}_{word}" for word in ("arm", "core", "begun", "bent"))
+        body = f"""{{
+    const double {bent} = {1.0 + self.ratio!r} * x / (1.0 + {self.ratio!r} * x);
+{self.arm.c_lines(f"f->{arm}", f"f->{begun}", f"{name}_relaxed", bent)}    {step.body}
+    x += {self.share!r} * ({bent} - {name}_relaxed);
+{self.core.c_lines(f"f->{core}", f"f->{begun}", f"{name}_lagged", "x")}    f->{begun} = 1.0;
+    x -= {self.part!r} * (x - {name}_lagged);
+}}"""
+        return CStep({**step.states, arm: 0.0, core: 0.0, begun: 0.0}, body)

@@ -1,0 +1,232 @@
+"""A reading that falls while no load is logged, or while the load stands still: how fast, and by which law.
+
+No cause can be named there: a leak, a relaxing wall and a load that is taken away look alike. What can be said is the
+time constant, how much is lost, and whether one exponential describes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+Course = Literal["exponential", "slower", "faster", "undecided"]
+
+POINTS = 500
+FEWEST_POINTS = 20
+STANDS_STILL = 0.02  # of the load's largest value
+BEYOND_NOISE = 6.0  # standard deviations of a mean over a tenth
+LEAST_LOST = 5e-4
+MONOTONE = 0.8  # of all its movement, smoothed, that a decay goes downwards
+ONSET = 0.02  # of the fall: how much is lost when the decay has begun
+CLEAR = 4.0  # standard deviations of noise, that the onset must be below the first readings
+LATE_ONSET = 0.01  # of the duration: a later onset is told
+TELLING_LOSS = 0.05  # of the reading: with less lost a curve cannot be told from a straight line
+PLATEAU = 0.05  # of the reading
+PLATEAU_EARNED = 0.3  # of the squared error without one
+NOT_ONE = 0.05  # of the order
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class Decay:
+    """What `decay_of` found.
+
+    From ``onset_s`` (since the first sample) the reading falls by ``lost_percent`` of its level there in ``within_s``,
+    with the time constant ``tau_s`` of one exponential (``ci95_s``), towards ``plateau`` (reading's unit; 0 unless the
+    data shows another). ``from_start_s`` is the time constant when the stretch before the onset is counted in.
+    ``order`` m (``order_ci95``): the rate of fall goes with the m-th power of the reading, as in -p' = k p^m: 1 is
+    exponential, 1/2 an orifice with incompressible flow, up to 2 a narrow channel with gas far above the ambient
+    pressure; None where too little is lost. ``course`` is the verdict on it, ``says`` all of it in a sentence.
+    """
+
+    onset_s: float
+    tau_s: float
+    ci95_s: tuple[float, float]
+    from_start_s: float
+    lost_percent: float
+    within_s: float
+    plateau: float
+    order: float | None
+    order_ci95: tuple[float, float] | None
+    course: Course
+    says: str
+
+
+def decay_of(recording: Recording) -> Decay | None:
+    """The decay of the first sensor's reading, or None: the load moves, or the reading does not fall steadily."""
+    standing = _load_stands_still(recording)
+    if standing is None or not recording.sensors:
+        return None
+    sensor = recording.sensors[0]
+    present = sensor.present
+    time_s, reading = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present])
+    if time_s.size < FEWEST_POINTS or not _falls(reading):
+        return None
+    end = max(time_s.size // 20, 3)
+    high, low = float(np.median(reading[:3])), float(np.median(reading[-end:]))
+    begun = np.flatnonzero(reading < high - max(ONSET * (high - low), CLEAR * _noise(reading)))
+    # A decay of which hardly anything is seen is a straight line, without a corner to begin at.
+    first = max(int(begun[0]) - 1, 0) if begun.size and high - low > TELLING_LOSS * high else 0
+    if time_s.size - first < FEWEST_POINTS:
+        return None
+    onset_s, t, v = float(time_s[first]), time_s[first:] - time_s[first], reading[first:]
+    lost = (float(v[0]) - low) / high
+    guess = _guess(t, v)
+    one = _fit(_exponential, t, v, [high, guess])
+    plateau = 0.0
+    order: float | None = None
+    order_ci95: tuple[float, float] | None = None
+    course: Course = "undecided"
+    if lost > TELLING_LOSS:
+        ordered = _fit(_of_order, t, v, [high, float(one.at[1]), 1.05])
+        towards = _fit(_to_plateau, t, v, [high - low, guess, low])
+        earned = towards.square < min(PLATEAU_EARNED * one.square, ordered.square)
+        if earned and towards.at[2] > PLATEAU * high:
+            one, plateau = towards, float(towards.at[2])
+            ordered = _fit(_of_order, t, v - plateau, [high - plateau, float(one.at[1]), 1.05])
+        order, sd = float(ordered.at[2]), float(ordered.sd[2])
+        order_ci95 = (order - NORMAL_95 * sd, order + NORMAL_95 * sd)
+        apart = abs(order - 1.0) > max(NORMAL_95 * sd, NOT_ONE)
+        course = ("slower" if order > 1.0 else "faster") if apart else "exponential"
+    tau_s, tau_sd = float(one.at[1]), float(one.sd[1])
+    from_start_s = float(_fit(_exponential, time_s, reading, [high, tau_s]).at[1]) if first else tau_s
+    ci95_s = (max(tau_s - NORMAL_95 * tau_sd, 0.0), tau_s + NORMAL_95 * tau_sd)
+    unit = sensor.unit.symbol
+    begins = f" from {onset_s:.3g} s on" if onset_s > LATE_ONSET * float(time_s[-1]) else ""
+    counted = f" ({_duration(from_start_s)} when counted from the first sample)" if begins and lost > 0.5 else ""
+    aim = f" towards {plateau:.3g} {unit}" if plateau else ""
+    says = (
+        f"the {sensor.name} falls by {100 * lost:.2g} % in {float(t[-1]):.3g} s{begins}{aim}, with a time constant of"
+        f" {_duration(tau_s)}{counted}, {_course_says(course, order)}: a leak or a relaxation, which"
+        f" {'only a logged load tells apart' if standing == 'absent' else 'a load that stands still cannot tell apart'}"
+    )
+    return Decay(
+        onset_s,
+        tau_s,
+        ci95_s,
+        from_start_s,
+        100.0 * lost,
+        float(t[-1]),
+        plateau,
+        order,
+        order_ci95,
+        course,
+        says,
+    )
+
+
+def _load_stands_still(recording: Recording) -> Literal["absent", "still"] | None:
+    loads = recording.of_role("load")
+    if not loads:
+        return "absent"
+    values = loads[0].values[loads[0].present]
+    low, high = (float(value) for value in np.percentile(values, [1, 99]))
+    return "still" if high - low <= STANDS_STILL * max(abs(low), abs(high)) else None
+
+
+def _thinned(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Means of both over at most `POINTS` blocks; a negative reading that dies away is turned."""
+    width = -(-values.size // POINTS)
+    count = values.size // max(width, 1)
+    if count == 0:
+        return time_s, values
+    t = time_s[: count * width].reshape(count, width).mean(axis=1)
+    v = values[: count * width].reshape(count, width).mean(axis=1)
+    return t, -v if v[: max(count // 20, 1)].mean() < 0 else v
+
+
+def _falls(reading: Array) -> bool:
+    """Whether it falls from a positive level, by more than its noise, and hardly ever rises."""
+    tenth = reading.size // 10
+    first, last = reading[:tenth], reading[-tenth:]
+    fall = float(np.median(first) - np.median(last))
+    if fall <= max(BEYOND_NOISE * _noise(reading) / np.sqrt(tenth), LEAST_LOST * abs(float(np.median(first)))):
+        return False
+    means = np.array([float(np.median(part)) for part in np.array_split(reading, 12)])
+    steps = np.diff(means)
+    moved = float(np.abs(steps).sum())
+    return float(np.median(first)) > 0.0 and moved > 0.0 and float(-steps[steps < 0].sum()) >= MONOTONE * moved
+
+
+def _noise(reading: Array) -> float:
+    """White noise's standard deviation, from second differences."""
+    return float(np.median(np.abs(np.diff(reading, 2)))) / (0.6745 * float(np.sqrt(6.0)))
+
+
+def _guess(t: Array, v: Array) -> float:
+    """Time constant of a straight line through the logarithm of the part above a fifth."""
+    part = v > 0.2 * v[0]
+    part[:3] = True
+    slope = float(np.polyfit(t[part], np.log(np.maximum(v[part], 1e-9 * v[0])), 1)[0])
+    return float(np.clip(-1.0 / slope if slope < 0 else 1e3 * t[-1], 1e-3 * t[-1], 1e6 * t[-1]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Fitted:
+    at: Array
+    sd: Array
+    square: float
+
+
+def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list[float]) -> _Fitted:
+    """Least squares; standard deviations allow for residuals that go on from sample to sample."""
+    from scipy.optimize import least_squares
+
+    begin = np.array(start, dtype=float)
+
+    def error(at: Array) -> Array:
+        return model(at, t) - v
+
+    found = least_squares(error, begin, x_scale=np.maximum(np.abs(begin), 1e-3), max_nfev=200)
+    residual = np.asarray(found.fun, dtype=float)
+    square = float(residual @ residual)
+    alike = float(residual[1:] @ residual[:-1] / square) if square > 0 else 0.0
+    longer = (1.0 + min(max(alike, 0.0), 0.99)) / (1.0 - min(max(alike, 0.0), 0.99))
+    variance = square * longer / max(residual.size - begin.size, 1)
+    jac = np.asarray(found.jac, dtype=float)
+    scale = np.linalg.norm(jac, axis=0)
+    scale[scale == 0.0] = 1.0
+    jac = jac / scale
+    covariance = np.linalg.pinv(jac.T @ jac) / np.outer(scale, scale)
+    return _Fitted(np.asarray(found.x, dtype=float), np.sqrt(np.diag(covariance) * variance), square)
+
+
+def _exponential(at: Array, t: Array) -> Array:
+    out: Array = at[0] * np.exp(-t / max(at[1], 1e-9))
+    return out
+
+
+def _to_plateau(at: Array, t: Array) -> Array:
+    return _exponential(at[:2], t) + float(at[2])
+
+
+def _of_order(at: Array, t: Array) -> Array:
+    """-v' = (v0/tau) (v/v0)^m from v0: v0 (1 + (m - 1) t/tau)^(-1/(m - 1)); ``at`` is v0, tau at the onset, m."""
+    over = float(at[2]) - 1.0
+    if abs(over) < 1e-6:
+        return _exponential(at[:2], t)
+    base = np.maximum(1.0 + over * t / max(at[1], 1e-9), 1e-12)
+    out: Array = at[0] * np.exp(-np.log(base) / over)
+    return out
+
+
+def _duration(time_s: float) -> str:
+    for limit_s, unit_s, name in ((600.0, 1.0, "s"), (7200.0, 60.0, "min")):
+        if time_s < limit_s:
+            return f"{time_s / unit_s:.3g} {name}"
+    return f"{time_s / 3600.0:.2g} h"
+
+
+def _course_says(course: Course, order: float | None) -> str:
+    if course == "undecided" or order is None:
+        return "were it to fall to zero (too little is lost to say by which law)"
+    if course == "exponential":
+        return "as one exponential"
+    return f"{course} than exponentially (its rate goes as the reading to the power {order:.2f})"
