@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 FEWEST_BLOCKS = 8
 COLOUR_S = (0.1, 0.2, 0.35, 0.6, 1.0)  # time constants of the noise's coloured part; slower ones count as structure
-NOISE_KNOWN_TO = 0.15
+NOISE_KNOWN_TO = 0.25
 PLACES = 64  # of a cycle, when repeats are laid over each other
 ALIKE = 0.1  # in height and duration
 

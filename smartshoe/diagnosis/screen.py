@@ -15,7 +15,7 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
-NOTHING = 1e-10  # of a column's squared norm: it lies within the others' span
+NOTHING = 1e-8  # of a column's squared norm: it lies within the others' span
 RIDGE = 1e-9
 
 
@@ -119,12 +119,14 @@ class Screened:
 class Screening:
     """The best shape of each effect, by fall of the whitened cost; ``likeness`` (effects, effects) in that order.
 
-    Likeness is the largest canonical correlation of two effects' sensitivities after the model's own parameters are
+    ``total`` is the squared error that could be explained at most. Likeness is the largest canonical correlation of
+    two effects' sensitivities after the model's own parameters are
     projected out: near one, this data cannot tell them apart (to first order).
     """
 
     ranked: tuple[Screened, ...]
     likeness: Array
+    total: float
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -132,45 +134,81 @@ class Screening:
         return tuple(one.candidate.effect.name for one in self.ranked)
 
 
-def screen(words: Dictionary, noise: NoiseModel) -> Screening:
-    """Project the residual on each effect's sensitivities, the model's own projected out."""
+@dataclass(frozen=True, eq=False)
+class Board:
+    """All inner products that a screen needs, taken once: of residual, own columns, candidates', and parts' shares.
+
+    ``white`` and ``raw`` (m, m) are Gram matrices in this order; ``parts`` says where a part's share stands.
+    """
+
+    words: Dictionary
+    white: Array
+    raw: Array
+    parts: Mapping[str, int]
+
+    def screen(self, gone: Sequence[str] = ()) -> Screening:
+        """Project the residual on each effect's sensitivities, the model's own projected out.
+
+        Without the parts ``gone``: what they contribute is added to the residual, and their own columns do not count.
+        """
+        white, raw = self._projected(self.white, gone), self._projected(self.raw, gone)
+        best: dict[str, Screened] = {}
+        for candidate in self.words.candidates:
+            strengths, fall = _explained(candidate, white[0], white[1:])
+            _, raw_fall = _explained(candidate, raw[0], raw[1:])
+            one = Screened(candidate, strengths, fall, raw_fall / max(raw[2], 1e-300))
+            name = candidate.effect.name
+            if name not in best or max(one.fall, 0.0) > best[name].fall:
+                best[name] = one
+        ranked = tuple(sorted(best.values(), key=lambda one: -one.fall))
+        return Screening(ranked, _likeness(ranked, white[0]), white[2])
+
+    def _projected(self, gram: Array, gone: Sequence[str]) -> tuple[Array, Array, float]:
+        """Gram matrix (q, q) of the candidates, their products with the target, and the target's square."""
+        owners = [owner for owner, _ in self.words.model.parameters]
+        own = np.array([1 + k for k, owner in enumerate(owners) if owner not in gone])
+        first = 1 + len(owners)
+        others = np.arange(first, first + self.words.others[0].shape[1])
+        place = np.array([0, *(self.parts[name] for name in gone)])
+        target = gram[:, place].sum(axis=1)
+        square = float(gram[np.ix_(place, place)].sum())
+        scale = np.sqrt(np.diag(gram)[own])
+        scale[scale == 0] = 1.0
+        inverse = np.linalg.pinv(gram[np.ix_(own, own)] / np.outer(scale, scale), rcond=1e-11, hermitian=True)
+        to_own = gram[np.ix_(others, own)] / scale
+        left = to_own @ inverse
+        norm = np.diag(gram)[others]
+        part = gram[np.ix_(others, others)] - left @ to_own.T
+        product = target[others] - left @ (target[own] / scale)
+        square -= float((target[own] / scale) @ inverse @ (target[own] / scale))
+        lost = np.diag(part) <= NOTHING * norm
+        part[lost], part[:, lost] = 0.0, 0.0
+        return part, np.where(lost, 0.0, product), max(square, 0.0)
+
+
+def board(words: Dictionary, noise: NoiseModel, parts: Mapping[str, Sequence[Array]] | None = None) -> Board:
+    """The inner products; ``parts`` are what each part adds to the reading, a session each (n,)."""
+    shares = dict(parts or {})
     whitened, raw = [], []
-    for residual, own, others, session in zip(words.residuals, words.own, words.others, words.sessions, strict=True):
-        rows = np.column_stack([residual, own, others])
+    for k, session in enumerate(words.sessions):
+        columns = [words.residuals[k], words.own[k], words.others[k], *(share[k] for share in shares.values())]
+        rows = np.column_stack(columns)
         whitened.append(noise.whitened(rows)[noise.counted(session.fitted)])
         raw.append(rows[session.fitted])
-    own_count = words.own[0].shape[1]
-    white_gram, white_fit = _projected(np.concatenate(whitened), own_count)
-    raw_gram, raw_fit = _projected(np.concatenate(raw), own_count)
-    best: dict[str, Screened] = {}
-    for candidate in words.candidates:
-        strengths, fall = _explained(candidate, white_gram, white_fit)
-        _, raw_fall = _explained(candidate, raw_gram, raw_fit)
-        one = Screened(candidate, strengths, fall, raw_fall / max(raw_fit[1], 1e-300))
-        name = candidate.effect.name
-        if name not in best or max(one.fall, 0.0) > best[name].fall:
-            best[name] = one
-    ranked = tuple(sorted(best.values(), key=lambda one: -one.fall))
-    return Screening(ranked, _likeness(ranked, white_gram))
+    first = 1 + words.own[0].shape[1] + words.others[0].shape[1]
+    places = {name: first + k for k, name in enumerate(shares)}
+    white_rows, raw_rows = np.concatenate(whitened), np.concatenate(raw)
+    return Board(words, white_rows.T @ white_rows, raw_rows.T @ raw_rows, places)
 
 
-def _projected(rows: Array, own_count: int) -> tuple[Array, tuple[Array, float]]:
-    """Gram matrix (q, q) of the candidates' columns, the own ones projected out; their products with the residual."""
-    target, own, others = rows[:, 0], rows[:, 1 : 1 + own_count], rows[:, 1 + own_count :]
-    basis = np.linalg.qr(own / np.maximum(np.sqrt(np.sum(own**2, axis=0)), 1e-300))[0]
-    others = others - basis @ (basis.T @ others)
-    target = target - basis @ (basis.T @ target)
-    norm = np.sum(rows[:, 1 + own_count :] ** 2, axis=0)
-    gram = others.T @ others
-    gone = np.diag(gram) <= NOTHING * norm
-    gram[gone], gram[:, gone] = 0.0, 0.0
-    product = np.where(gone, 0.0, others.T @ target)
-    return gram, (product, float(target @ target))
+def screen(words: Dictionary, noise: NoiseModel) -> Screening:
+    """The screen of a model as it is."""
+    return board(words, noise).screen()
 
 
-def _explained(candidate: Candidate, gram: Array, fit: tuple[Array, float]) -> tuple[Array, float]:
+def _explained(candidate: Candidate, gram: Array, fit: Sequence[Array | float]) -> tuple[Array, float]:
     """Strengths (k,) within their signs, and the fall of the squared error."""
-    part, product = gram[candidate.columns, candidate.columns], fit[0][candidate.columns]
+    part, product = gram[candidate.columns, candidate.columns], np.asarray(fit[0])[candidate.columns]
     signs = [(p.lower >= p.null, p.upper <= p.null) for p in candidate.effect.parameters if p.null is not None]
     free = np.diag(part) > 0
     found = np.zeros(product.size)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis.fitting import Evidence, Fit, fit
 from smartshoe.diagnosis.noise import white
-from smartshoe.diagnosis.screen import Screened, Screening, dictionary, noise_of, screen
+from smartshoe.diagnosis.screen import Board, Screened, Screening, board, dictionary, noise_of, screen
 from smartshoe.diagnosis.session import Session
 from smartshoe.models.effects import catalogue, effect
 from smartshoe.models.extended import ExtendedModel, Part
@@ -30,6 +30,7 @@ QUICK_STEPS = 8
 FIRST_STEPS = 2
 CLOSE = 0.1  # of what the best candidate takes off the cost
 MOST_MERGED = 4
+WORTH_A_MERGER = 0.9
 WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
 NAMED_OF_LARGEST = 0.05
@@ -253,13 +254,14 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
             current = without[name]
             continue
         tried.add(frozenset(current.model.names))
-        rivals = {name: tuple(_swaps(evidence, current, less, name)) for name, less in without.items()}
+        words = _board(evidence, current, without)
+        rivals = {name: tuple(_swaps(evidence, current, less, words, name)) for name, less in without.items()}
         here = Settled(current, without, rivals)
         if best is None or merged is not None or _score(evidence, current) < _score(evidence, best.fit):
             best, merged = here, None
         following = _better(here, tried)
         if following is None:
-            one = _merged(evidence, current, without, tried)
+            one = _merged(evidence, current, without, words, tried)
             if one is None:
                 return best
             following, merged = one, one.model.names[-1]
@@ -292,25 +294,41 @@ def _better(here: Settled, tried: set[frozenset[str]]) -> Fit | None:
     return min(found, key=lambda rival: rival.margin).fit if found else None
 
 
-def _merged(evidence: Evidence, current: Fit, without: dict[str, Fit], tried: set[frozenset[str]]) -> Fit | None:
+def _merged(
+    evidence: Evidence, current: Fit, without: dict[str, Fit], words: Board, tried: set[frozenset[str]]
+) -> Fit | None:
     """One effect in the place of two, where it does as well: two that lean on each other may have come in by turns."""
     names = sorted(without, key=lambda one: without[one].cost)[:MOST_MERGED]
     for pair in combinations(names, 2):
+        looked = words.screen(pair)
+        worth = [one for one in _newcomers(looked, current, pair) if one.fall >= WORTH_A_MERGER * looked.total]
+        if not worth:
+            continue
         less = fit(evidence, current.model.without(pair[0]).without(pair[1]), QUICK_STEPS)
         whole = less.cost - current.cost
-        looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
-        worth = _newcomers(looked, less, pair)[:BEST_SWAPS]
         saved = penalty(pair[0]) + penalty(pair[1]) + MERGED_SHAPE_ERROR**2 * whole
-        for one in _raced(evidence, less, worth):
+        for one in _raced(evidence, less, worth[:BEST_SWAPS]):
             worse = one.cost - current.cost + penalty(one.model.names[-1])
             if worse < saved and frozenset(one.model.names) not in tried:
                 return one
     return None
 
 
-def _newcomers(looked: Screening, less: Fit, gone: Sequence[str]) -> list[Screened]:
+def _board(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> Board:
+    """The screen's inner products, with what each part adds to the reading (everything else fitted anew)."""
+    shares = {
+        name: [
+            current.model.simulate(session.conditions) - less.model.simulate(session.conditions)
+            for session in evidence.fitted
+        ]
+        for name, less in without.items()
+    }
+    return board(dictionary(current.model, evidence.fitted), evidence.noise, shares)
+
+
+def _newcomers(looked: Screening, current: Fit, gone: Sequence[str]) -> list[Screened]:
     """Candidates in the place of ``gone``: one member a family, beside those that stay."""
-    families = {effect(name).family for name in less.model.names}
+    families = {effect(name).family for name in current.model.names if name not in gone}
     return [
         one
         for one in looked.ranked
@@ -339,14 +357,12 @@ def _least_size(name: str, sizes: dict[str, float]) -> float:
     return max(HALF_MATERIAL, LEAST_OF_LARGEST * max(sizes.values()))
 
 
-def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival]:
+def _swaps(evidence: Evidence, current: Fit, less: Fit, words: Board, name: str) -> list[Rival]:
     """Other effects in the place of ``name`` and how much worse each is, nearest first; ``less``: the fit without."""
-    looked = screen(dictionary(less.model, evidence.fitted), evidence.noise)
-    others = _newcomers(looked, less, (name,))
+    looked = words.screen((name,))
+    others = _newcomers(looked, current, (name,))
     whole = less.cost - current.cost
-    # The screen is linear: what it promises is held against what it promises for the effect itself.
-    own_fall = max((one.fall for one in looked.ranked if one.candidate.effect.name == name), default=0.0)
-    near = [one for one in others if one.fall >= WORTH_A_SWAP * own_fall][:BEST_SWAPS]
+    near = [one for one in others if one.fall >= WORTH_A_SWAP * looked.total][:BEST_SWAPS]
     raced = _raced(evidence, less, near)
     own = replace(
         current, model=current.model.without(name).with_part(effect(name), part_of(current.model, name).values)
@@ -354,8 +370,9 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, name: str) -> list[Rival
     rivals = [Rival(one.model.names[-1], float(margin(evidence, one, own, less)), one) for one in raced]
     rivals.sort(key=lambda rival: rival.margin)
     far = [one for one in others[:BEST_SWAPS] if one not in near]
-    share = whole / max(own_fall, 1e-9)
-    return rivals + [Rival(one.candidate.effect.name, float(share * (own_fall - one.fall)), None) for one in far]
+    return rivals + [
+        Rival(one.candidate.effect.name, float(whole * (1.0 - one.fall / max(looked.total, 1e-9))), None) for one in far
+    ]
 
 
 def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:

@@ -23,9 +23,9 @@ from smartshoe.units import Unit
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SAMPLES_A_RAMP = 12  # of the fastest ramp from 10 to 90 % of the load
+SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
-MOST_SAMPLES = 12_000
+MOST_SAMPLES = 25_000
 MOST_COARSENED = 1.35  # times: for the sake of speed
 # Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
 CYCLE_SHARE = 0.08

@@ -84,7 +84,7 @@ class Core:
                 values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
                 if np.linalg.cond(vectors) < MOST_SKEWED:
                     break
-        inverse = np.linalg.pinv(vectors)
+        inverse: Array = np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4

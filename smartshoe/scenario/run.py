@@ -120,7 +120,7 @@ def _record(
                 name=path.stem,
             )
         return found
-    options = {**scenario.machine.options, **unit.options}
+    options = _beside(source, {**scenario.machine.options, **unit.options})
     try:
         machine = open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit), **options)
     except ValidationError as error:
@@ -139,6 +139,14 @@ def _record(
             progress(f"{unit.name}: {name}")
             recordings[name] = machine.run(protocol)
     return recordings
+
+
+def _beside(source: Source, options: dict[str, Any]) -> dict[str, Any]:
+    """``options`` with a twin's calibration taken from the scenario's folder, as recordings are."""
+    bladder = options.get("bladder")
+    if not isinstance(bladder, dict) or not isinstance(bladder.get("twin"), str):
+        return options
+    return {**options, "bladder": {**bladder, "twin": str(source.path.parent / bladder["twin"])}}
 
 
 def simulate(scenario: Scenario, source: Source, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:

@@ -23,9 +23,10 @@ def markdown(found: Findings) -> str:
     """The tables for a person, and for docs."""
     lines = ["", "### Figures", "", "| figure | floor | reach | reached |", "| --- | --- | --- | --- |"]
     for figure in found.figures:
-        short = " **short**" if figure.met is False else ""
+        short = " **short**" if figure.count and figure.met is False else ""
         name, *cells = figure.cells
-        lines.append(f"| {name.strip()} | " + " | ".join(cells) + short + " |")
+        name = f"… {name.strip()}" if name.startswith(" ") else name
+        lines.append(f"| {name} | " + " | ".join(cells) + short + " |")
     heads = [f"{percent:g} %" for percent in GRID_PERCENT]
     lines += ["", "### By effect and strength: exact / family / cases", ""]
     lines += [f"| effect | {' | '.join(heads)} | any, 0.3 % or more |", "| --- " * (len(heads) + 2) + "|"]

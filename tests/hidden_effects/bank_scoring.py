@@ -8,7 +8,7 @@
 - *within equivalents*: the same, but for an effect it is enough to stand among a cause's ``equivalents``.
 - *family*: the families of the hidden effects are named, and no other but those of nuisances.
 - *wrong*: causes that are neither hidden nor nuisances nor of a nuisance's family. A data fault that is not there
-  (`minor` ones ask for nothing) is counted by itself, and spoils *exact* and *family* as well.
+  is counted by itself, and spoils *exact* and *family* as well; `minor` ones, which ask for nothing, do not.
 - *parameters*: those that the truth shares with the catalogue's equation; right within the 95 % interval or 10 %.
 - *removed*: 1 - sum (truth - extended)^2 / sum (truth - baseline)^2 over the held-out recordings' twins without noise:
   the share of the explainable held-out variance that the extension takes away.
@@ -17,7 +17,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +26,6 @@ from simulators.hidden import HiddenCase
 from simulators.hidden_effects import EFFECTS
 from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.session import Scale, prepare
-from smartshoe.models.parameter import Parameter
 
 # What a fault's word of its own stands for.
 FAULT_IS = {
@@ -37,10 +35,7 @@ FAULT_IS = {
     "gaps": ("dropouts",),
 }
 FAULT_FAMILIES = frozenset({"noise", "data", "saturation"})
-NUISANCE_IS = {"mild_hysteresis": ("play_hysteresis", "bouc_wen_hysteresis")}
 WITHIN = 0.1
-
-Fitted = Callable[[Mapping[str, Parameter], Diagnosis, HiddenCase], tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -103,11 +98,12 @@ def score(case: HiddenCase, diagnosis: Diagnosis) -> Score:
     """The score of ``diagnosis`` of ``case``."""
     hidden = [effect.name for effect in case.effects]
     inside = [name for name in hidden if EFFECTS[name].inside]
-    faults = tuple(sorted({fault.kind for fault in diagnosis.data_faults if fault.severity != "minor"}))
+    faults = tuple(sorted({fault.kind for fault in diagnosis.data_faults}))
+    loud = {fault.kind for fault in diagnosis.data_faults if fault.severity != "minor"}
     true_faults = {kind for kind in faults if {kind, *FAULT_IS.get(kind, ())} & set(hidden)}
     named = tuple(_named(cause, case) for cause in diagnosis.causes)
     wrong = tuple(one.effect for one in named if not one.right)
-    false_faults = tuple(kind for kind in faults if kind not in true_faults)
+    false_faults = tuple(kind for kind in faults if kind in loud and kind not in true_faults)
     found = {one.effect for one in named} | true_faults
     like = found | {other for one in named for other in one.equivalents}
     families = {one.family for one in named} | {EFFECTS[k].family for k in true_faults if k in EFFECTS}
@@ -126,7 +122,7 @@ def score(case: HiddenCase, diagnosis: Diagnosis) -> Score:
         false_faults=false_faults,
         named=named,
         faults=faults,
-        parameters=tuple(one for cause in diagnosis.causes for one in _compared(cause, diagnosis, case)),
+        parameters=tuple(one for cause in diagnosis.causes for one in _compared(cause, case)),
         gain_percent=diagnosis.gain.gain_percent if diagnosis.gain else 0.0,
         removed=removed(case, diagnosis),
     )
@@ -170,66 +166,28 @@ def removed(case: HiddenCase, diagnosis: Diagnosis) -> float | None:
     return 1.0 - after / before
 
 
-# -- parameters ----------------------------------------------------------------------------------------------------
-def _same(name: str) -> Fitted:
-    return lambda found, diagnosis, case: (found[name].value, *found[name].ci95)
-
-
-def _per_load(name: str) -> Fitted:
-    """A load in N as a share of full scale."""
-
-    def fitted(found: Mapping[str, Parameter], diagnosis: Diagnosis, case: HiddenCase) -> tuple[float, float, float]:
-        full = diagnosis.full_scale_load_n
-        return found[name].value / full, found[name].ci95[0] / full, found[name].ci95[1] / full
-
-    return fitted
-
-
-def _per_reading(name: str) -> Fitted:
-    """A reading in mbar as a share of what full-scale load reads."""
-
-    def fitted(found: Mapping[str, Parameter], diagnosis: Diagnosis, case: HiddenCase) -> tuple[float, float, float]:
-        full = case.full_scale_mbar
-        return found[name].value / full, found[name].ci95[0] / full, found[name].ci95[1] / full
-
-    return fitted
-
-
-def _inverse(name: str) -> Fitted:
-    """A time constant from a rate."""
-
-    def fitted(found: Mapping[str, Parameter], diagnosis: Diagnosis, case: HiddenCase) -> tuple[float, float, float]:
-        low, high = found[name].ci95
-        return 1.0 / found[name].value, 1.0 / high, 1.0 / low if low > 0 else float("inf")
-
-    return fitted
-
-
-# By the truth's name (`simulators.hidden_truths`), where it is not the fitted one with its unit behind.
-SPECIAL: dict[str, dict[str, Fitted]] = {
-    "gas_heat": {"time_constant_s": _inverse("cooling_rate")},
-    "play_hysteresis": {"half_height_fs": _per_load("half_height")},
-    "bouc_wen_hysteresis": {"half_height_fs": _per_load("half_height")},
-    "rate_gain": {"gain_at_800_n_per_s": _same("gain_per_rate")},
-    "permanent_set": {"set_rate_fs_per_s": _per_reading("set_rate")},
-}
+# -- parameters --------------------------------------------------------------------------------------------------------
 UNITS = ("_mbar_per_k", "_mbar_per_s", "_per_k", "_per_s", "_mbar", "_n", "_s", "_hz")
+# Truths that are one over what is fitted.
+INVERSE = {("gas_heat", "time_constant_s"): "cooling_rate"}
 
 
-def _compared(cause: Cause, diagnosis: Diagnosis, case: HiddenCase) -> list[Compared]:
-    """The parameters of a named hidden effect that have a counterpart in the truth."""
+def _compared(cause: Cause, case: HiddenCase) -> list[Compared]:
+    """The parameters of a named hidden effect that have a counterpart in the truth (`simulators.hidden_truths`)."""
     hidden = next((effect for effect in case.effects if effect.name == cause.name), None)
-    if hidden is None or cause.name == "cross_talk":  # relative to the neighbour's largest pressure of each file
-        return []
     found = []
-    for name, truth in hidden.catalogue.items():
-        fitted = SPECIAL.get(cause.name, {}).get(name)
-        if fitted is None:
-            plain = _bare(name)
-            if plain not in cause.parameters:
-                raise KeyError(f"{cause.name}: the truth's {name} has no counterpart {plain}: add it to SPECIAL")
-            fitted = _same(plain)
-        found.append(Compared(cause.name, name, truth, *fitted(cause.parameters, diagnosis, case)))
+    for name, truth in hidden.catalogue.items() if hidden is not None else ():
+        inverse = INVERSE.get((cause.name, name))
+        plain = inverse or _bare(name)
+        if plain not in cause.parameters and cause.effect.family in FAULT_FAMILIES:
+            continue  # noise is described, not fitted
+        if plain not in cause.parameters:
+            raise KeyError(f"{cause.name}: the truth's {name} has no counterpart {plain} among what is fitted")
+        parameter = cause.parameters[plain]
+        value, low, high = parameter.value, *parameter.ci95
+        if inverse is not None:
+            value, low, high = 1.0 / value, 1.0 / high, 1.0 / low if low > 0 else float("inf")
+        found.append(Compared(cause.name, name, truth, value, low, high))
     return found
 
 

@@ -1,10 +1,10 @@
 """Hide an effect and require its name, its parameter and the gain on held-out data.
 
-Hypothesis draws the cases: effect, strength from 0.3 % of full scale to what the effect can have, protocol, noise and
-seed (which draws the effect's further parameters, the unit and two nuisances). The requirement is on counts over
-the drawn set, not on every example: the figure asked for is 92 % of names and 97 % of families, so that one example in
-twelve may go wrong by right, and a search for a counterexample would find one. A set is drawn anew only when this file
-changes (derandomised), and nothing that fails is taken out of it.
+Every effect of the catalogue is hidden once. Hypothesis draws the rest: strength from 0.3 % of full scale to what the
+effect can have, protocol, noise and seed (which draws the effect's further parameters, the unit and two nuisances).
+The requirement is on counts over the drawn set, not on every example: what is asked for is 92 % of names and 97 % of
+families, so that one case in twelve may rightly go wrong, and a search for a counterexample would find one. The set is
+the same until this file changes (derandomised), and nothing that fails is taken out of it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import pytest
 from bank import GRID_PERCENT, INSIDE, PHYSICAL, PLAIN, drawn, protocols_of, strongest
 from bank_scoring import Score, score
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from simulators.hidden import HiddenCase, hide
@@ -27,8 +27,7 @@ GROUPS = {
     "gas and sensor": ("gas", "sensor"),
     "logger": ("logger",),
 }
-CASES = {"load and wall": 12, "gas and sensor": 12, "logger": 8}
-MISSES = 1  # of twelve: 92 %
+MISSES = 1  # of a group, so at most 3 of 35: 91 %
 
 
 @dataclass(frozen=True)
@@ -55,24 +54,32 @@ class Asked:
 
 
 @st.composite
-def cases(draw: st.DrawFn, names: list[str]) -> Asked:
-    name = draw(st.sampled_from(names))
-    percent = draw(st.floats(0.3, strongest(name)))
-    return Asked(name, percent, draw(st.sampled_from(protocols_of(name))), draw(st.floats(0.1, 0.3)), draw(SEEDS))
+def every_effect_once(draw: st.DrawFn, names: list[str]) -> list[Asked]:
+    return [
+        Asked(
+            name,
+            draw(st.floats(0.3, strongest(name))),
+            draw(st.sampled_from(protocols_of(name))),
+            draw(st.floats(0.1, 0.3)),
+            draw(SEEDS),
+        )
+        for name in names
+    ]
 
 
 def drawn_cases(group: str) -> list[Asked]:
     """What Hypothesis draws for a group: the same until this file changes."""
-    found: list[Asked] = []
+    found: list[list[Asked]] = []
     names = [name for name in INSIDE if EFFECTS[name].stage in GROUPS[group]]
 
-    @settings(max_examples=CASES[group], phases=[Phase.generate], database=None, derandomize=True, deadline=None)
-    @given(asked=cases(names))
-    def collect(asked: Asked) -> None:
+    @settings(max_examples=2, phases=[Phase.generate], database=None, deadline=None)
+    @seed(len(names))
+    @given(asked=every_effect_once(names))
+    def collect(asked: list[Asked]) -> None:
         found.append(asked)
 
     collect()
-    return found
+    return found[-1]  # the first is the simplest there is: every strength the least
 
 
 def diagnosed(case: HiddenCase) -> tuple[Diagnosis, Score]:
