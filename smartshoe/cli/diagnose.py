@@ -79,6 +79,8 @@ def command(
         _save_calibration(calibration_path, found, recordings, unit)
     taken = emit_json(found.to_dict(), json_path)
     if refused:
+        for said in found.limits[1:]:
+            click.echo(f"note: {said}", err=True)
         raise NotIdentifiableError(found.limits[0] if found.limits else found.says)
     if taken:
         return

@@ -21,6 +21,7 @@ Mask = NDArray[np.bool_]
 REST_QUANTILE = 0.05  # of the load: what counts as unloaded
 SAME_LAG = 0.25
 LARGEST_DELAY_S = 1.9
+UNLOADED = 0.1  # of the largest load: where the lowest ones do not come below it, no rest is seen
 FOREIGN_ZERO = 0.3  # of the reading's span: a zero beyond it is the sensor's convention, no offset
 
 
@@ -78,9 +79,11 @@ def _turned_and_zeroed(recording: Recording, usable: Mask) -> tuple[Recording, s
         return recording, ""
     values, load = sensor.values[usable], load_n[usable]
     span = float(np.percentile(values, 99) - np.percentile(values, 1))
-    rest = float(np.median(values[load <= np.quantile(load, REST_QUANTILE)]))
+    low = load <= np.quantile(load, REST_QUANTILE)
+    rest = float(np.median(values[low]))
+    unloads = float(np.median(np.abs(load[low]))) < UNLOADED * float(np.percentile(np.abs(load), 99.9))
     falls = float(np.corrcoef(values, load)[0, 1]) < -0.5 if span > 0 else False
-    foreign = sensor.unit.quantity != "pressure" or abs(rest) > FOREIGN_ZERO * span
+    foreign = unloads and (sensor.unit.quantity != "pressure" or abs(rest) > FOREIGN_ZERO * span)
     if not (falls or (foreign and span > 0 and abs(rest) > 0.02 * span)):
         return recording, ""
     zero = rest if foreign else 0.0

@@ -11,6 +11,8 @@ from smartshoe.blas import on_one_thread
 from smartshoe.diagnosis.aligned import common_delay_s, put_right
 from smartshoe.diagnosis.baseline import global_baseline
 from smartshoe.diagnosis.confidence import confidence, inseparable
+from smartshoe.diagnosis.course import course_of
+from smartshoe.diagnosis.decay import decay_of
 from smartshoe.diagnosis.force import force_rmse_n
 from smartshoe.diagnosis.integrity import Integrity, examine
 from smartshoe.diagnosis.judgement import Errors, errors, gain
@@ -18,6 +20,7 @@ from smartshoe.diagnosis.leftover import Leftover, leftover_of
 from smartshoe.diagnosis.next_experiment import next_experiment
 from smartshoe.diagnosis.noise_kinds import noise_kinds
 from smartshoe.diagnosis.parameters import joint_parameters, parameters_of
+from smartshoe.diagnosis.ranges import ranges_of
 from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
 from smartshoe.diagnosis.selection import MATERIAL, Choice, choose, penalty
 from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
@@ -33,6 +36,7 @@ Progress = Callable[[str], None]
 REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
 LEAST_FIT_PERCENT = 70.0  # of the best model on held-out data: below it a name means nothing
+LEAST_BASELINE_FIT_PERCENT = 40.0  # below it what must be added is larger than the model
 NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
 LEFT_OF_EXPLAINED = 0.12  # of the structure that was there: less than this left over is a matter of equations' shape
 
@@ -91,8 +95,18 @@ def _refused(recordings: Sequence[Recording], integrity: Integrity, refusals: Se
         0.0,
         0.0,
         data_faults=integrity.faults,
-        limits=tuple(refusals),
+        limits=(*refusals, *(said for said in map(_seen, recordings) if said is not None)),
     )
+
+
+def _courses(recordings: Sequence[Recording]) -> list[str]:
+    return [f"{one.label}: {said}" for one in recordings if (said := course_of(one)) is not None]
+
+
+def _seen(recording: Recording) -> str | None:
+    """What can be told of a recording without a model."""
+    decay = decay_of(recording)
+    return decay.says if decay is not None else course_of(recording)
 
 
 @on_one_thread
@@ -103,7 +117,7 @@ def _diagnosed(
     scale = full_scale(recordings[:count], usable[:count])
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
     sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
-    traits = traits_of(sessions)
+    traits, ranges = traits_of(sessions), ranges_of(sessions, scale)
     delay_s = common_delay_s(integrity)
     start = global_baseline(sessions, scale, delay_s)
     if delay_s:
@@ -115,9 +129,12 @@ def _diagnosed(
     fine = at_full_rate(sessions, usable, scale)
     baseline, best = errors(fine, choice.baseline.model), errors(fine, choice.fit.model)
     causes = [_cause(name, choice, fine, best, scale, traits) for name in choice.causes]
-    causes, verdict = _judged([one for one in causes if _stands(one)], before, after, material)
-    follows = best.fit_percent >= LEAST_FIT_PERCENT
-    if not follows:
+    moved = not delay_s and (any(integrity.clock_offset_s) or any(integrity.clock_rate))
+    # What is left of a delay after the clocks were put right is an error of the putting right.
+    causes = [one for one in causes if _stands(one) and not (moved and one.effect.family == "timing")]
+    causes, verdict = _judged(causes, before, after, material)
+    follows = best.fit_percent >= LEAST_FIT_PERCENT and baseline.fit_percent >= LEAST_BASELINE_FIT_PERCENT
+    if not follows or (ranges.is_trap and causes):
         causes, verdict = [], "unexplained"
     extended, after_all, last = choice.fit.model, best, after
     if verdict == "unexplained":
@@ -146,7 +163,12 @@ def _diagnosed(
         explained_percent=_percent_less(after_all.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _candidates(choice),
         next_experiment=next_experiment(choice, causes, traits, sessions),
-        limits=(*put, *traits.limits(), *([] if follows else [_does_not_follow(best)])),
+        limits=(
+            *put,
+            *ranges.says,
+            *traits.limits(),
+            *([] if follows else [_does_not_follow(baseline, best), *_courses(recordings)]),
+        ),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=tuple((one.candidate.effect.name, float(one.fall)) for one in choice.screening.ranked),
         likeness=choice.screening.likeness,
@@ -182,10 +204,11 @@ def _stands(cause: Cause) -> bool:
     return any(not low <= null <= high for null, (low, high) in zip(nulls, intervals, strict=True))
 
 
-def _does_not_follow(best: Errors) -> str:
+def _does_not_follow(baseline: Errors, best: Errors) -> str:
     return (
-        f"the best model of a pressed unit follows this reading by {best.fit_percent:.0f} % only: it is of another"
-        " kind, or its columns are mistaken, and no cause can be named by it"
+        f"the model of a pressed unit follows this reading by {max(baseline.fit_percent, 0.0):.0f} % only, and by"
+        f" {max(best.fit_percent, 0.0):.0f} % at best: it is of another kind, or its columns are mistaken, and no cause"
+        " can be named by it"
     )
 
 

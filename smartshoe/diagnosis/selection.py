@@ -23,6 +23,7 @@ MATERIAL = 2e-4  # of the full-scale reading: what an effect must move the readi
 SLIGHT = 5e-5  # what is significant but moves the reading by less is left alone
 LEAST_FALL = 30.0  # of -2 log likelihood for an effect with one parameter
 FALL_A_PARAMETER = 8.0
+MOST_COUNTED = 2  # parameters beyond the first: those of shape bend little more
 BEST_WHITENED, BEST_OF_FAMILY, BEST_RAW = 6, 2, 1
 BEST_SWAPS = 3
 MOST_PARTS = 6
@@ -33,6 +34,14 @@ MOST_MERGED = 4
 WORTH_A_MERGER = 0.9
 WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
+NEIGHBOURING = (
+    frozenset({"hysteresis", "asymmetry", "rate"}),
+    frozenset({"softening", "gain_drift"}),
+    frozenset({"relaxation", "gas_heat", "timing"}),
+    frozenset({"leak", "zero"}),
+    frozenset({"static_curve", "dead_band"}),
+)
+SHAPE_OF_NEIGHBOUR = 0.1
 NAMED_OF_LARGEST = 0.05
 LEAST_OF_LARGEST = (
     0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
@@ -130,7 +139,8 @@ def held_out_square(evidence: Evidence, model: ExtendedModel) -> float:
 
 def penalty(name: str) -> float:
     """What -2 log likelihood must fall by for an effect to be taken in."""
-    return LEAST_FALL + FALL_A_PARAMETER * (len(catalogue()[name].parameters) - 1)
+    live = [p for p in catalogue()[name].parameters if not p.unit.endswith("/K")]
+    return LEAST_FALL + FALL_A_PARAMETER * min(len(live) - 1, MOST_COUNTED)
 
 
 def choose(
@@ -375,10 +385,17 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, words: Board, name: str)
     ]
 
 
+def _is_shape_error(name: str, sizes: dict[str, float]) -> bool:
+    """Whether an effect is small beside one whose equation, a little wrong, leaves just such a thing behind."""
+    group = next((group for group in NEIGHBOURING if effect(name).family in group), frozenset())
+    near = [size for other, size in sizes.items() if other != name and effect(other).family in group]
+    return bool(near) and sizes[name] < SHAPE_OF_NEIGHBOUR * max(near)
+
+
 def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:
     current = settled.fit
     sizes = {name: visible(evidence, less.model, current.model) for name, less in settled.without.items()}
     least = max(material, NAMED_OF_LARGEST * max(sizes.values(), default=0.0))
-    named = {name: size for name, size in sizes.items() if size >= least}
+    named = {name: size for name, size in sizes.items() if size >= least and not _is_shape_error(name, sizes)}
     falls = {name: less.cost - current.cost for name, less in settled.without.items()}
     return Choice(current, baseline, evidence, screening, settled.rivals, settled.without, named, falls)

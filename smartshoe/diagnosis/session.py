@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.denoise import noise_sd, without_noise
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.loading import turning_points
 from smartshoe.models.effects import Conditions
@@ -31,7 +32,7 @@ MOST_COARSENED = 1.35  # times: for the sake of speed
 CYCLE_SHARE = 0.08
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
-REST_MARGIN_S = 0.25  # about a rest, where the load may already move
+REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
 REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
 
 
@@ -179,15 +180,15 @@ def _session(
         extra = {name: np.interp(even, time_s, values) for name, values in extra.items()}
         displacement = None if displacement is None else np.interp(even, time_s, displacement)
         time_s = even
-    noise = _noise(load_n) / scale.load_n
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
     weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
-    load = load_n / scale.load_n
+    raw = load_n / scale.load_n
+    load, noise = without_noise(raw, step_s)
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)
     conditions = Conditions(
         time_s[::factor],
-        smoothed(_without_rest_noise(load, base + 0.25 * REST_SHARE, step_s), weights, factor),
+        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, noise_sd(raw)), weights, factor),
         step_s * factor,
         noise * float(np.sqrt(np.sum(weights**2))),
         **{name: smoothed(values, weights, factor) for name, values in extra.items()},
@@ -214,18 +215,16 @@ def _session(
     )
 
 
-def _without_rest_noise(load: Array, level: float, step_s: float) -> Array:
-    """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise.
-
-    A dead band would else be found wherever the cell is noisy, since it keeps that noise from the simulation.
-    """
+def _rests_levelled(load: Array, level: float, noise: float) -> Array:
+    """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise."""
     out = load.copy()
-    width = max(1, round(REST_MARGIN_S / step_s))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], load < level, [False]]).astype(np.int8)))
     for first, last in zip(edges[0::2], edges[1::2], strict=True):
-        if last - first > 4 * width:
-            inside = slice(first + (width if first else 0), last - (width if last < load.size else 0))
-            out[inside] = load[inside].mean()
+        part = load[first:last]
+        middle = float(np.median(part))
+        still = np.abs(part - middle) < REST_NOISE * noise
+        if still.sum() > 10:
+            out[first:last][still] = part[still].mean()
     return out
 
 
@@ -261,13 +260,6 @@ def _neighbour(recording: Recording) -> Channel | None:
     quantity = recording.sensor.unit.quantity
     others = [c for c in recording.of_role("auxiliary") if c.unit.quantity == quantity and c.name != "reference"]
     return others[0] if others else None
-
-
-def _noise(signal: Array) -> float:
-    """White noise's standard deviation from third differences, which no ramp or bend reaches."""
-    if signal.size < 10:
-        return 0.0
-    return float(np.median(np.abs(np.diff(signal, 3))) / (0.6745 * np.sqrt(20.0)))
 
 
 def _cycles(conditions: Conditions) -> NDArray[np.intp]:

@@ -60,7 +60,7 @@ class Traits:
 
 def traits_of(sessions: Sequence[Session]) -> Traits:
     """What all sessions together hold."""
-    rates: list[float] = []
+    rates: list[tuple[float, int]] = []
     peaks: list[float] = []
     hold_s = rest_s = 0.0
     pauses: list[float] = []
@@ -81,7 +81,7 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
                 continue  # too short to have a rate
             rate = 0.6 * rise / max((end - begin) * step_s, 0.5 * step_s)
             if rise > 0:
-                rates.append(rate)
+                rates.append((rate, end - begin))
                 peaks.append(float(load[last]))
                 kind = (round(10 * np.log2(rate)), round(20 * peaks[-1]))
                 kinds[kind] = kinds.get(kind, 0) + 1
@@ -93,12 +93,12 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
         rest_s = max([rest_s, *(n * step_s for n in lengths)])
         pauses += [n * step_s for n in lengths[1:-1]]
     present = set()
-    few_rates, few_peaks = _distinct(rates, SAME_RATE), _distinct(peaks, SAME_PEAK)
+    few_rates, few_peaks = _distinct_rates(rates), _distinct(peaks, SAME_PEAK)
     if len(few_rates) > 1:
         present.add("rates")
     if len(few_peaks) > 1:
         present.add("peaks")
-    if any(rate * STEP_S > CYCLE_SHARE * 4 for rate in rates):
+    if any(rate * STEP_S > CYCLE_SHARE * 4 for rate, _ in rates):
         present.add("steps")
     if hold_s >= HOLD_S:
         present.add("holds")
@@ -132,4 +132,19 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
     for value in sorted(values):
         if not found or value > found[-1] * (1.0 + alike):
             found.append(value)
+    return found
+
+
+def _distinct_rates(rates: Sequence[tuple[float, int]]) -> list[float]:
+    """Rates that differ by more than `SAME_RATE`, and by more than ramps of so few samples tell.
+
+    Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2.
+    """
+    found: list[float] = []
+    reach = 0.0
+    for rate, samples in sorted(rates):
+        n = max(samples, 1)
+        if not found or (rate > found[-1] * (1.0 + SAME_RATE) and rate * n / (n + 2.0) > reach):
+            found.append(rate)
+            reach = rate * n / max(n - 2.0, 0.1)
     return found

@@ -7,20 +7,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Diagnosis, diagnose
 from smartshoe.diagnosis.decay import Decay, decay_of
 from smartshoe.logs import read
 from smartshoe.recording import Recording
 
+Array = NDArray[np.float64]
+
 pytestmark = pytest.mark.real_data
 
 HALF_WIDTHS_N = {1: 5.6, 3: 7.6, 5: 9.0, 7: 11.0}  # by bar, from the notes beside the data
 INSOLE_ROWS_HZ = 49.0
+SATURATED_TAXEL = 251
 INSOLE_LAGS_S = {  # from static fits in windows over a grid of lags, apart from this project's code
     "calibration_dataset": 1.4,
     "validation_dataset_3": 1.1,
-    "experiment_Inf_17September_dynamic_2": 0.65,
 }
 
 
@@ -35,19 +38,22 @@ def _leaking(measured: Path, name: str) -> Recording:
     )
 
 
-def _insole(measured: Path, name: str, rows_hz: float) -> Recording:
-    """Reference pressure as the force on 1 cm2, its rows at ``rows_hz`` from the taxels' first sample on."""
+def _insole(measured: Path, name: str, rows_hz: float, taxel: str = "mean_active_taxels_counts") -> Recording:
     folder = measured / "insole_plenum"
     taxels = np.genfromtxt(folder / f"{name}_C.csv", delimiter=",", names=True)
     reference = np.genfromtxt(folder / f"{name}_P.csv", delimiter=",", names=True)["P_bar"]
-    time_s = taxels["t_s"] - taxels["t_s"][0]
-    rows_s = np.arange(reference.size) / rows_hz
-    kept = (np.diff(time_s, prepend=-1.0) > 0) & (time_s <= rows_s[-1])
+    return _insole_of(taxels["t_s"], taxels[taxel], reference, rows_hz)
+
+
+def _insole_of(time_s: Array, counts: Array, reference_bar: Array, rows_hz: float) -> Recording:
+    """Reference pressure as the force on 1 cm2, its rows at ``rows_hz`` from the taxels' first sample on."""
+    since_s = time_s - time_s[0]
+    rows_s = np.arange(reference_bar.size) / rows_hz
+    kept = (np.diff(since_s, prepend=-1.0) > 0) & (since_s <= rows_s[-1])
     return Recording.from_arrays(
-        time_s=time_s[kept],
-        force_n=10.0 * np.interp(time_s[kept], rows_s, reference),
-        pressure_counts=taxels["mean_active_taxels_counts"][kept],
-        name=name,
+        time_s=since_s[kept],
+        force_n=10.0 * np.interp(since_s[kept], rows_s, reference_bar),
+        pressure_counts=counts[kept],
     )
 
 
@@ -128,7 +134,10 @@ class TestInsole:
         found = diagnose(_insole(measured, name, INSOLE_ROWS_HZ))
         offset_s = float(re.findall(r"reading is ([\d.]+) s late", _fault(found, "two_clocks"))[0])
         assert offset_s == pytest.approx(INSOLE_LAGS_S[name], abs=0.25)
-        assert not {cause.effect.family for cause in found.causes} & {"relaxation", "timing", "leak"}
+        assert not {cause.effect.family for cause in found.causes} & {"relaxation", "leak"}
+        for cause in found.causes:
+            if cause.name == "delay":
+                assert cause.parameters["delay"].value == pytest.approx(INSOLE_LAGS_S[name], abs=0.25)
 
     def test_a_wrong_rate_of_the_rows_is_seen_as_a_lag_that_grows(self, measured: Path) -> None:
         name = "experiment_Inf_17September_dynamic_2"
@@ -143,14 +152,17 @@ class TestInsole:
         assert (last_s - first_s) / duration_s == pytest.approx(50.0 / INSOLE_ROWS_HZ - 1.0, abs=0.006)
 
     def test_the_lattice_of_a_single_taxel_is_found(self, measured: Path) -> None:
-        folder = measured / "insole_plenum"
-        taxels = np.genfromtxt(folder / "calibration_dataset_C.csv", delimiter=",", names=True)
-        whole = _insole(measured, "calibration_dataset", INSOLE_ROWS_HZ)
-        one = np.interp(whole.time_s, taxels["t_s"] - taxels["t_s"][0], taxels["taxel_152_counts"]).round()
-        found = diagnose(
-            Recording.from_arrays(time_s=whole.time_s, force_n=whole.force_n, pressure_counts=one, name="taxel")
-        )
+        found = diagnose(_insole(measured, "calibration_dataset", INSOLE_ROWS_HZ, "taxel_0_counts"))
         assert "lattice of 1 counts" in _fault(found, "quantisation")
+
+    def test_a_taxel_that_saturates_is_refused(self, measured: Path) -> None:
+        from scipy.io import loadmat
+
+        experiment = loadmat(measured / "insole_plenum" / "calibration_dataset.mat")["experiment"][0, 0]
+        rows, reference = experiment["C"].astype(float), experiment["P"].ravel()
+        found = diagnose(_insole_of(rows[:, 1], rows[:, 2 + SATURATED_TAXEL], reference, INSOLE_ROWS_HZ))
+        assert found.verdict == "refused"
+        assert "exactly 0 counts" in _fault(found, "saturation")
 
 
 def _fault(found: Diagnosis, kind: str) -> str:

@@ -36,6 +36,7 @@ BINS = 4000
 MOVING = 0.05  # of the largest increment
 CUT = 6.0  # of the median increment
 WINDOWS = 8
+REPEATING = 0.8  # autocorrelation of the load's increments at a lag
 EARNED = 0.8  # of the squared error that is left without the shift
 EARNED_ALONE = 0.6  # the same where zero lag correlates nearly as well, as it does on long even ramps
 TIME_CONSTANTS_S = (0.05, 0.1, 0.2, 0.5, 1.5, 5.0, 15.0, 60.0)
@@ -89,7 +90,7 @@ def _lag_line(view: View) -> tuple[float, float] | None:
             break
     least = max(LEAST_LAG_S, LEAST_LAG_SAMPLES * view.step_s)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
-    before = None
+    before, repeating = None, _repeats_itself(load)
     for lags, earned in ((smallest, EARNED), (best, EARNED_ALONE)):
         if places.size == 0 or np.max(np.abs(lags)) <= least:
             continue
@@ -98,10 +99,11 @@ def _lag_line(view: View) -> tuple[float, float] | None:
             ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
             if np.max(np.abs(ends)) <= least:
                 continue
-            if lags is smallest and _unanimous(places - middle, lags, offset_s, rate):
-                return offset_s, rate
             shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
-            offered.append((_unexplained(grid, shifted, reading, smooth_s), offset_s, rate))
+            after = _unexplained(grid, shifted, reading, smooth_s)
+            if lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate):
+                return offset_s, rate
+            offered.append((after, offset_s, rate))
         if not offered:
             continue
         before = _unexplained(grid, load, reading, smooth_s) if before is None else before
@@ -116,6 +118,17 @@ def _is_one_sine(load: Array) -> bool:
     power = np.abs(np.fft.rfft(np.diff(load))) ** 2
     best = int(np.argmax(power))
     return bool(power[max(best - 2, 0) : best + 3].sum() > ONE_SINE * power.sum())
+
+
+def _repeats_itself(load: Array) -> bool:
+    """Whether the load is periodic: windows then agree on a lag that may be wrong by a period."""
+    from scipy.signal import correlate
+
+    d = np.diff(load)
+    correlation = correlate(d, d, mode="full", method="fft")[d.size - 1 :]
+    correlation = correlation[: d.size // 2] / (correlation[0] * (1.0 - np.arange(d.size // 2) / d.size))
+    fallen = int(np.argmax(correlation < 0.0)) or correlation.size
+    return bool(np.max(correlation[fallen:], initial=0.0) > REPEATING)
 
 
 def _unanimous(places: Array, lags: Array, offset_s: float, rate: float) -> bool:
