@@ -15,6 +15,7 @@ from smartshoe.models.extended import ExtendedModel
 Array = NDArray[np.float64]
 
 POLES_PER_S = np.geomspace(0.01, 20.0, 31)
+LARGEST_SHARE = 5.0  # no wall relaxes by more: what looks like it is a lag or a permanent set
 LEAST_SHARE = 1e-3  # of the load that relaxes: below it the pole means nothing
 
 
@@ -36,7 +37,7 @@ def global_baseline(sessions: Sequence[Session], scale: Scale, delay_s: float = 
         (fast, slow, _), *_ = np.linalg.lstsq(columns, reading, rcond=None)
         if slow <= 0:
             continue
-        fast = min(max(float(fast), 0.02 * slow), slow / (1.0 + LEAST_SHARE))
+        fast = min(max(float(fast), slow / (1.0 + LARGEST_SHARE)), slow / (1.0 + LEAST_SHARE))
         offset_free = columns[:, :2] @ np.array([fast, slow])
         error = float(np.var(reading - offset_free))
         if best is None or error < best[0]:

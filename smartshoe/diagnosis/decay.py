@@ -38,7 +38,7 @@ NORMAL_95 = 1.96
 class Decay:
     """What `decay_of` found.
 
-    From ``onset_s`` (since the first sample) the reading falls by ``lost_percent`` of its level there in ``within_s``,
+    From ``onset_s`` (since the first sample) the reading falls by ``lost_percent`` of its first level in ``within_s``,
     with the time constant ``tau_s`` of one exponential (``ci95_s``), towards ``plateau`` (reading's unit; 0 unless the
     data shows another). ``from_start_s`` is the time constant when the stretch before the onset is counted in.
     ``order`` m (``order_ci95``): the rate of fall goes with the m-th power of the reading, as in -p' = k p^m: 1 is
@@ -77,7 +77,7 @@ def decay_of(recording: Recording) -> Decay | None:
     if time_s.size - first < FEWEST_POINTS:
         return None
     onset_s, t, v = float(time_s[first]), time_s[first:] - time_s[first], reading[first:]
-    lost = (float(v[0]) - low) / high
+    lost = (high - low) / high
     guess = _guess(t, v)
     one = _fit(_exponential, t, v, [high, guess])
     plateau = 0.0

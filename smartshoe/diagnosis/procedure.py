@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
+COMMANDED_REST_SD = 1.2e-4  # the same where the machine was told to be at zero
+PLAIN_GAIN_PERCENT = 5.0  # a gain that needs no interval to be seen
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
 LEAST_FIT_PERCENT = 70.0  # of the best model on held-out data: below it a name means nothing
 LEAST_BASELINE_FIT_PERCENT = 40.0  # below it what must be added is larger than the model
@@ -183,6 +185,7 @@ def _diagnosed(
 def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
     """Mean measured load of each session's rests, shares of full scale, and how well it should be zero."""
     means = []
+    commanded = all(session.recording.command_n is not None for session in sessions)
     for session in sessions:
         command = session.recording.command_n
         resting = session.resting & ~session.held_out
@@ -191,12 +194,13 @@ def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
             resting &= np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
         if resting.sum() > 10:
             means.append(float(np.mean(session.conditions.load[resting])))
-    return np.array(means), REST_SD
+    return np.array(means), COMMANDED_REST_SD if commanded else REST_SD
 
 
 def _stands(cause: Cause) -> bool:
     """Whether a cause gains on data it has not seen, and its strength is told from nothing."""
-    if cause.held_out.gain_percent <= 0:
+    won = cause.held_out
+    if won.gain_percent <= 0 or (won.ci95[0] <= 0 and won.gain_percent < PLAIN_GAIN_PERCENT):
         return False
     strengths = [p for p in cause.effect.parameters if p.null is not None]
     intervals = [cause.parameters[p.name].ci95 for p in strengths]

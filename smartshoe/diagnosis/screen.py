@@ -119,7 +119,8 @@ class Screened:
 class Screening:
     """The best shape of each effect, by fall of the whitened cost; ``likeness`` (effects, effects) in that order.
 
-    ``total`` is the squared error that could be explained at most. Likeness is the largest canonical correlation of
+    ``total`` is the squared error that is there to be explained: where parts are gone, what they themselves explain.
+    Likeness is the largest canonical correlation of
     two effects' sensitivities after the model's own parameters are
     projected out: near one, this data cannot tell them apart (to first order).
     """
@@ -164,11 +165,13 @@ class Board:
         return Screening(ranked, _likeness(ranked, white[0]), white[2])
 
     def _projected(self, gram: Array, gone: Sequence[str]) -> tuple[Array, Array, float]:
-        """Gram matrix (q, q) of the candidates, their products with the target, and the target's square."""
+        """Gram matrix (q, q) of the candidates, their products with the target, and what is there to be explained."""
         owners = [owner for owner, _ in self.words.model.parameters]
         own = np.array([1 + k for k, owner in enumerate(owners) if owner not in gone])
         first = 1 + len(owners)
-        others = np.arange(first, first + self.words.others[0].shape[1])
+        count = self.words.others[0].shape[1]
+        lost_own = np.array([1 + k for k, owner in enumerate(owners) if owner in gone], dtype=int)
+        others = np.concatenate([np.arange(first, first + count), lost_own])
         place = np.array([0, *(self.parts[name] for name in gone)])
         target = gram[:, place].sum(axis=1)
         square = float(gram[np.ix_(place, place)].sum())
@@ -183,7 +186,10 @@ class Board:
         square -= float((target[own] / scale) @ inverse @ (target[own] / scale))
         lost = np.diag(part) <= NOTHING * norm
         part[lost], part[:, lost] = 0.0, 0.0
-        return part, np.where(lost, 0.0, product), max(square, 0.0)
+        product = np.where(lost, 0.0, product)
+        if gone:
+            square = _fall_of(part[count:, count:], product[count:])
+        return part[:count, :count], product[:count], max(square, 0.0)
 
 
 def board(words: Dictionary, noise: NoiseModel, parts: Mapping[str, Sequence[Array]] | None = None) -> Board:
@@ -225,6 +231,16 @@ def _explained(candidate: Candidate, gram: Array, fit: Sequence[Array | float]) 
             break
         free &= ~wrong
     return found, float(2 * found @ product - found @ part @ found)
+
+
+def _fall_of(part: Array, product: Array) -> float:
+    """What columns with these inner products take off a squared error."""
+    scale = np.sqrt(np.diag(part))
+    seen = np.flatnonzero(scale > 0)
+    if not seen.size:
+        return 0.0
+    inner = part[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
+    return float(product[seen] / scale[seen] @ np.linalg.lstsq(inner, product[seen] / scale[seen], rcond=1e-9)[0])
 
 
 def _likeness(ranked: Sequence[Screened], gram: Array) -> Array:

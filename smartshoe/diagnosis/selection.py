@@ -47,6 +47,7 @@ LEAST_OF_LARGEST = (
     0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
 )
 SHAPE_ERROR = 0.05
+TIMING_SHAPE_ERROR = 0.1
 MERGED_SHAPE_ERROR = 0.02
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
@@ -110,11 +111,15 @@ def margin(evidence: Evidence, one: Fit, other: Fit, less: Fit) -> float:
 
     ``less`` is the fit without either. Among static curves the pressure alone says little: no equation is exact, and
     a truth that departs from its own by `SHAPE_ERROR` of the effect's size leaves SHAPE_ERROR^2 of the fall behind,
-    which another curve may follow better. There the displacement decides, where it was logged.
+    which another curve may follow better. There the displacement decides, where it was logged. Lags and delays differ
+    within milliseconds of a corner only, whose own rounding is not known.
     """
     names = one.model.names[-1], other.model.names[-1]
     worse = one.cost - other.cost
     more = penalty(names[0]) - penalty(names[1])
+    if all(effect(name).family == "timing" for name in names):
+        fall = max(less.cost - min(one.cost, other.cost), 0.0)
+        return worse / (1.0 + TIMING_SHAPE_ERROR**2 * fall / SEEN_CLEARLY) + more
     seen = evidence.displacement_cost(other.model)
     if seen == 0.0 or any(effect(name).family != "static_curve" for name in names):
         return worse + more
@@ -317,7 +322,8 @@ def _merged(
         less = fit(evidence, current.model.without(pair[0]).without(pair[1]), QUICK_STEPS)
         whole = less.cost - current.cost
         saved = penalty(pair[0]) + penalty(pair[1]) + MERGED_SHAPE_ERROR**2 * whole
-        for one in _raced(evidence, less, worth[:BEST_SWAPS]):
+        as_it_is = replace(less, model=current.model.without(pair[0]).without(pair[1]))
+        for one in _raced(evidence, as_it_is, worth[:BEST_SWAPS]):
             worse = one.cost - current.cost + penalty(one.model.names[-1])
             if worse < saved and frozenset(one.model.names) not in tried:
                 return one
@@ -373,7 +379,8 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, words: Board, name: str)
     others = _newcomers(looked, current, (name,))
     whole = less.cost - current.cost
     near = [one for one in others if one.fall >= WORTH_A_SWAP * looked.total][:BEST_SWAPS]
-    raced = _raced(evidence, less, near)
+    # Everything else is where it was: fitted anew it would have moved to take the missing effect's place.
+    raced = _raced(evidence, replace(less, model=current.model.without(name)), near)
     own = replace(
         current, model=current.model.without(name).with_part(effect(name), part_of(current.model, name).values)
     )

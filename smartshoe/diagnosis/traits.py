@@ -15,6 +15,7 @@ from smartshoe.loading import turning_points
 Array = NDArray[np.float64]
 
 SAME_RATE = 0.25
+SINGLE_RATE = 0.8  # of the ramps
 SAME_PEAK = 0.10
 SAMPLES_OF_A_RATE = 4
 STEP_S = 0.15  # a ramp within this time is a step
@@ -138,13 +139,18 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
 def _distinct_rates(rates: Sequence[tuple[float, int]]) -> list[float]:
     """Rates that differ by more than `SAME_RATE`, and by more than ramps of so few samples tell.
 
-    Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2.
+    Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2. A
+    stray ramp beside a single rate, a first one say, makes no second rate.
     """
     found: list[float] = []
+    ramps: list[int] = []
     reach = 0.0
     for rate, samples in sorted(rates):
         n = max(samples, 1)
         if not found or (rate > found[-1] * (1.0 + SAME_RATE) and rate * n / (n + 2.0) > reach):
             found.append(rate)
+            ramps.append(0)
             reach = rate * n / max(n - 2.0, 0.1)
-    return found
+        ramps[-1] += 1
+    most = int(np.argmax(ramps)) if ramps else 0
+    return [found[most]] if ramps and ramps[most] >= SINGLE_RATE * sum(ramps) else found

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 BASELINE = (
     EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),
-    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, 1e-5, 50.0, 0.1),
+    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, 1e-5, 5.0, 0.1),
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
 TAKEN_BY_WALL = ("static_curve", "leak")

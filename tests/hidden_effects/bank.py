@@ -5,7 +5,7 @@ of the diagnosis used (that took 0-50 and 1000-1400):
 
 ========== ======= =========================================================================
 grid       500,000 one effect at 0.05, 0.1, 0.3, 1 or 3 % of full scale: the table by effect
-single     520,000 one effect, strength log-uniform from 0.1 to 10 %
+single     520,000 one effect, strength log-uniform from 0.1 to 10 % or what it can have
 pair       540,000 two effects of different families, physical ones, each 0.3 to 3 %
 none       560,000 no effect
 outside    580,000 one effect that the catalogue does not have, 0.3 to 10 %
@@ -63,7 +63,7 @@ STRONGEST = {
     "second_relaxation": 1.0, "power_law_creep": 2.0, "gas_heat": 0.8, "gas_compression": 1.6, "sensor_lag": 0.8,
     "sensor_nonlinearity": 2.5, "held_samples": 1.0,
 }  # fmt: skip
-USUALLY_STRONGEST = 4.0
+USUALLY_STRONGEST = 10.0
 INSIDE = tuple(name for name, effect in EFFECTS.items() if effect.inside)
 OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.inside)
 PHYSICAL = tuple(name for name in INSIDE if catalogue()[name].is_physical)
@@ -144,13 +144,19 @@ def protocols_of(name: str) -> tuple[str, ...]:
 
 
 def strongest(name: str) -> float:
-    """What the effect ``name`` may be asked for, percent of full scale; outside the catalogue there is no end."""
-    return STRONGEST.get(name, USUALLY_STRONGEST if name in INSIDE else 10.0)
+    """What the effect ``name`` may be asked for, percent of full scale."""
+    return STRONGEST.get(name, USUALLY_STRONGEST)
 
 
 def _cell(index: int) -> tuple[str, float]:
-    """The grid's cells in turn: all effects at one strength, then at the next, leaving out what cannot be reached."""
-    cells = [(name, percent) for percent in GRID_PERCENT for name in INSIDE if percent <= strongest(name)]
+    """The grid's cells: every effect once before any comes again, strengths in turn; no strength beyond reach."""
+    strengths = len(GRID_PERCENT)
+    turns = [
+        (name, GRID_PERCENT[(place + turn) % strengths])
+        for turn in range(strengths)
+        for place, name in enumerate(INSIDE)
+    ]
+    cells = [(name, percent) for name, percent in turns if percent <= strongest(name)]
     return cells[index % len(cells)]
 
 
