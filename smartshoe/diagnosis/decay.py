@@ -103,7 +103,7 @@ def decay_of(recording: Recording) -> Decay | None:
     counted = f" ({_duration(from_start_s)} when counted from the first sample)" if begins and lost > 0.5 else ""
     aim = f" towards {plateau:.3g} {unit}" if plateau else ""
     says = (
-        f"the {sensor.name} falls by {100 * lost:.2g} % in {float(t[-1]):.3g} s{begins}{aim}, with a time constant of"
+        f"the {sensor.name} falls by {100 * lost:.3g} % in {float(t[-1]):.3g} s{begins}{aim}, with a time constant of"
         f" {_duration(tau_s)}{counted}, {_course_says(course, order)}: a leak or a relaxation, which"
         f" {'only a logged load tells apart' if standing == 'absent' else 'a load that stands still cannot tell apart'}"
     )
