@@ -20,7 +20,8 @@ Mask = NDArray[np.bool_]
 
 REST_QUANTILE = 0.05  # of the load: what counts as unloaded
 SAME_LAG = 0.25
-LARGEST_DELAY_S = 1.9
+BEGIN_TOGETHER = 0.4  # of the lag in the middle: what the lag at the start may be, where it is all drift
+LARGEST_DELAY_S = 2.9
 UNLOADED = 0.1  # of the largest load: where the lowest ones do not come below it, no rest is seen
 FOREIGN_ZERO = 0.3  # of the reading's span: a zero beyond it is the sensor's convention, no offset
 
@@ -37,12 +38,27 @@ def common_delay_s(integrity: Integrity) -> float:
     return mean if abs(mean) <= LARGEST_DELAY_S else 0.0
 
 
+def common_drift(integrity: Integrity, recordings: Sequence[Recording]) -> float:
+    """How much faster one clock runs, where all recordings begin together and part alike; 0 where they do not.
+
+    A drift is a cause like any other, and the model bears it.
+    """
+    offsets, rates = np.array(integrity.clock_offset_s), np.array(integrity.clock_rate)
+    if not rates.any() or np.ptp(offsets) > SAME_LAG * np.max(np.abs(offsets)):
+        return 0.0
+    half_s = 0.5 * np.array([recording.duration_s for recording in recordings])
+    begins = (offsets - rates * half_s)[rates != 0]
+    if np.max(np.abs(begins)) > BEGIN_TOGETHER * np.max(np.abs(offsets)):
+        return 0.0
+    return float(np.mean(offsets / half_s))
+
+
 def put_right(recordings: Sequence[Recording], integrity: Integrity) -> tuple[list[Recording], list[Mask], list[str]]:
     """The recordings, sensors aligned, turned and zeroed where they must be; usable samples; a sentence for each."""
     made: list[Recording] = []
     usable: list[Mask] = []
     said: list[str] = []
-    borne = common_delay_s(integrity) != 0.0
+    borne = common_delay_s(integrity) != 0.0 or common_drift(integrity, recordings) != 0.0
     for recording, mask, offset_s, rate in zip(
         recordings, integrity.usable, integrity.clock_offset_s, integrity.clock_rate, strict=True
     ):

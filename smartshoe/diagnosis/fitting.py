@@ -50,6 +50,11 @@ class Evidence:
     rest_load: Array
     rest_sd: float
 
+    @property
+    def sample_time_s(self) -> float:
+        """Of the log, before thinning."""
+        return max(session.conditions.step_s / session.thinned for session in self.sessions)
+
     @cached_property
     def fitted(self) -> tuple[Session, ...]:
         """The sessions that a fit looks at."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
-from smartshoe.diagnosis.aligned import common_delay_s, put_right
+from smartshoe.diagnosis.aligned import common_delay_s, common_drift, put_right
 from smartshoe.diagnosis.baseline import global_baseline
 from smartshoe.diagnosis.confidence import confidence, inseparable
 from smartshoe.diagnosis.course import course_of
@@ -38,7 +38,8 @@ COMMANDED_REST_SD = 1.2e-4  # the same where the machine was told to be at zero
 PLAIN_GAIN_PERCENT = 5.0  # a gain that needs no interval to be seen
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
 LEAST_FIT_PERCENT = 70.0  # of the best model on held-out data: below it a name means nothing
-LEAST_BASELINE_FIT_PERCENT = 40.0  # below it what must be added is larger than the model
+LEAST_BASELINE_FIT_PERCENT = 40.0  # below it what must be added is larger than the model, and has to fit as
+PLAIN_FIT_PERCENT = 97.0  # this, to be believed
 NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
 LEFT_OF_EXPLAINED = 0.12  # of the structure that was there: less than this left over is a matter of equations' shape
 
@@ -120,10 +121,13 @@ def _diagnosed(
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
     sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
     traits, ranges = traits_of(sessions), ranges_of(sessions, scale)
-    delay_s = common_delay_s(integrity)
+    drift = common_drift(integrity, recordings)
+    delay_s = 0.0 if drift else common_delay_s(integrity)
     start = global_baseline(sessions, scale, delay_s)
     if delay_s:
         start = start.with_part(effect("delay"), np.array([delay_s]))
+    if drift:
+        start = start.with_part(effect("clock_drift"), np.array([drift]))
     choice = choose(start, sessions, rest_loads(sessions), material, progress)
     before = leftover_of(sessions, choice.evidence.residuals(choice.baseline.model))
     after = leftover_of(sessions, choice.evidence.residuals(choice.fit.model))
@@ -131,11 +135,13 @@ def _diagnosed(
     fine = at_full_rate(sessions, usable, scale)
     baseline, best = errors(fine, choice.baseline.model), errors(fine, choice.fit.model)
     causes = [_cause(name, choice, fine, best, scale, traits) for name in choice.causes]
-    moved = not delay_s and (any(integrity.clock_offset_s) or any(integrity.clock_rate))
+    moved = not delay_s and not drift and (any(integrity.clock_offset_s) or any(integrity.clock_rate))
     # What is left of a delay after the clocks were put right is an error of the putting right.
     causes = [one for one in causes if _stands(one) and not (moved and one.effect.family == "timing")]
     causes, verdict = _judged(causes, before, after, material)
-    follows = best.fit_percent >= LEAST_FIT_PERCENT and baseline.fit_percent >= LEAST_BASELINE_FIT_PERCENT
+    follows = best.fit_percent >= LEAST_FIT_PERCENT and (
+        baseline.fit_percent >= LEAST_BASELINE_FIT_PERCENT or best.fit_percent >= PLAIN_FIT_PERCENT
+    )
     if not follows or (ranges.is_trap and causes):
         causes, verdict = [], "unexplained"
     extended, after_all, last = choice.fit.model, best, after

@@ -48,7 +48,9 @@ LEAST_OF_LARGEST = (
 )
 SHAPE_ERROR = 0.05
 TIMING_SHAPE_ERROR = 0.1
+UNSEEN_SHAPE_ERROR = 0.3  # the same within one sample of the log
 MERGED_SHAPE_ERROR = 0.02
+ARM = "second_relaxation"
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
 CANCELLING_OTHERS = 12.0
@@ -119,7 +121,9 @@ def margin(evidence: Evidence, one: Fit, other: Fit, less: Fit) -> float:
     more = penalty(names[0]) - penalty(names[1])
     if all(effect(name).family == "timing" for name in names):
         fall = max(less.cost - min(one.cost, other.cost), 0.0)
-        return worse / (1.0 + TIMING_SHAPE_ERROR**2 * fall / SEEN_CLEARLY) + more
+        short = all(abs(float(each.model.parts[-1].values[0])) < evidence.sample_time_s for each in (one, other))
+        error = UNSEEN_SHAPE_ERROR if short else TIMING_SHAPE_ERROR
+        return worse / (1.0 + error**2 * fall / SEEN_CLEARLY) + more
     seen = evidence.displacement_cost(other.model)
     if seen == 0.0 or any(effect(name).family != "static_curve" for name in names):
         return worse + more
@@ -260,7 +264,7 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
     best: Settled | None = None
     merged: str | None = None
     while True:
-        without = {name: fit(evidence, current.model.without(name), QUICK_STEPS) for name in current.model.names}
+        without = {name: _fit_without(evidence, current.model, name) for name in current.model.names}
         name = _needless(evidence, current, without)
         if name is not None and name == merged and best is not None:
             return best  # the merger was no gain
@@ -285,6 +289,16 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
             f"{'merged' if merged else 'swapped'} {gone} {'into' if merged else 'for'} {following.model.names[-1]}"
         )
         current = fit(evidence, following.model)
+
+
+def _fit_without(evidence: Evidence, model: ExtendedModel, name: str) -> Fit:
+    """The best fit without an effect; a relaxation may have taken the place of the baseline's own arm."""
+    less = fit(evidence, model.without(name), QUICK_STEPS)
+    if name != ARM:
+        return less
+    share, time_constant_s = (float(value) for value in part_of(model, name).values[:2])
+    arm = replace(model.without(name), relaxing_share=share, relaxation_rate_per_s=1.0 / time_constant_s)
+    return min(less, fit(evidence, arm, QUICK_STEPS), key=lambda one: one.cost)
 
 
 def _score(evidence: Evidence, one: Fit) -> float:

@@ -12,7 +12,7 @@ from smartshoe.diagnosis.integrity.view import View
 
 BLOCK_S = 0.25
 LEAST_STRETCH_S = 1.0
-LEAST_HZ = 1.5  # below, a line is drift or physics
+LEAST_HZ = 3.0  # below, a line is drift or physics
 QUIET_MOVE = 0.003  # of the load's span, from one block to the next
 NEIGHBOURHOOD_HZ = 3.0
 SURE = 14.0  # beyond ln(frequencies) in units of the local mean power: a chance of 1e-6

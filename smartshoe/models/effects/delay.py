@@ -16,7 +16,7 @@ class Delay(Effect):
 
     name, family, stage, place = "delay", "timing", "logger", "logger"
     says = "the reading is late against the load by a constant time, its corners as sharp as before"
-    parameters = (EffectParameter("delay", "s", "time by which the reading is late", 0.0, -2.0, 2.0, 0.01),)
+    parameters = (EffectParameter("delay", "s", "time by which the reading is late", 0.0, -3.0, 3.0, 0.01),)
     exposed_by = frozenset({"rates", "steps"})
     separated_by = {"sensor_lag": "step or multisine", "clock_drift": "sync pulse at both ends"}
 
