@@ -53,6 +53,7 @@ MERGED_SHAPE_ERROR = 0.02
 ARM = "second_relaxation"
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
+SECOND_OF_FAMILY = 0.05  # of what the first one moves the reading by
 CANCELLING_OTHERS = 12.0
 CANCELLING = 4.0  # times what an addition takes off the error: what it may move the reading by
 
@@ -249,7 +250,9 @@ def _refusal(evidence: Evidence, current: Fit, attempt: Fit) -> str | None:
         return "no gain on held-out data"
     added = attempt.model.parts[-1]
     alone = visible(evidence, attempt.model, attempt.model.without(added.name))
-    related = any(effect(one).family == added.effect.family for one in current.model.names)
+    related = [name for name in current.model.names if effect(name).family == added.effect.family]
+    if any(size < SECOND_OF_FAMILY * visible(evidence, current.model, current.model.without(n)) for n in related):
+        return "one of its family is there, of which it may be the error of shape"
     if alone > (CANCELLING if related else CANCELLING_OTHERS) * size:
         return "it mostly cancels what is there"
     return None
@@ -278,7 +281,7 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
         here = Settled(current, without, rivals)
         if best is None or merged is not None or _score(evidence, current) < _score(evidence, best.fit):
             best, merged = here, None
-        following = _better(here, tried)
+        following = _better(evidence, here, tried)
         if following is None:
             one = _merged(evidence, current, without, words, tried)
             if one is None:
@@ -312,15 +315,20 @@ def _of_curves(evidence: Evidence, model: ExtendedModel) -> float:
     return evidence.displacement_cost(model) if curved else 0.0
 
 
-def _better(here: Settled, tried: set[frozenset[str]]) -> Fit | None:
-    """The swap that gains most, to a set that was not tried."""
+def _better(evidence: Evidence, here: Settled, tried: set[frozenset[str]]) -> Fit | None:
+    """The swap that gains most, to a set that was not tried and of which the newcomer would not be dropped again."""
     found = [
-        rival
-        for rivals in here.rivals.values()
+        (rival.margin, rival.fit, here.without[name])
+        for name, rivals in here.rivals.items()
         for rival in rivals
         if rival.fit is not None and rival.margin < -BETTER and frozenset(rival.fit.model.names) not in tried
     ]
-    return min(found, key=lambda rival: rival.margin).fit if found else None
+    for _, one, less in sorted(found, key=lambda entry: entry[0]):
+        gains = held_out_square(evidence, one.model) < held_out_square(evidence, less.model)
+        if gains and visible(evidence, one.model, less.model) >= HALF_MATERIAL:
+            return one
+        tried.add(frozenset(one.model.names))
+    return None
 
 
 def _merged(

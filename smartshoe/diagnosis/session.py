@@ -27,7 +27,7 @@ Mask = NDArray[np.bool_]
 SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 25_000
-MOST_COARSENED = 1.35  # times: for the sake of speed
+MOST_COARSENED = 2.0  # times: for the sake of speed
 # Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
 CYCLE_SHARE = 0.08
 HELD_OUT_EVERY = 3

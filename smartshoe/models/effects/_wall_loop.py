@@ -8,7 +8,7 @@ import numpy as np
 
 from smartshoe.models.effects.effect import Array, Conditions
 
-ROUNDS = 3
+ROUNDS = 2
 
 
 def shared(static: Callable[[Array], Array], load: Array, conditions: Conditions) -> tuple[Array, Array]:
