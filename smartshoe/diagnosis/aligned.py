@@ -20,6 +20,7 @@ Mask = NDArray[np.bool_]
 
 REST_QUANTILE = 0.05  # of the load: what counts as unloaded
 SAME_LAG = 0.25
+SMALL_LAG_S = 0.2
 BEGIN_TOGETHER = 0.4  # of the lag in the middle: what the lag at the start may be, where it is all drift
 LARGEST_DELAY_S = 2.9
 UNLOADED = 0.1  # of the largest load: where the lowest ones do not come below it, no rest is seen
@@ -44,11 +45,11 @@ def common_drift(integrity: Integrity, recordings: Sequence[Recording]) -> float
     A drift is a cause like any other, and the model bears it.
     """
     offsets, rates = np.array(integrity.clock_offset_s), np.array(integrity.clock_rate)
-    if not rates.any() or np.ptp(offsets) > SAME_LAG * np.max(np.abs(offsets)):
+    if not rates.any() or np.ptp(offsets) > max(SAME_LAG * np.max(np.abs(offsets)), SMALL_LAG_S):
         return 0.0
     half_s = 0.5 * np.array([recording.duration_s for recording in recordings])
     begins = (offsets - rates * half_s)[rates != 0]
-    if np.max(np.abs(begins)) > BEGIN_TOGETHER * np.max(np.abs(offsets)):
+    if np.max(np.abs(begins)) > max(BEGIN_TOGETHER * np.max(np.abs(offsets)), SMALL_LAG_S):
         return 0.0
     return float(np.mean(offsets / half_s))
 

@@ -43,12 +43,14 @@ class Evidence:
 
     A unit that carries nothing must be told no load: in rests the measured load plus a tare is zero within
     ``rest_sd``. That row tells a load cell's tare from a sensor's zero, which the waveform cannot.
+    ``kept``: effects that were found before any fit (a delay between two clocks) and are not dropped again.
     """
 
     sessions: Sequence[Session]
     noise: NoiseModel
     rest_load: Array
     rest_sd: float
+    kept: frozenset[str] = frozenset()
 
     @property
     def sample_time_s(self) -> float:

@@ -32,7 +32,7 @@ FIRST_STEPS = 2
 CLOSE = 0.1  # of what the best candidate takes off the cost
 MOST_MERGED = 4
 WORTH_A_MERGER = 0.9
-WORTH_A_SWAP = 0.5  # of what an effect takes off: what another must promise by itself to be tried in its place
+WORTH_A_SWAP = 0.7  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
 NEIGHBOURING = (
     frozenset({"hysteresis", "asymmetry", "rate"}),
@@ -157,7 +157,7 @@ def choose(
     start: ExtendedModel, sessions: Sequence[Session], rests: tuple[Array, float], material: float, progress: Progress
 ) -> Choice:
     """Forward selection, with drop and swap after each step, until nothing is left that an effect explains."""
-    evidence = Evidence(sessions, white(1.0), *rests)
+    evidence = Evidence(sessions, white(1.0), *rests, kept=frozenset(start.names))
     words = dictionary(start, evidence.fitted)
     evidence = replace(evidence, noise=noise_of(words))
     current = fit(evidence, start)
@@ -322,6 +322,8 @@ def _better(evidence: Evidence, here: Settled, tried: set[frozenset[str]]) -> Fi
         for name, rivals in here.rivals.items()
         for rival in rivals
         if rival.fit is not None and rival.margin < -BETTER and frozenset(rival.fit.model.names) not in tried
+        # What was found before any fit may only turn into its like.
+        if name not in evidence.kept or effect(rival.effect).family == effect(name).family
     ]
     for _, one, less in sorted(found, key=lambda entry: entry[0]):
         gains = held_out_square(evidence, one.model) < held_out_square(evidence, less.model)
@@ -335,7 +337,7 @@ def _merged(
     evidence: Evidence, current: Fit, without: dict[str, Fit], words: Board, tried: set[frozenset[str]]
 ) -> Fit | None:
     """One effect in the place of two, where it does as well: two that lean on each other may have come in by turns."""
-    names = sorted(without, key=lambda one: without[one].cost)[:MOST_MERGED]
+    names = sorted(set(without) - evidence.kept, key=lambda one: without[one].cost)[:MOST_MERGED]
     for pair in combinations(names, 2):
         looked = words.screen(pair)
         worth = [one for one in _newcomers(looked, current, pair) if one.fall >= WORTH_A_MERGER * looked.total]
@@ -381,9 +383,12 @@ def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> str 
     missed = {
         name: less.cost - current.cost
         for name, less in without.items()
-        if less.cost - current.cost < penalty(name)
-        or sizes[name] < _least_size(name, sizes)
-        or held_out_square(evidence, less.model) <= judged
+        if name not in evidence.kept
+        and (
+            less.cost - current.cost < penalty(name)
+            or sizes[name] < _least_size(name, sizes)
+            or held_out_square(evidence, less.model) <= judged
+        )
     }
     return min(missed, key=lambda name: missed[name] - penalty(name)) if missed else None
 

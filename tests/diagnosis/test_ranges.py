@@ -1,0 +1,66 @@
+"""A gain that is seen over a narrow range, or within files only, is no gain to calibrate by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.ranges import Ranges, ranges_of
+from smartshoe.diagnosis.session import full_scale, prepare
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+TIME_S = np.arange(0.0, 40.0, 0.02)
+TRIANGLE = np.abs(2.0 * (TIME_S / 5.0 % 1.0) - 1.0)
+GAIN_MBAR_PER_N = 0.25
+NOISE_MBAR = 0.02
+
+
+def _ranges(*pairs: tuple[Array, Array]) -> Ranges:
+    noise = np.random.default_rng(0).normal(0.0, NOISE_MBAR, TIME_S.size)
+    recordings = [
+        Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading + noise) for load, reading in pairs
+    ]
+    usable = [np.ones(TIME_S.size, dtype=bool) for _ in recordings]
+    scale = full_scale(recordings, usable)
+    return ranges_of(prepare(recordings, usable, None, scale, 1), scale)
+
+
+def _proportional(low_n: float, high_n: float) -> tuple[Array, Array]:
+    load = low_n + (high_n - low_n) * TRIANGLE
+    return load, GAIN_MBAR_PER_N * load
+
+
+def test_a_unit_loaded_from_zero_has_nothing_to_be_said_of_its_range() -> None:
+    assert _ranges(_proportional(0.0, 800.0)) == Ranges()
+
+
+def test_a_narrow_range_whose_line_meets_zero_is_told_but_no_trap() -> None:
+    found = _ranges(_proportional(600.0, 800.0))
+    assert not found.is_trap
+    assert "narrow range" in found.says[0]
+
+
+def test_a_line_that_misses_zero_by_far_is_a_trap() -> None:
+    load = 600.0 + 200.0 * TRIANGLE
+    found = _ranges((load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)))
+    assert found.is_trap
+    assert "0.05 mbar/N" in found.says[0]
+    assert "none to calibrate by" in found.says[0]
+
+
+def test_gains_within_files_that_differ_from_the_gain_between_them_are_a_trap() -> None:
+    pairs = []
+    for middle in (200.0, 400.0, 800.0):
+        load = middle * (1.0 + 0.05 * (TRIANGLE - 0.5))
+        pairs.append((load, GAIN_MBAR_PER_N * (middle + 0.7 * (load - middle))))
+    found = _ranges(*pairs)
+    assert found.is_trap
+    assert "between the files by 0.25 mbar/N" in found.says[-1]
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0])
+def test_files_over_different_ranges_of_one_unit_are_no_trap(factor: float) -> None:
+    assert not _ranges(_proportional(0.0, 800.0), _proportional(0.0, 800.0 * factor)).is_trap
