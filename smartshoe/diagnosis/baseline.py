@@ -9,25 +9,63 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis.session import Scale, Session
 from smartshoe.models.core import USUAL_WALL_RATIO, Core
+from smartshoe.models.effects import effect
 from smartshoe.models.effects.effect import Arm
 from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
 POLES_PER_S = np.geomspace(0.01, 20.0, 31)
+LATE_S = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28)
+TIMINGS = (*(("delay", (late,)) for late in LATE_S), *(("sensor_lag", (late, 0.1)) for late in LATE_S))
+EARNED = 0.9  # of the error, for a delay that nobody asked for
+PLAINLY = 0.5  # the same where one is known: what looked like two clocks is a slow sensor
 LARGEST_SHARE = 5.0  # no wall relaxes by more: what looks like it is a lag or a permanent set
 LEAST_SHARE = 1e-3  # of the load that relaxes: below it the pole means nothing
 
 
-def global_baseline(sessions: Sequence[Session], scale: Scale, delay_s: float = 0.0) -> ExtendedModel:
-    """Gain, relaxing share and rate with the least squared error: linear in two numbers for each pole of a grid.
+Timing = tuple[str, tuple[float, ...]]
 
-    ``delay_s`` is by how much the readings are late.
-    y = c (f - w) + d w with w = pole/(s + pole) f; the wall is passive where d >= c > 0 (the pressure creeps up).
+
+def global_baseline(sessions: Sequence[Session], scale: Scale, timing: Timing | None = None) -> ExtendedModel:
+    """The model that `searched` finds."""
+    return searched(sessions, scale, timing)[1]
+
+
+def start_of(sessions: Sequence[Session], scale: Scale, known: Timing | None = None) -> ExtendedModel:
+    """The baseline from which effects are looked for; with a delay or lag where its arm would else play one.
+
+    An arm that relaxes by several times the wall, or within milliseconds, is none: it has eaten a delay or a lag,
+    which no screen would find again. ``known`` is an effect of timing that is known from elsewhere.
+    """
+    error, model = searched(sessions, scale, known)
+    if known:
+        model = model.with_part(effect(known[0]), np.array(known[1]))
+    elif not has_idle_arm(model):
+        return model
+    others = [(*searched(sessions, scale, timing), timing) for timing in TIMINGS]
+    lower, late, (name, values) = min(others, key=lambda one: one[0])
+    return late.with_part(effect(name), np.array(values)) if lower < (PLAINLY if known else EARNED) * error else model
+
+
+def has_idle_arm(model: ExtendedModel) -> bool:
+    """Whether the baseline's arm is at an end of its range, where it is no relaxation of a wall."""
+    share, rate = model.relaxing_share, model.relaxation_rate_per_s
+    return not (LEAST_SHARE < share < 0.9 * LARGEST_SHARE and 0.011 < rate < 40.0)
+
+
+def searched(sessions: Sequence[Session], scale: Scale, timing: Timing | None) -> tuple[float, ExtendedModel]:
+    """The least mean squared error, and gain, relaxing share and rate there, for readings that are late by ``timing``.
+
+    Linear in two numbers for each pole of a grid: y = c (f - w) + d w with w = pole/(s + pole) f; the wall is passive
+    where d >= c > 0 (the pressure creeps up).
     """
     kept = [session.fitted for session in sessions]
     reading = np.concatenate([s.reading[k] for s, k in zip(sessions, kept, strict=True)])
-    loads = [_late(s.conditions.load, delay_s / s.conditions.step_s) for s in sessions]
+    loads = [s.conditions.load for s in sessions]
+    if timing is not None:  # linear like all the rest, so that it may as well act on the load
+        late, values = effect(timing[0]), np.array(timing[1])
+        loads = [late.apply(f, s.conditions, values) for f, s in zip(loads, sessions, strict=True)]
     load = np.concatenate([f[k] for f, k in zip(loads, kept, strict=True)])
     best: tuple[float, float, float, float] | None = None
     for pole in POLES_PER_S:
@@ -44,10 +82,10 @@ def global_baseline(sessions: Sequence[Session], scale: Scale, delay_s: float = 
             best = error, fast, float(slow), float(pole)
     if best is None:
         gain = float(load @ reading / (load @ load))
-        best = 0.0, gain / (1.0 + LEAST_SHARE), gain, 0.2
-    _, fast, slow, pole = best
+        best = float(np.var(reading - gain * load)), gain / (1.0 + LEAST_SHARE), gain, 0.2
+    error, fast, slow, pole = best
     share = slow / fast - 1.0
-    return ExtendedModel(
+    return error, ExtendedModel(
         slow,
         share,
         pole * (1.0 + share),
@@ -57,14 +95,6 @@ def global_baseline(sessions: Sequence[Session], scale: Scale, delay_s: float = 
         (),
         _wall_ratio(sessions, slow, scale),
     )
-
-
-def _late(load: Array, steps: float) -> Array:
-    """The load as it was ``steps`` before; the first one lasted for ever."""
-    if steps == 0.0:
-        return load
-    place = np.arange(load.size)
-    return np.asarray(np.interp(place - steps, place, load), dtype=np.float64)
 
 
 def _lag(load: Array, step_s: float, pole: float) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
 from smartshoe.diagnosis.aligned import common_delay_s, common_drift, put_right
-from smartshoe.diagnosis.baseline import global_baseline
+from smartshoe.diagnosis.baseline import start_of
 from smartshoe.diagnosis.confidence import confidence, inseparable
 from smartshoe.diagnosis.course import course_of
 from smartshoe.diagnosis.decay import decay_of
@@ -123,12 +123,10 @@ def _diagnosed(
     traits, ranges = traits_of(sessions), ranges_of(sessions, scale)
     drift = common_drift(integrity, recordings)
     delay_s = 0.0 if drift else common_delay_s(integrity)
-    start = global_baseline(sessions, scale, delay_s)
-    if delay_s:
-        start = start.with_part(effect("delay"), np.array([delay_s]))
-    if drift:
-        start = start.with_part(effect("clock_drift"), np.array([drift]))
-    choice = choose(start, sessions, rest_loads(sessions), material, progress)
+    known = ("clock_drift", (drift,)) if drift else ("delay", (delay_s,)) if delay_s else None
+    start = start_of(sessions, scale, known)
+    kept = frozenset(start.names if known else ())
+    choice = choose(start, sessions, rest_loads(sessions), kept, material, progress)
     before = leftover_of(sessions, choice.evidence.residuals(choice.baseline.model))
     after = leftover_of(sessions, choice.evidence.residuals(choice.fit.model))
     progress("judging on held-out data")

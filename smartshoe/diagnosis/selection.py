@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.baseline import has_idle_arm
 from smartshoe.diagnosis.fitting import Evidence, Fit, fit
 from smartshoe.diagnosis.noise import white
 from smartshoe.diagnosis.screen import Board, Screened, Screening, board, dictionary, noise_of, screen
@@ -51,6 +52,7 @@ TIMING_SHAPE_ERROR = 0.1
 UNSEEN_SHAPE_ERROR = 0.3  # the same within one sample of the log
 MERGED_SHAPE_ERROR = 0.02
 ARM = "second_relaxation"
+ARM_SHARE, ARM_RATES_PER_S = 0.08, np.geomspace(0.03, 10.0, 7)
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
 SECOND_OF_FAMILY = 0.05  # of what the first one moves the reading by
@@ -154,13 +156,21 @@ def penalty(name: str) -> float:
 
 
 def choose(
-    start: ExtendedModel, sessions: Sequence[Session], rests: tuple[Array, float], material: float, progress: Progress
+    start: ExtendedModel,
+    sessions: Sequence[Session],
+    rests: tuple[Array, float],
+    kept: frozenset[str],
+    material: float,
+    progress: Progress,
 ) -> Choice:
-    """Forward selection, with drop and swap after each step, until nothing is left that an effect explains."""
-    evidence = Evidence(sessions, white(1.0), *rests, kept=frozenset(start.names))
+    """Forward selection, with drop and swap after each step, until nothing is left that an effect explains.
+
+    ``kept`` are effects of the ``start`` that are known from elsewhere, and stay.
+    """
+    evidence = Evidence(sessions, white(1.0), *rests, kept)
     words = dictionary(start, evidence.fitted)
     evidence = replace(evidence, noise=noise_of(words))
-    current = fit(evidence, start)
+    current = _restarted(evidence, fit(evidence, start))
     baseline = start
     for name in start.names:
         baseline = baseline.without(name)
@@ -209,8 +219,20 @@ def _added(evidence: Evidence, current: Fit, looked: Screening, progress: Progre
         progress(f"  {name}: -2 log L falls by {current.cost - attempt.cost:.1f}{', ' + why if why else ''}")
         if why is None:
             progress(f"added {name}")
-            return fit(evidence, attempt.model)
+            return _restarted(evidence, fit(evidence, attempt.model))
     return None
+
+
+def _restarted(evidence: Evidence, current: Fit) -> Fit:
+    """The fit with its baseline's arm begun anew over a grid, where it had come to stand for something else."""
+    if not has_idle_arm(current.model):
+        return current
+    begun = [
+        fit(evidence, replace(current.model, relaxing_share=ARM_SHARE, relaxation_rate_per_s=float(rate)), FIRST_STEPS)
+        for rate in ARM_RATES_PER_S
+    ]
+    again = fit(evidence, min(begun, key=lambda one: one.cost).model)
+    return again if again.cost < current.cost else current
 
 
 def _worth_trying(looked: Screening) -> list[Screened]:
