@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from simulators.paper import AMBIENT_PA, DIAMETER_M, GAS_CONSTANT, MOLES, PEAK_N, TABLE_1, TABLE_2, TEMPERATURE_K
+from smartshoe.blas import on_one_thread
 
 Array = NDArray[np.float64]
 RATE_HZ = 100.0
@@ -106,6 +107,7 @@ def under_gain(unit: str) -> list[float]:
     return found
 
 
+@on_one_thread
 def least_filtered_rmse(unit: str) -> list[float]:
     """The smallest RMSE(r) in N that the printed filter can give for *any* raw signal with Table 2's RMSE(u).
 
