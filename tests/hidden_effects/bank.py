@@ -15,7 +15,7 @@ calibrate  900,000 a mixture of these: what the confidence is calibrated on, and
 Every case has noise of 0.1-0.3 % of full scale, partly coloured, and two nuisances (`simulators.hidden`). An effect is
 drawn with a protocol that can show it, and tell it from its neighbours as far as any load history does: `SHOWN_BY`
 follows the last column of the catalogue. No effect is asked for more than it can have: `STRONGEST`, from
-docs/simulated_effects.md.
+docs/simulated_effects.md, and what a unit and protocol cannot reach is halved (`within_reach`).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import traceback
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from bank_scoring import Score, score
@@ -44,7 +45,7 @@ MIXTURE = ("single", "grid", "pair", "single", "none", "outside", "single", "pai
 PLAIN = ("rates_and_holds", "rates", "shuffled")
 HELD = ("rates_and_holds", "static")
 SHOWN_BY: dict[str, tuple[str, ...]] = {
-    "second_relaxation": (*HELD, "step"), "power_law_creep": (*HELD, "step"),
+    "second_relaxation": ("rates_and_holds", "step"), "power_law_creep": (*HELD, "step"),
     "linear_leak": (*HELD, "long_hold"), "orifice_leak": HELD, "permanent_set": (*HELD, "shuffled"),
     "gas_heat": ("rates_and_holds", "rates", "step"),
     "gas_compression": (*PLAIN, "static"), "wall_hardening": (*PLAIN, "static"), "contact_area": (*PLAIN, "static"),
@@ -64,6 +65,8 @@ STRONGEST = {
     "sensor_nonlinearity": 2.5, "held_samples": 1.0,
 }  # fmt: skip
 USUALLY_STRONGEST = 10.0
+BEYOND = ("the most that", "clip")  # remarks of `hide` where a strength is out of reach
+MOST_HALVINGS = 4
 INSIDE = tuple(name for name, effect in EFFECTS.items() if effect.inside)
 OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.inside)
 PHYSICAL = tuple(name for name in INSIDE if catalogue()[name].is_physical)
@@ -81,7 +84,7 @@ class Drawn:
 
     def hidden(self) -> HiddenCase:
         """The recordings."""
-        return hide(self.effects, protocol=self.protocol, seed=self.seed)
+        return within_reach(self.effects, self.protocol, self.seed)
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,21 @@ def _pair(rng: np.random.Generator) -> tuple[str, str]:
         shared = set(protocols_of(one)) & set(protocols_of(other))
         if shared and EFFECTS[one].family != EFFECTS[other].family:
             return one, other
+
+
+def within_reach(effects: dict[str, float], protocol: str, seed: int, **given: Any) -> HiddenCase:
+    """`hide`, with a strength halved that the effect cannot have on this unit and protocol.
+
+    At its strongest an effect drives the sensor into its rails, or is a parameter that no unit has.
+    """
+    case = hide(effects, protocol=protocol, seed=seed, **given)
+    for _ in range(MOST_HALVINGS):
+        beyond = {effect.name for effect in case.effects if any(word in effect.note for word in BEYOND)}
+        if not beyond:
+            break
+        effects = {name: percent / 2 if name in beyond else percent for name, percent in effects.items()}
+        case = hide(effects, protocol=protocol, seed=seed, **given)
+    return case
 
 
 def run(case: Drawn) -> Row:

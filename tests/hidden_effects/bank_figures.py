@@ -51,6 +51,8 @@ class Figure:
             return "" if value is None else f"{value:.4g} {self.unit}".strip()
 
         reached = f"{self.value:.3g} {self.unit}".strip() if self.count else "-"
+        if np.isinf(self.value):
+            reached = f"above {GRID_PERCENT[-1]:g} {self.unit}"
         return self.name, said(self.floor), said(self.reach), f"{reached} (of {self.count})"
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
-from bank import GRID_PERCENT, INSIDE, PHYSICAL, PLAIN, drawn, protocols_of, strongest
+from bank import GRID_PERCENT, INSIDE, PHYSICAL, PLAIN, drawn, protocols_of, strongest, within_reach
 from bank_scoring import Score, score
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
@@ -44,12 +44,8 @@ class Asked:
         return f"{self.name} {self.percent:.2f} %, {self.protocol}, noise {self.noise_percent:.2f} %, seed {self.seed}"
 
     def case(self) -> HiddenCase:
-        return hide(
-            {self.name: self.percent},
-            protocol=self.protocol,
-            noise_percent_fs=self.noise_percent,
-            seed=self.seed,
-            recordings=2,
+        return within_reach(
+            {self.name: self.percent}, self.protocol, self.seed, noise_percent_fs=self.noise_percent, recordings=2
         )
 
 
