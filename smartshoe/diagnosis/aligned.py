@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.integrity import Integrity
+from smartshoe.diagnosis.session import lowest, resting_reading
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-REST_QUANTILE = 0.05  # of the load: what counts as unloaded
 SAME_LAG = 0.25
 SMALL_LAG_S = 0.2
 BEGIN_TOGETHER = 0.4  # of the lag in the middle: what the lag at the start may be, where it is all drift
@@ -96,8 +96,8 @@ def _turned_and_zeroed(recording: Recording, usable: Mask) -> tuple[Recording, s
         return recording, ""
     values, load = sensor.values[usable], load_n[usable]
     span = float(np.percentile(values, 99) - np.percentile(values, 1))
-    low = load <= np.quantile(load, REST_QUANTILE)
-    rest = float(np.median(values[low]))
+    low = lowest(load)
+    rest = resting_reading(values, load)
     unloads = float(np.median(np.abs(load[low]))) < UNLOADED * float(np.percentile(np.abs(load), 99.9))
     falls = float(np.corrcoef(values, load)[0, 1]) < -0.5 if span > 0 else False
     foreign = unloads and (sensor.unit.quantity != "pressure" or abs(rest) > FOREIGN_ZERO * span)

@@ -39,6 +39,7 @@ NEIGHBOURING = (
     frozenset({"hysteresis", "asymmetry", "rate"}),
     frozenset({"softening", "gain_drift"}),
     frozenset({"relaxation", "gas_heat", "timing"}),
+    frozenset({"rate", "timing"}),
     frozenset({"leak", "zero"}),
     frozenset({"static_curve", "dead_band"}),
 )
@@ -443,8 +444,9 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, words: Board, name: str)
 
 def _is_shape_error(name: str, sizes: dict[str, float]) -> bool:
     """Whether an effect is small beside one whose equation, a little wrong, leaves just such a thing behind."""
-    group = next((group for group in NEIGHBOURING if effect(name).family in group), frozenset())
-    near = [size for other, size in sizes.items() if other != name and effect(other).family in group]
+    family = effect(name).family
+    like = {one for group in NEIGHBOURING if family in group for one in group}
+    near = [size for other, size in sizes.items() if other != name and effect(other).family in like]
     return bool(near) and sizes[name] < SHAPE_OF_NEIGHBOUR * max(near)
 
 

@@ -33,6 +33,8 @@ CYCLE_SHARE = 0.08
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
 REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
+LOWEST_SHARE = 0.02
+FEWEST_AT_REST = 10
 REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
 
 
@@ -84,13 +86,29 @@ def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask]) -> Scale
     for recording, mask in zip(recordings, usable, strict=True):
         values = recording.sensor.in_unit(unit)[mask]
         if values.size:
-            low = float(np.median(values[recording.force_n[mask] <= np.quantile(recording.force_n, 0.05)]))
-            spans.append(float(np.percentile(np.abs(values - low), 99.9)))
+            rest = resting_reading(values, recording.force_n[mask])
+            spans.append(float(np.percentile(np.abs(values - rest), 99.9)))
     if load <= 0 or not spans or max(spans) <= 0:
         raise NotIdentifiableError(
             f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
         )
     return Scale(load, max(spans), unit)
+
+
+def lowest(load_n: Array) -> Mask:
+    """(n,) samples at the lowest load, within a fiftieth of its span."""
+    low, high = float(np.percentile(load_n, 0.1)), float(np.percentile(load_n, 99.9))
+    return np.asarray(load_n <= low + LOWEST_SHARE * (high - low))
+
+
+def resting_reading(values: Array, load_n: Array) -> float:
+    """The reading (n,) before the unit is first loaded; where that was not recorded, its median at the lowest load.
+
+    A unit that relaxes slowly goes on reading pressure for minutes after it was unloaded.
+    """
+    low = lowest(load_n)
+    before = int(np.argmin(low)) if not low.all() else low.size
+    return float(np.median(values[:before] if before >= FEWEST_AT_REST else values[low]))
 
 
 def thinning(recordings: Sequence[Recording], scale: Scale) -> int:

@@ -27,12 +27,21 @@ def of_family(diagnosis: Diagnosis, family: str) -> Cause:
 
 
 @pytest.mark.parametrize(
-    ("name", "protocol", "seed"),
-    [("delay", "rates", 1_000_001), ("sensor_lag", "rates", 1_000_002), ("sensor_lag", "single_rate", 1_000_003)],
+    ("name", "percent", "protocol", "seed"),
+    [
+        ("delay", 0.1, "rates", 1_000_001),
+        ("sensor_lag", 0.3, "rates", 1_000_002),
+    ],
 )
-def test_an_ambiguous_pair_becomes_certain_after_the_proposed_experiment(name, protocol, seed):
+def test_an_ambiguous_pair_becomes_certain_after_the_proposed_experiment(name, percent, protocol, seed):
     case = hide(
-        {name: 0.1}, protocol=protocol, seed=seed, nuisances=0, noise_percent_fs=0.3, coloured_share=0.2, recordings=1
+        {name: percent},
+        protocol=protocol,
+        seed=seed,
+        nuisances=0,
+        noise_percent_fs=0.3,
+        coloured_share=0.2,
+        recordings=1,
     )
     first = diagnose(case.recordings, case.hold_out)
     doubtful = of_family(first, "timing")
