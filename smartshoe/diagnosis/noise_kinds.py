@@ -20,11 +20,12 @@ IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_s
 
 
 def noise_kinds(
-    fine: Sequence[Session], model: ExtendedModel, known: Sequence[DataFault], explained: bool
+    fine: Sequence[Session], model: ExtendedModel, known: Sequence[DataFault], explained: bool, material: float
 ) -> list[DataFault]:
     """What the residual at the full rate shows, for recordings in which no fault of the data would imitate it.
 
-    Where structure is left that no effect has ``explained``, it would be taken for coloured noise.
+    Where structure is left that no effect has ``explained``, it would be taken for coloured noise. Nothing weaker than
+    ``material`` (share of full scale) is told.
     """
     found = []
     for session in fine:
@@ -38,7 +39,7 @@ def noise_kinds(
             if kind in faults or (kind == "coloured_noise" and not explained):
                 continue
             one = evidence(residual, conditions, prediction, conditions.step_s)
-            if one is not None:
+            if one is not None and one.strength >= material:
                 start_s = float(session.recording.time_s[0])
                 stop_s = start_s + float(conditions.time_s[-1])
                 found.append(

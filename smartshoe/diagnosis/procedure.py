@@ -149,7 +149,7 @@ def _diagnosed(
     noise_variance = max(best.rmse**2 - last.rms**2, 0.0)
     wrong = float(np.sqrt(max(baseline.rmse**2 - noise_variance, 0.0)))
     # Structure that no effect explains would be taken for coloured noise.
-    noise = noise_kinds(fine, extended, integrity.faults, verdict in ("adequate", "explained"))
+    noise = noise_kinds(fine, extended, integrity.faults, verdict in ("adequate", "explained"), material)
     named = [cause.name for cause in causes]
     fitted_to = choice.baseline if verdict == "unexplained" else choice.fit
     parameters, covariance = joint_parameters(fitted_to, scale)
