@@ -57,7 +57,7 @@ ARM_SHARE, ARM_RATES_PER_S = 0.08, np.geomspace(0.03, 10.0, 7)
 SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
 SECOND_OF_FAMILY = 0.05  # of what the first one moves the reading by
-CANCELLING_OTHERS = 12.0
+CANCELLING_OTHERS = 25.0
 CANCELLING = 4.0  # times what an addition takes off the error: what it may move the reading by
 
 

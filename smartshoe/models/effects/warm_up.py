@@ -22,10 +22,10 @@ class WarmUp(Effect):
     says = "the reading's zero moves once after the start and settles, loaded or not"
     parameters = (
         EffectParameter("change", "FS_reading", "change of the zero once settled", 0.0, -0.5, 0.5, 0.01),
-        EffectParameter("time_constant", "s", "mean time of settling", None, 5.0, 2000.0, 60.0),
+        EffectParameter("time_constant", "s", "mean time of settling", None, 5.0, 300.0, 60.0),
         EffectParameter("stretch", "1", "exponent of the settling, 1 for a single time constant", None, 0.6, 1.4, 0.2),
     )
-    shapes = tuple({"time_constant": tau, "stretch": 1.0} for tau in (10.0, 30.0, 100.0, 300.0))
+    shapes = tuple({"time_constant": tau, "stretch": 1.0} for tau in (10.0, 30.0, 100.0, 250.0))
     exposed_by = frozenset({"rests", "idle"})
     separated_by = {"zero_drift": "idle", "linear_leak": "idle", "permanent_set": "pauses", "zero_offset": "idle"}
 
