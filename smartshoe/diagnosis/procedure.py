@@ -37,9 +37,7 @@ REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read
 COMMANDED_REST_SD = 1.2e-4  # the same where the machine was told to be at zero
 PLAIN_GAIN_PERCENT = 5.0  # a gain that needs no interval to be seen
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
-LEAST_FIT_PERCENT = 70.0  # of the best model on held-out data: below it a name means nothing
-LEAST_BASELINE_FIT_PERCENT = 40.0  # below it what must be added is larger than the model, and has to fit as
-PLAIN_FIT_PERCENT = 97.0  # this, to be believed
+FIT_PERCENT_NEEDED = ((15.0, 35.0, 45.0), (97.0, 88.0, 70.0))  # of the best model, by the baseline's own fit
 NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
 LEFT_OF_EXPLAINED = 0.12  # of the structure that was there: less than this left over is a matter of equations' shape
 
@@ -137,9 +135,9 @@ def _diagnosed(
     # What is left of a delay after the clocks were put right is an error of the putting right.
     causes = [one for one in causes if _stands(one) and not (moved and one.effect.family == "timing")]
     causes, verdict = _judged(causes, before, after, material)
-    follows = best.fit_percent >= LEAST_FIT_PERCENT and (
-        baseline.fit_percent >= LEAST_BASELINE_FIT_PERCENT or best.fit_percent >= PLAIN_FIT_PERCENT
-    )
+    # The less the baseline follows, the better must be what follows.
+    needed = np.interp(baseline.fit_percent, *FIT_PERCENT_NEEDED)
+    follows = best.fit_percent >= needed
     if not follows or (ranges.is_trap and causes):
         causes, verdict = [], "unexplained"
     extended, after_all, last = choice.fit.model, best, after

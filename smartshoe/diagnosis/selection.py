@@ -39,7 +39,7 @@ NEIGHBOURING = (
     frozenset({"hysteresis", "asymmetry", "rate"}),
     frozenset({"softening", "gain_drift"}),
     frozenset({"relaxation", "gas_heat", "timing"}),
-    frozenset({"rate", "timing"}),
+    frozenset({"rate", "asymmetry", "hysteresis", "timing"}),
     frozenset({"leak", "zero"}),
     frozenset({"static_curve", "dead_band"}),
 )

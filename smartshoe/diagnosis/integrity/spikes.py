@@ -12,7 +12,7 @@ from smartshoe.diagnosis.integrity.view import Signal, View
 
 NOISES = 6.5  # the largest of 1e6 normal deviates reaches 5.1 of this scale
 STEPS = 2.0  # of a lattice
-CORNERS = 1.5  # of what the other channel's corner explains
+CORNERS = 4.0  # of what the other channel's corner explains
 LEAST_SHARE = 0.0005  # of the span
 
 
