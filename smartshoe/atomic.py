@@ -1,12 +1,13 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, and JSON without NaN."""
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from smartshoe.errors import UsageError
 
@@ -46,6 +47,13 @@ def write_text(path: Path | str, text: str) -> None:
     """Write ``text`` as UTF-8 to ``path``, whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def json_text(result: Mapping[str, Any]) -> str:
+    """The result as JSON text; NaN and infinity are an error, never written."""
+    import json
+
+    return json.dumps(result, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def make_folder(path: Path | str) -> Path:

@@ -70,10 +70,9 @@ def command(
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
-            from smartshoe.cli.output import to_json
             from smartshoe.report.diagnosis.folder import publish_diagnosis
 
-            written = publish_diagnosis(folder, found, title, _facts(recordings, others), to_json(found.to_dict()))
+            written = publish_diagnosis(folder, found, title, _facts(recordings, others))
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, recordings, unit)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,13 +9,8 @@ from typing import Any
 
 import click
 
-from smartshoe.atomic import write_text
+from smartshoe.atomic import json_text, write_text
 from smartshoe.recording import Recording
-
-
-def to_json(result: dict[str, Any]) -> str:
-    """The result as JSON text; NaN and infinity are an error, never written."""
-    return json.dumps(result, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def emit_json(result: dict[str, Any], path: str | None) -> bool:
@@ -24,9 +18,9 @@ def emit_json(result: dict[str, Any], path: str | None) -> bool:
     if path is None:
         return False
     if path == "-":
-        click.echo(to_json(result), nl=False)
+        click.echo(json_text(result), nl=False)
         return True
-    write_text(path, to_json(result))
+    write_text(path, json_text(result))
     return False
 
 

@@ -15,8 +15,8 @@ def command(scenario: str, seed: int | None, out_folder: str | None, json_path: 
     from smartshoe.kernels import warm_up
 
     warm_up.begin()
-    from smartshoe.atomic import make_folder
-    from smartshoe.cli.output import emit_json, progress, to_json
+    from smartshoe.atomic import json_text, make_folder
+    from smartshoe.cli.output import emit_json, progress
     from smartshoe.report.tables import print_summary
     from smartshoe.scenario import load, run
     from smartshoe.scenario.publish import publish
@@ -31,7 +31,7 @@ def command(scenario: str, seed: int | None, out_folder: str | None, json_path: 
         report = None
         if folder is not None:
             step("writing the report")
-            report = publish(result, folder, to_json(whole))
+            report = publish(result, folder, json_text(whole))
     if not emit_json(whole, json_path):
         print_summary(whole["units"])
         if report is not None:

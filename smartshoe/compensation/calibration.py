@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.atomic import write_text
+from smartshoe.atomic import json_text, write_text
 from smartshoe.compensation.compensator import Compensator
 from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.compensation.filter import Array, ForceFilter
@@ -131,7 +130,7 @@ class Calibration:
 
     def save(self, path: Path | str) -> None:
         """Write the calibration as JSON, whole or not at all."""
-        write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+        write_text(path, json_text(self.to_dict()))
 
     @classmethod
     def load(cls, path: Path | str) -> Calibration:

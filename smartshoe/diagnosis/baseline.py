@@ -27,11 +27,6 @@ LEAST_SHARE = 1e-3  # of the load that relaxes: below it the pole means nothing
 Timing = tuple[str, tuple[float, ...]]
 
 
-def global_baseline(sessions: Sequence[Session], scale: Scale, timing: Timing | None = None) -> ExtendedModel:
-    """The model that `searched` finds."""
-    return searched(sessions, scale, timing)[1]
-
-
 def start_of(sessions: Sequence[Session], scale: Scale, known: Timing | None = None) -> ExtendedModel:
     """The baseline from which effects are looked for; with a delay or lag where its arm would else play one.
 

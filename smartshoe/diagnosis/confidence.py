@@ -1,4 +1,4 @@
-"""How sure a name is: what the data cannot separate, and a probability calibrated on a simulated bank."""
+"""How sure a name is: what the data cannot separate, and a probability whose calibration a simulated bank measures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from smartshoe.diagnosis.result import Rival
 
 SEPARATED = 6.0  # difference of -2 log likelihood under which another effect does as well
 
-# Logistic regression of "the name was right" on the log of the margin and of the fall: docs/diagnosis.md says on what.
+# Log odds of "the name was right" over the logs of the margin and of the fall. Chosen by hand, not fitted: the bank
+# (docs/diagnosis.md) tells how far they are off.
 INTERCEPT, PER_LOG_MARGIN, PER_LOG_FALL = -1.0, 0.8, 0.3
 
 
@@ -18,7 +19,7 @@ def inseparable(rivals: Sequence[Rival]) -> tuple[str, ...]:
     return tuple(rival.effect for rival in rivals if rival.margin < SEPARATED)
 
 
-def confidence(rivals: Sequence[Rival], fall: float, size: float) -> float:
+def confidence(rivals: Sequence[Rival], fall: float) -> float:
     """Probability that the name is right."""
     margin = min((rival.margin for rival in rivals), default=fall)
     score = INTERCEPT + PER_LOG_MARGIN * log(max(margin, 1.0)) + PER_LOG_FALL * log(max(fall, 1.0))

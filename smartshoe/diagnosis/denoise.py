@@ -25,9 +25,8 @@ def noise_sd(signal: Array) -> float:
     return float(np.median(np.abs(np.diff(signal, 3))) / (0.6745 * np.sqrt(20.0)))
 
 
-def without_noise(load: Array, step_s: float) -> tuple[Array, float]:
-    """The load (n,) from lines through its neighbourhood, and the standard deviation of the noise that is left."""
-    sd = noise_sd(load)
+def without_noise(load: Array, step_s: float, sd: float) -> tuple[Array, float]:
+    """The load (n,) from lines through its neighbourhood, and what is left of its noise's standard deviation ``sd``."""
     if sd == 0.0 or load.size < 4 * FEWEST:
         return load, sd
     best = load.copy()

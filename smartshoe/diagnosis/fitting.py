@@ -15,6 +15,7 @@ from smartshoe.models.effects import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 MOST_STEPS = 12
 SETTLED = 0.05  # fall of -2 log likelihood that ends a fit
@@ -30,7 +31,6 @@ class Fit:
     model: ExtendedModel
     cost: float
     covariance: Array
-    rows: int
 
     def sd(self, k: int) -> float:
         """Standard deviation of parameter k."""
@@ -62,19 +62,37 @@ class Evidence:
         """The sessions that a fit looks at."""
         return tuple(session for session in self.sessions if session.fitted.any())
 
+    @cached_property
+    def judged(self) -> tuple[Session, ...]:
+        """The sessions of which something was held out."""
+        return tuple(session for session in self.sessions if session.judged.any())
+
     def residuals(self, model: ExtendedModel) -> list[Array]:
         """Reading less simulation, a session each, in shares of full scale."""
         return [session.reading - model.simulate(session.conditions) for session in self.sessions]
 
     def cost(self, model: ExtendedModel) -> float:
         """Sum of whitened squares over what is fitted."""
-        total = 0.0
-        for session in self.fitted:
-            residual = session.reading - model.simulate(session.conditions)
-            white = self.noise.whitened(residual)[self.noise.counted(session.fitted)]
-            total += float(white @ white)
         rest = self._rest(model)
-        return total + float(rest @ rest)
+        return sum(self._white_square(model, one, one.fitted) for one in self.fitted) + float(rest @ rest)
+
+    def held_out_cost(self, model: ExtendedModel) -> float:
+        """Sum of whitened squares over what was held out."""
+        return sum(self._white_square(model, one, one.judged) for one in self.judged)
+
+    def held_out_square(self, model: ExtendedModel) -> float:
+        """Mean squared error over what was held out, as it is."""
+        total, count = 0.0, 0
+        for session in self.judged:
+            left = (session.reading - model.simulate(session.conditions))[session.judged]
+            total += float(left @ left)
+            count += left.size
+        return total / max(count, 1)
+
+    def _white_square(self, model: ExtendedModel, session: Session, kept: Mask) -> float:
+        residual = session.reading - model.simulate(session.conditions)
+        white = self.noise.whitened(residual)[self.noise.counted(kept)]
+        return float(white @ white)
 
     def displacement_cost(self, model: ExtendedModel) -> float:
         """What the crosshead's displacement says against a model, on the scale of -2 log likelihood.
@@ -137,11 +155,9 @@ def fit(evidence: Evidence, start: ExtendedModel, steps: int = MOST_STEPS, settl
     residual, slopes = evidence.rows(model)
     cost = float(residual @ residual)
     damping = 1e-4
-    scale = np.ones(len(parameters))
     for _ in range(steps):
         theta = model.theta
-        scale = np.where(logarithmic, theta, 1.0)
-        J = slopes * scale
+        J = slopes * np.where(logarithmic, theta, 1.0)
         normal, right = J.T @ J, J.T @ residual
         best: tuple[float, ExtendedModel] | None = None
         for _ in range(6):
@@ -163,7 +179,7 @@ def fit(evidence: Evidence, start: ExtendedModel, steps: int = MOST_STEPS, settl
         residual, slopes = evidence.rows(model)
         if fell < settled:
             break
-    return Fit(model, cost, _covariance(slopes), residual.size)
+    return Fit(model, cost, _covariance(slopes))
 
 
 def _is_logarithmic(parameter: EffectParameter) -> bool:

@@ -13,7 +13,6 @@ from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.result import Cause, NextExperiment
 from smartshoe.diagnosis.selection import Choice
 from smartshoe.diagnosis.session import Session
-from smartshoe.diagnosis.traits import Traits
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.protocol import Protocol
 
@@ -26,9 +25,7 @@ CHANNELS = {
 }
 
 
-def next_experiment(
-    choice: Choice, causes: Sequence[Cause], traits: Traits, sessions: Sequence[Session]
-) -> NextExperiment | None:
+def next_experiment(choice: Choice, causes: Sequence[Cause], sessions: Sequence[Session]) -> NextExperiment | None:
     """For the most doubtful cause: the protocol with the largest expected margin, or the channel to log.
 
     None where every cause is told from its rivals with ease.

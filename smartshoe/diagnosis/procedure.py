@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from smartshoe.blas import on_one_thread
 from smartshoe.diagnosis.aligned import common_delay_s, common_drift, put_right
 from smartshoe.diagnosis.baseline import start_of
-from smartshoe.diagnosis.confidence import confidence, inseparable
+from smartshoe.diagnosis.confidence import SEPARATED, confidence, inseparable
 from smartshoe.diagnosis.course import course_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.diagnosis.force import force_rmse_n
@@ -22,7 +22,7 @@ from smartshoe.diagnosis.noise_kinds import noise_kinds
 from smartshoe.diagnosis.parameters import joint_parameters, parameters_of
 from smartshoe.diagnosis.ranges import ranges_of
 from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
-from smartshoe.diagnosis.selection import MATERIAL, Choice, choose, penalty
+from smartshoe.diagnosis.selection import MATERIAL, Choice, Progress, choose, penalty
 from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
 from smartshoe.diagnosis.traits import Traits, traits_of
 from smartshoe.errors import UsageError
@@ -31,7 +31,6 @@ from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
-Progress = Callable[[str], None]
 
 REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
 COMMANDED_REST_SD = 1.2e-4  # the same where the machine was told to be at zero
@@ -140,20 +139,21 @@ def _diagnosed(
     follows = best.fit_percent >= needed
     if not follows or (ranges.is_trap and causes):
         causes, verdict = [], "unexplained"
-    extended, after_all, last = choice.fit.model, best, after
-    if verdict == "unexplained":
-        extended, after, after_all = choice.baseline.model, before, baseline
     # What the best model leaves is noise but for the structure in it.
-    noise_variance = max(best.rmse**2 - last.rms**2, 0.0)
+    noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
+    # Without a name nothing is added: the baseline stays.
+    fitted, left, extended_errors = choice.fit, after, best
+    if verdict == "unexplained":
+        fitted, left, extended_errors = choice.baseline, before, baseline
+    extended = fitted.model
     wrong = float(np.sqrt(max(baseline.rmse**2 - noise_variance, 0.0)))
     # Structure that no effect explains would be taken for coloured noise.
     noise = noise_kinds(fine, extended, integrity.faults, verdict in ("adequate", "explained"), material)
     named = [cause.name for cause in causes]
-    fitted_to = choice.baseline if verdict == "unexplained" else choice.fit
-    parameters, covariance = joint_parameters(fitted_to, scale)
+    parameters, covariance = joint_parameters(fitted, scale)
     return Diagnosis(
         verdict,
-        _sentence(verdict, causes, wrong, after.rms),
+        _sentence(verdict, causes, wrong, left.rms),
         scale.unit.symbol,
         scale.load_n,
         scale.reading,
@@ -161,19 +161,19 @@ def _diagnosed(
         minor=tuple(name for name in extended.names if name not in named),
         data_faults=(*integrity.faults, *noise),
         baseline=_standing(baseline, choice.baseline.model, before, fine, scale),
-        extended=_standing(after_all, extended, after, fine, scale),
-        gain=gain(baseline, after_all, scale),
+        extended=_standing(extended_errors, extended, left, fine, scale),
+        gain=gain(baseline, extended_errors, scale),
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
-        explained_percent=_percent_less(after_all.rmse**2, baseline.rmse**2),
+        explained_percent=_percent_less(extended_errors.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _candidates(choice),
-        next_experiment=next_experiment(choice, causes, traits, sessions),
+        next_experiment=next_experiment(choice, causes, sessions),
         limits=(
             *put,
             *ranges.says,
             *traits.limits(),
             *([] if follows else [_does_not_follow(baseline, best), *_courses(recordings)]),
         ),
-        leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
+        leftover=left.says if verdict in ("unexplained", "partly_explained") else None,
         screening=tuple((one.candidate.effect.name, float(one.fall)) for one in choice.screening.ranked),
         likeness=choice.screening.likeness,
         model=extended,
@@ -255,8 +255,6 @@ def _sentence(verdict: Verdict, causes: Sequence[Cause], wrong: float, left: flo
 
 def _candidates(choice: Choice) -> tuple[Rival, ...]:
     ranked = choice.screening.ranked[:4]
-    if not ranked:
-        return ()
     return tuple(Rival(one.candidate.effect.name, float(ranked[0].fall - one.fall)) for one in ranked)
 
 
@@ -264,10 +262,8 @@ def _cause(name: str, choice: Choice, fine: Sequence[Session], best: Errors, sca
     less = choice.without[name]
     won = gain(errors(fine, less.model), best, scale)
     rivals = tuple(Rival(one.effect, one.margin) for one in choice.rivals[name])
-    equivalents = inseparable(rivals)
-    sure = confidence(rivals, choice.falls[name], choice.sizes[name])
     one = effect(name)
-    fall, size = choice.falls[name], choice.sizes[name]
+    fall, size = choice.fall(name), choice.sizes[name]
     evidence = [
         Statement(
             "fall of -2 log likelihood",
@@ -294,7 +290,7 @@ def _cause(name: str, choice: Choice, fine: Sequence[Session], best: Errors, sca
             Statement(
                 "margin to the nearest rival",
                 nearest.margin,
-                6.0,
+                SEPARATED,
                 f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:,.0f}",
             )
         )
@@ -308,7 +304,16 @@ def _cause(name: str, choice: Choice, fine: Sequence[Session], best: Errors, sca
                 f"the data holds no {', no '.join(sorted(word.replace('_', ' ') for word in lacking))}",
             )
         )
-    return Cause(one, sure, equivalents, parameters_of(choice.fit, name, scale), tuple(evidence), won, size, rivals)
+    return Cause(
+        one,
+        confidence(rivals, fall),
+        inseparable(rivals),
+        parameters_of(choice.fit, name, scale),
+        tuple(evidence),
+        won,
+        size,
+        rivals,
+    )
 
 
 def _standing(found: Errors, model: ExtendedModel, left: Leftover, fine: Sequence[Session], scale: Scale) -> Standing:

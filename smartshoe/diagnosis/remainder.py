@@ -48,20 +48,18 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> Look:
     found, share = repeats(sessions, residuals)
     for rows in found:
         count = rows.shape[0]
-        gram = rows @ rows.T / rows.shape[1]
+        gram = rows @ rows.T / PLACES
         upper = np.triu_indices(count, 1)
         products += list(gram[upper])
         # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
         noise = rows - rows.mean(axis=0)
         scale = count / (count - 1)
-        auto = np.zeros(rows.shape[1])
+        auto = np.zeros(PLACES)
         for row in noise:
-            full = np.correlate(row, row, "full")[rows.shape[1] - 1 :]
-            auto += full / rows.shape[1]
+            auto += np.correlate(row, row, "full")[PLACES - 1 :] / PLACES
         auto *= scale / count
-        variance = (auto[0] ** 2 + 2 * np.sum((1 - np.arange(1, auto.size) / auto.size) * auto[1:] ** 2)) / rows.shape[
-            1
-        ]
+        fewer = 1 - np.arange(1, auto.size) / auto.size
+        variance = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
         spreads += [variance] * upper[0].size
     if not products:
         return Look(0.0, 0.0, 0)

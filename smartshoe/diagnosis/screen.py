@@ -120,8 +120,7 @@ class Screening:
     """The best shape of each effect, by fall of the whitened cost; ``likeness`` (effects, effects) in that order.
 
     ``total`` is the squared error that is there to be explained: where parts are gone, what they themselves explain.
-    Likeness is the largest canonical correlation of
-    two effects' sensitivities after the model's own parameters are
+    Likeness is the largest canonical correlation of two effects' sensitivities after the model's own parameters are
     projected out: near one, this data cannot tell them apart (to first order).
     """
 
@@ -155,8 +154,8 @@ class Board:
         white, raw = self._projected(self.white, gone), self._projected(self.raw, gone)
         best: dict[str, Screened] = {}
         for candidate in self.words.candidates:
-            strengths, fall = _explained(candidate, white[0], white[1:])
-            _, raw_fall = _explained(candidate, raw[0], raw[1:])
+            strengths, fall = _explained(candidate, white[0], white[1])
+            _, raw_fall = _explained(candidate, raw[0], raw[1])
             one = Screened(candidate, strengths, fall, raw_fall / max(raw[2], 1e-300))
             name = candidate.effect.name
             if name not in best or max(one.fall, 0.0) > best[name].fall:
@@ -212,9 +211,9 @@ def screen(words: Dictionary, noise: NoiseModel) -> Screening:
     return board(words, noise).screen()
 
 
-def _explained(candidate: Candidate, gram: Array, fit: Sequence[Array | float]) -> tuple[Array, float]:
+def _explained(candidate: Candidate, gram: Array, products: Array) -> tuple[Array, float]:
     """Strengths (k,) within their signs, and the fall of the squared error."""
-    part, product = gram[candidate.columns, candidate.columns], np.asarray(fit[0])[candidate.columns]
+    part, product = gram[candidate.columns, candidate.columns], products[candidate.columns]
     signs = [(p.lower >= p.null, p.upper <= p.null) for p in candidate.effect.parameters if p.null is not None]
     free = np.diag(part) > 0
     found = np.zeros(product.size)

@@ -45,9 +45,8 @@ NEIGHBOURING = (
 )
 SHAPE_OF_NEIGHBOUR = 0.1
 NAMED_OF_LARGEST = 0.05
-LEAST_OF_LARGEST = (
-    0.02  # no equation is exact: what is smaller than this beside another effect may be its error of shape
-)
+# No equation is exact: what is smaller than this beside another effect may be its error of shape.
+LEAST_OF_LARGEST = 0.02
 SHAPE_ERROR = 0.05
 TIMING_SHAPE_ERROR = 0.1
 UNSEEN_SHAPE_ERROR = 0.3  # the same within one sample of the log
@@ -72,10 +71,10 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """What was chosen. ``parts`` are all effects in the model; ``rivals`` of each, nearest first.
+    """What was chosen: ``rivals`` of each effect in the model, nearest first, and the best fit ``without`` each.
 
-    ``without``: the best fit without each effect; ``sizes``: what the reading moves by when it is taken out and the
-    rest is fitted anew. ``screening`` is that of the baseline.
+    ``sizes``, of those that are causes: what the reading moves by when one is taken out and the rest is fitted anew.
+    ``screening`` is that of the baseline.
     """
 
     fit: Fit
@@ -85,7 +84,10 @@ class Choice:
     rivals: dict[str, tuple[Rival, ...]]
     without: dict[str, Fit]
     sizes: dict[str, float]
-    falls: dict[str, float]
+
+    def fall(self, name: str) -> float:
+        """How much worse -2 log likelihood is without an effect."""
+        return self.without[name].cost - self.fit.cost
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -101,15 +103,6 @@ def visible(evidence: Evidence, one: ExtendedModel, other: ExtendedModel) -> flo
         total += float(moved @ moved)
         count += moved.size
     return float(np.sqrt(total / max(count, 1)))
-
-
-def held_out_cost(evidence: Evidence, model: ExtendedModel) -> float:
-    """Whitened squares over what was held out."""
-    total = 0.0
-    for session, residual in zip(evidence.sessions, evidence.residuals(model), strict=True):
-        white = evidence.noise.whitened(residual)[evidence.noise.counted(session.judged)]
-        total += float(white @ white)
-    return total
 
 
 def margin(evidence: Evidence, one: Fit, other: Fit, less: Fit) -> float:
@@ -140,16 +133,6 @@ def part_of(model: ExtendedModel, name: str) -> Part:
     return next(part for part in model.parts if part.name == name)
 
 
-def held_out_square(evidence: Evidence, model: ExtendedModel) -> float:
-    """Mean squared error over what was held out, as it is."""
-    total, count = 0.0, 0
-    for session, residual in zip(evidence.sessions, evidence.residuals(model), strict=True):
-        left = residual[session.judged]
-        total += float(left @ left)
-        count += left.size
-    return total / max(count, 1)
-
-
 def penalty(name: str) -> float:
     """What -2 log likelihood must fall by for an effect to be taken in."""
     live = [p for p in catalogue()[name].parameters if not p.unit.endswith("/K")]
@@ -172,11 +155,7 @@ def choose(
     words = dictionary(start, evidence.fitted)
     evidence = replace(evidence, noise=noise_of(words))
     current = _restarted(evidence, fit(evidence, start))
-    baseline = start
-    for name in start.names:
-        baseline = baseline.without(name)
     screening: Screening | None = None
-    settled: Settled | None = None
     seen: set[frozenset[str]] = set()
     while True:
         words = dictionary(current.model, evidence.fitted)
@@ -189,22 +168,25 @@ def choose(
         added = _added(evidence, current, looked, progress)
         if added is None:
             break
-        settled = _settled(evidence, added, seen, progress)
-        current = settled.fit
+        current = _settled(evidence, added, seen, progress).fit
         names = frozenset(current.model.names)
         if names in seen:  # it goes in circles: what is here is as good as what was before
             break
         seen.add(names)
     settled = _settled(evidence, current, set(), progress)
-    return _concluded(evidence, settled, fit(evidence, baseline), screening, material)
+    return _concluded(evidence, settled, fit(evidence, replace(start, parts=())), screening, material)
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A fit of which no part is needless and none is better replaced; the fits without each part, and the rivals."""
+    """A fit of which no part is needless and none is better replaced; the fits without each part, and the rivals.
+
+    ``sizes``: what the reading moves by without each part, the rest fitted anew.
+    """
 
     fit: Fit
     without: dict[str, Fit]
+    sizes: dict[str, float]
     rivals: dict[str, tuple[Rival, ...]]
 
 
@@ -269,7 +251,7 @@ def _refusal(evidence: Evidence, current: Fit, attempt: Fit) -> str | None:
     size = visible(evidence, attempt.model, current.model)
     if size < SLIGHT:
         return f"slight ({100 * size:.3f} % of full scale)"
-    if held_out_cost(evidence, attempt.model) >= held_out_cost(evidence, current.model):
+    if evidence.held_out_cost(attempt.model) >= evidence.held_out_cost(current.model):
         return "no gain on held-out data"
     added = attempt.model.parts[-1]
     alone = visible(evidence, attempt.model, attempt.model.without(added.name))
@@ -291,7 +273,8 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
     merged: str | None = None
     while True:
         without = {name: _fit_without(evidence, current.model, name) for name in current.model.names}
-        name = _needless(evidence, current, without)
+        sizes = {name: visible(evidence, less.model, current.model) for name, less in without.items()}
+        name = _needless(evidence, current, without, sizes)
         if name is not None and name == merged and best is not None:
             return best  # the merger was no gain
         if name is not None:
@@ -301,7 +284,7 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
         tried.add(frozenset(current.model.names))
         words = _board(evidence, current, without)
         rivals = {name: tuple(_swaps(evidence, current, less, words, name)) for name, less in without.items()}
-        here = Settled(current, without, rivals)
+        here = Settled(current, without, sizes, rivals)
         if best is None or merged is not None or _score(evidence, current) < _score(evidence, best.fit):
             best, merged = here, None
         following = _better(evidence, here, tried)
@@ -349,7 +332,7 @@ def _better(evidence: Evidence, here: Settled, tried: set[frozenset[str]]) -> Fi
         if name not in evidence.kept or effect(rival.effect).family == effect(name).family
     ]
     for _, one, less in sorted(found, key=lambda entry: entry[0]):
-        gains = held_out_square(evidence, one.model) < held_out_square(evidence, less.model)
+        gains = evidence.held_out_square(one.model) < evidence.held_out_square(less.model)
         if gains and visible(evidence, one.model, less.model) >= HALF_MATERIAL:
             return one
         tried.add(frozenset(one.model.names))
@@ -366,11 +349,11 @@ def _merged(
         worth = [one for one in _newcomers(looked, current, pair) if one.fall >= WORTH_A_MERGER * looked.total]
         if not worth:
             continue
-        less = fit(evidence, current.model.without(pair[0]).without(pair[1]), QUICK_STEPS)
+        rest = current.model.without(pair[0]).without(pair[1])
+        less = fit(evidence, rest, QUICK_STEPS)
         whole = less.cost - current.cost
         saved = penalty(pair[0]) + penalty(pair[1]) + MERGED_SHAPE_ERROR**2 * whole
-        as_it_is = replace(less, model=current.model.without(pair[0]).without(pair[1]))
-        for one in _raced(evidence, as_it_is, worth[:BEST_SWAPS]):
+        for one in _raced(evidence, replace(less, model=rest), worth[:BEST_SWAPS]):
             worse = one.cost - current.cost + penalty(one.model.names[-1])
             if worse < saved and frozenset(one.model.names) not in tried:
                 return one
@@ -399,10 +382,9 @@ def _newcomers(looked: Screening, current: Fit, gone: Sequence[str]) -> list[Scr
     ]
 
 
-def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> str | None:
+def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit], sizes: dict[str, float]) -> str | None:
     """The effect that is missed least, if too little: by the likelihood, or by what the reading moves."""
-    sizes = {name: visible(evidence, less.model, current.model) for name, less in without.items()}
-    judged = held_out_square(evidence, current.model)
+    judged = evidence.held_out_square(current.model)
     missed = {
         name: less.cost - current.cost
         for name, less in without.items()
@@ -410,7 +392,7 @@ def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> str 
         and (
             less.cost - current.cost < penalty(name)
             or sizes[name] < _least_size(name, sizes)
-            or held_out_square(evidence, less.model) <= judged
+            or evidence.held_out_square(less.model) <= judged
         )
     }
     return min(missed, key=lambda name: missed[name] - penalty(name)) if missed else None
@@ -430,10 +412,10 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, words: Board, name: str)
     whole = less.cost - current.cost
     near = [one for one in others if one.fall >= WORTH_A_SWAP * looked.total][:BEST_SWAPS]
     # Everything else is where it was: fitted anew it would have moved to take the missing effect's place.
-    raced = _raced(evidence, replace(less, model=current.model.without(name)), near)
-    own = replace(
-        current, model=current.model.without(name).with_part(effect(name), part_of(current.model, name).values)
-    )
+    rest = current.model.without(name)
+    raced = _raced(evidence, replace(less, model=rest), near)
+    part = part_of(current.model, name)
+    own = replace(current, model=rest.with_part(part.effect, part.values))
     rivals = [Rival(one.model.names[-1], float(margin(evidence, one, own, less)), one) for one in raced]
     rivals.sort(key=lambda rival: rival.margin)
     far = [one for one in others[:BEST_SWAPS] if one not in near]
@@ -451,9 +433,7 @@ def _is_shape_error(name: str, sizes: dict[str, float]) -> bool:
 
 
 def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:
-    current = settled.fit
-    sizes = {name: visible(evidence, less.model, current.model) for name, less in settled.without.items()}
+    sizes = settled.sizes
     least = max(material, NAMED_OF_LARGEST * max(sizes.values(), default=0.0))
     named = {name: size for name, size in sizes.items() if size >= least and not _is_shape_error(name, sizes)}
-    falls = {name: less.cost - current.cost for name, less in settled.without.items()}
-    return Choice(current, baseline, evidence, screening, settled.rivals, settled.without, named, falls)
+    return Choice(settled.fit, baseline, evidence, screening, settled.rivals, settled.without, named)

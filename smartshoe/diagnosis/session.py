@@ -7,7 +7,7 @@ mostly gone; and a fit costs a fraction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.denoise import noise_sd, without_noise
+from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.errors import NotIdentifiableError
+from smartshoe.identification.experiment import bridged
 from smartshoe.loading import turning_points
 from smartshoe.models.effects import Conditions
 from smartshoe.recording import Channel, Recording
@@ -157,12 +159,10 @@ def prepare(
 
 def at_full_rate(sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale) -> list[Session]:
     """The same sessions without thinning: cycles and what is held out as they are."""
-    full = []
-    for session, mask in zip(sessions, usable, strict=True):
-        before = dict(session.conditions.before)
-        fine = _session(session.recording, session.index, mask, scale, 1, before, session)
-        full.append(fine)
-    return full
+    return [
+        _session(one.recording, one.index, mask, scale, 1, one.conditions.before, one)
+        for one, mask in zip(sessions, usable, strict=True)
+    ]
 
 
 def _session(
@@ -171,7 +171,7 @@ def _session(
     usable: Mask,
     scale: Scale,
     factor: int,
-    before: dict[str, float],
+    before: Mapping[str, float],
     like: Session | None = None,
 ) -> Session:
     time_s = recording.time_s - recording.time_s[0]
@@ -179,8 +179,8 @@ def _session(
     load_n, load_present = recording.force_n, recording.load.present
     reading = recording.sensor.in_unit(scale.unit)
     good = usable & recording.sensor.present & load_present
-    reading = _bridged(time_s, reading, good)
-    load_n = _bridged(time_s, load_n, load_present)
+    reading = bridged(time_s, reading, good)
+    load_n = bridged(time_s, load_n, load_present)
     extra = {}
     temperature = _named(recording, "temperature")
     if temperature is not None:
@@ -201,12 +201,13 @@ def _session(
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
     weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
     raw = load_n / scale.load_n
-    load, noise = without_noise(raw, step_s)
+    raw_noise = noise_sd(raw)
+    load, noise = without_noise(raw, step_s, raw_noise)
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)
     conditions = Conditions(
         time_s[::factor],
-        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, noise_sd(raw)), weights, factor),
+        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, raw_noise), weights, factor),
         step_s * factor,
         noise * float(np.sqrt(np.sum(weights**2))),
         **{name: smoothed(values, weights, factor) for name, values in extra.items()},
@@ -236,8 +237,7 @@ def _session(
 def _rests_levelled(load: Array, level: float, noise: float) -> Array:
     """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise."""
     out = load.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], load < level, [False]]).astype(np.int8)))
-    for first, last in zip(edges[0::2], edges[1::2], strict=True):
+    for first, last in zip(*runs_of(load < level), strict=True):
         part = load[first:last]
         middle = float(np.median(part))
         still = np.abs(part - middle) < REST_NOISE * noise
@@ -262,10 +262,6 @@ def smoothed(signal: Array, weights: Array, factor: int) -> Array:
     left = 2 * signal[0] - signal[half:0:-1]
     right = 2 * signal[-1] - signal[-2 : -half - 2 : -1]
     return np.convolve(np.concatenate([left, signal, right]), weights, "valid")[::factor]
-
-
-def _bridged(time_s: Array, values: Array, good: Mask) -> Array:
-    return values if good.all() or not good.any() else np.interp(time_s, time_s[good], values[good])
 
 
 def _named(recording: Recording, name: str) -> Channel | None:

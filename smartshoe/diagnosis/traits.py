@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.loading import turning_points
 
@@ -120,8 +121,8 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[int]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [int(n) for n in edges[1::2] - edges[0::2]]
+    first, last = runs_of(mask)
+    return [int(n) for n in last - first]
 
 
 def _longest(mask: NDArray[np.bool_]) -> int:

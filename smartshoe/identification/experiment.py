@@ -127,8 +127,8 @@ def prepare(
             name,
             recording.time_s - recording.time_s[0],
             steps(recording.time_s),
-            _bridged(recording.time_s, load.si, load.present),
-            _bridged(recording.time_s, sensor.in_unit(reading_unit), sensor.present),
+            bridged(recording.time_s, load.si, load.present),
+            bridged(recording.time_s, sensor.in_unit(reading_unit), sensor.present),
             kept,
             int(np.count_nonzero(~present)),
             None if command_n is None else np.array(command_n, dtype=float),
@@ -170,7 +170,7 @@ def _on_one_step(experiment: Experiment) -> Experiment:
     )
 
 
-def _bridged(time_s: Array, values: Array, present: Mask) -> Array:
+def bridged(time_s: Array, values: Array, present: Mask) -> Array:
     """A copy of ``values``, missing samples on the line between their neighbours: what the model takes for granted.
 
     A copy, since a compiled pass is compiled anew for arrays that may not be written.

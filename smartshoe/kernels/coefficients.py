@@ -7,14 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
-from smartshoe.kernels.first_order import COLUMNS, hold, inner_products, respond
+from smartshoe.kernels.first_order import COLUMNS, inner_products, respond
 from smartshoe.kernels.srivc import INSTRUMENT, REGRESSOR, TARGET, instrument_products
-
-
-@njit(cache=True)
-def hold_row(alpha, step, out):  # type: ignore[no-untyped-def]
-    """`kernels.first_order.hold` as one row (1, 6)."""
-    out[0, 0], out[0, 1], out[0, 2], out[0, 3], out[0, 4], out[0, 5] = hold(alpha, step)
 
 
 @njit(cache=True)

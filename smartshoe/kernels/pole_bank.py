@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from smartshoe.kernels.coefficients import hold_row
+from smartshoe.kernels.first_order import hold
 
 
 @njit(cache=True)
@@ -16,20 +16,17 @@ def lag_bank(u, at, poles, step, last_u, last_at, lags, out):  # type: ignore[no
     and ``lags`` what went before. A gap is one long straight line, for which the hold is exact.
     """
     count = poles.size
-    row = np.empty((1, 6))
     even, wide = np.empty((3, count)), np.empty((3, count))
     for i in range(count):
-        hold_row(poles[i], step, row)
-        even[0, i], even[1, i], even[2, i] = row[0, 0], row[0, 1], row[0, 2]
+        even[0, i], even[1, i], even[2, i] = hold(poles[i], step)[:3]
     for k in range(u.size):
         gap = at[k] - last_at
-        hold = even
+        row = even
         if gap != 1:
             for i in range(count):
-                hold_row(poles[i], gap * step, row)
-                wide[0, i], wide[1, i], wide[2, i] = row[0, 0], row[0, 1], row[0, 2]
-            hold = wide
+                wide[0, i], wide[1, i], wide[2, i] = hold(poles[i], gap * step)[:3]
+            row = wide
         for i in range(count):
-            lags[i] = hold[0, i] * lags[i] + hold[1, i] * u[k] + hold[2, i] * last_u
+            lags[i] = row[0, i] * lags[i] + row[1, i] * u[k] + row[2, i] * last_u
             out[k, i] = lags[i]
         last_u, last_at = u[k], at[k]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import smartshoe
@@ -20,8 +19,7 @@ def _publish_diagnosis(unit: UnitResult, folder: Path, result: ScenarioResult) -
         return None
     own = make_folder(folder / "diagnosis" / unit.name)
     facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "smartshoe": smartshoe.__version__}
-    text = json.dumps(found.to_dict(), indent=2, allow_nan=False) + "\n"
-    page = publish_diagnosis(own, found, unit.name, facts, text)["report"]
+    page = publish_diagnosis(own, found, unit.name, facts)["report"]
     if found.model is not None:
         rate_hz = next(iter(unit.recordings.values())).sample_rate_hz
         saved = found.calibration(unit=unit.name, sample_rate_hz=rate_hz)

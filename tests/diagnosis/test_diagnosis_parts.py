@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from smartshoe import Recording, dynamic_protocol
-from smartshoe.diagnosis.baseline import global_baseline
+from smartshoe.diagnosis.baseline import searched
 from smartshoe.diagnosis.experiments import EXPERIMENTS
 from smartshoe.diagnosis.fitting import Evidence, fit
 from smartshoe.diagnosis.judgement import errors, gain
@@ -45,6 +45,10 @@ def sessions_of(*recordings: Recording) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in recordings]
     scale = full_scale(recordings, usable)
     return prepare(recordings, usable, None, scale, thinning(recordings, scale)), scale
+
+
+def baseline_of(sessions: list[Session], scale: Scale) -> ExtendedModel:
+    return searched(sessions, scale, None)[1]
 
 
 def evidence_of(sessions: list[Session]) -> Evidence:
@@ -118,7 +122,7 @@ def test_whitened_noise_is_white_with_variance_one(memory: float, seed: int) -> 
 def test_the_baseline_is_found_wherever_its_pole_is(share: float, rate: float) -> None:
     truth = ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")
     sessions, scale = sessions_of(recording(truth, noise=0.0005))
-    start = global_baseline(sessions, scale)
+    start = baseline_of(sessions, scale)
     found = fit(evidence_of(sessions), start).model
     at = sessions[0].conditions
     off = found.simulate(at) - sessions[0].reading
@@ -130,7 +134,7 @@ def test_a_fit_finds_an_effects_parameter_within_its_error_bar() -> None:
         effect("gain_drift"), np.array([2e-4, 0.0])
     )
     sessions, scale = sessions_of(recording(truth))
-    start = global_baseline(sessions, scale).with_part(effect("zero_offset")).with_part(effect("gain_drift"))
+    start = baseline_of(sessions, scale).with_part(effect("zero_offset")).with_part(effect("gain_drift"))
     found = fit(evidence_of(sessions), start)
     theta = found.model.theta * 1.0
     # Shares of full scale depend on the scale that was taken: the record's own largest reading.
@@ -141,7 +145,7 @@ def test_a_fit_finds_an_effects_parameter_within_its_error_bar() -> None:
 
 def test_a_bound_holds_and_a_parameter_without_influence_stays() -> None:
     sessions, scale = sessions_of(recording(MODEL.with_part(effect("zero_offset"), np.array([0.01]))))
-    start = global_baseline(sessions, scale).with_part(effect("linear_leak")).with_part(effect("gain_drift"))
+    start = baseline_of(sessions, scale).with_part(effect("linear_leak")).with_part(effect("gain_drift"))
     found = fit(evidence_of(sessions), start).model
     leak, drift = (part for part in found.parts)
     assert leak.values[0] >= 0.0
@@ -155,14 +159,14 @@ def test_a_bound_holds_and_a_parameter_without_influence_stays() -> None:
 )
 def test_the_screen_ranks_the_effect_that_is_there_among_the_first(name: str, values: list[float]) -> None:
     sessions, scale = sessions_of(recording(MODEL.with_part(effect(name), np.array(values))))
-    start = fit(evidence_of(sessions), global_baseline(sessions, scale)).model
+    start = fit(evidence_of(sessions), baseline_of(sessions, scale)).model
     looked = screen(dictionary(start, sessions), white(0.001))
     assert name in looked.names[:4]
 
 
 def test_likeness_is_symmetric_one_with_itself_and_high_for_a_tare_and_an_offset() -> None:
     sessions, scale = sessions_of(recording())
-    looked = screen(dictionary(global_baseline(sessions, scale), sessions), white(0.001))
+    looked = screen(dictionary(baseline_of(sessions, scale), sessions), white(0.001))
     assert_allclose(looked.likeness, looked.likeness.T)
     assert_allclose(np.diag(looked.likeness), 1.0)
     place = {name: k for k, name in enumerate(looked.names)}
@@ -203,7 +207,7 @@ def test_what_repeats_and_what_wanders_are_seen() -> None:
 def test_a_gains_interval_holds_the_gain_and_shrinks_to_nothing_for_nothing() -> None:
     truth = MODEL.with_part(effect("zero_offset"), np.array([0.01]))
     sessions, scale = sessions_of(recording(truth))
-    start = fit(evidence_of(sessions), global_baseline(sessions, scale)).model
+    start = fit(evidence_of(sessions), baseline_of(sessions, scale)).model
     better = fit(evidence_of(sessions), start.with_part(effect("zero_offset"))).model
     won = gain(errors(sessions, start), errors(sessions, better), scale)
     assert won.ci95[0] <= won.gain_percent <= won.ci95[1]
@@ -232,7 +236,7 @@ def test_an_experiment_asks_for_no_more_than_the_load_it_is_made_for(name: str) 
 
 def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
     sessions, scale = sessions_of(recording())
-    found = fit(evidence_of(sessions), global_baseline(sessions, scale))
+    found = fit(evidence_of(sessions), baseline_of(sessions, scale))
     for made in EXPERIMENTS.values():
         assert expected_margin(found, found, made(800.0), white(0.001), sessions[0]) == pytest.approx(0.0, abs=1e-6)
 
@@ -240,7 +244,7 @@ def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
 def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     truth = MODEL.with_part(effect("sensor_lag"), np.array([0.03, 0.0]))
     sessions, scale = sessions_of(recording(truth))
-    start = fit(evidence_of(sessions), global_baseline(sessions, scale)).model
+    start = fit(evidence_of(sessions), baseline_of(sessions, scale)).model
     lag = fit(evidence_of(sessions), start.with_part(effect("sensor_lag"), np.array([0.02, 0.1])))
     delay = fit(evidence_of(sessions), start.with_part(effect("delay"), np.array([0.02])))
     margins = {

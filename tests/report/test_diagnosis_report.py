@@ -8,11 +8,11 @@ import tomllib
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from balance import Balance
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -191,30 +191,10 @@ def plain_text(html: str) -> str:
     return " ".join(escapes.unescape(re.sub(r"<[^>]+>", " ", kept)).split())
 
 
-class _Balance(HTMLParser):
-    void = frozenset({"meta", "br", "link", "img"})
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: set[str] = set()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        if tag not in self.void:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_every_page_is_whole_and_says_no_number_that_is_none(name: str) -> None:
     html = page(name)
-    parser = _Balance()
+    parser = Balance()
     parser.feed(html)
     assert parser.open == []
     assert "script" not in parser.tags
@@ -293,7 +273,7 @@ def test_names_and_sentences_from_files_are_escaped(tmp_path: Path) -> None:
     hostile = replace(made, says=NAME, unit="m$b", limits=(NAME,), traces=traces, data_faults=faults, leftover=NAME)
     html = write_diagnosis_page(tmp_path / "x.html", hostile, NAME, {NAME: NAME}).read_text(encoding="utf-8")
     assert "<script" not in html
-    parser = _Balance()
+    parser = Balance()
     parser.feed(html)
     assert parser.open == []
     assert NAME in plain_text(html)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from balance import Balance
 
 from smartshoe.identification import identify
 from smartshoe.recording import Recording
@@ -17,26 +17,6 @@ from smartshoe.report.page import UnitReport, write_page
 from smartshoe.validation import validate
 
 NAME = "<script>alert(1)</script>"
-
-
-class _Balance(HTMLParser):
-    void = frozenset({"meta", "br", "link", "img"})
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: set[str] = set()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        if tag not in self.void:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +39,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_the_page_is_well_formed_and_needs_no_network(page: str) -> None:
-    parser = _Balance()
+    parser = Balance()
     parser.feed(page)
     assert parser.open == []
     assert "script" not in parser.tags

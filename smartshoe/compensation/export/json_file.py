@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
+from smartshoe.atomic import json_text
 from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
 from smartshoe.models.parameter import finite_or_none
 
@@ -49,7 +49,7 @@ def json_files(model: FilterModel) -> dict[str, str]:
     }
     if isinstance(model, ExtendedFilterModel):
         found["extended"] = _extended(model)
-    return {"smartshoe_filter.json": json.dumps(found, indent=1, allow_nan=False, ensure_ascii=False) + "\n"}
+    return {"smartshoe_filter.json": json_text(found)}
 
 
 def _extended(model: ExtendedFilterModel) -> dict[str, Any]:

@@ -91,6 +91,23 @@ def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> 
     return LocalVariance(means(fast**2), means(prediction[1:n:3] ** 2), means(slope**2))
 
 
+def growing_noise(
+    residual: Array, prediction: Array, sample_time_s: float, asked: int
+) -> tuple[float, float, LocalVariance] | None:
+    """Score, strength and `LocalVariance` where the residual's variance grows with the ``asked`` part; None elsewhere.
+
+    At one false alarm in 1000; `PRESSURE` or `SLOPE`, the growth with the other apart.
+    """
+    local = local_variance(residual, prediction, sample_time_s)
+    if local is None:
+        return None
+    value, growth = variance_score(local, asked)
+    weight = np.abs(prediction if asked == PRESSURE else np.gradient(prediction))
+    if value <= ONE_SIDED or growth <= 0.0 or keeps_rhythm(residual, weight):
+        return None
+    return value, sqrt(growth), local
+
+
 def keeps_rhythm(residual: Array, weight: Array) -> bool:
     """Whether what the fast part of the residual (n,) has more of where ``weight`` (n,) is large is a tone, no noise.
 

@@ -22,13 +22,10 @@ class Delay(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The delayed signal."""
-        from smartshoe.kernels.shift import weighted_neighbours
-        from smartshoe.models.first_order import HALF_WIDTH, interpolation_taps
+        from smartshoe.kernels.shift import shift
 
         if values[0] == 0.0:
             return signal.copy()
-        place = -float(values[0]) / conditions.step_s
-        whole = int(np.floor(place))
-        late = np.empty(signal.size)
-        weighted_neighbours(np.array(signal), whole + 1 - HALF_WIDTH, interpolation_taps(place - whole)[0], late)
+        late, slope = np.empty(signal.size), np.empty(signal.size)
+        shift(np.array(signal), -float(values[0]) / conditions.step_s, 1.0, late, slope)
         return late

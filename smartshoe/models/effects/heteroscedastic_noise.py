@@ -2,19 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
-import numpy as np
-
-from smartshoe.models.effects._sensor_evidence import (
-    ONE_SIDED,
-    PRESSURE,
-    Evidence,
-    Waveformless,
-    keeps_rhythm,
-    local_variance,
-    variance_score,
-)
+from smartshoe.models.effects._sensor_evidence import ONE_SIDED, PRESSURE, Evidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Array, Conditions, Effect
 
 
@@ -32,12 +20,9 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
 
     Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
     """
-    local = local_variance(residual, prediction, sample_time_s)
-    if local is None:
+    found = growing_noise(residual, prediction, sample_time_s, PRESSURE)
+    if found is None:
         return None
-    value, growth = variance_score(local, PRESSURE)
-    if value <= ONE_SIDED or growth <= 0.0 or keeps_rhythm(residual, np.abs(prediction)):
-        return None
-    strength = sqrt(growth)
+    value, strength, _ = found
     says = f"the noise grows with pressure: {100 * strength:.2g} % of full scale are added at the largest pressure"
     return Evidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)

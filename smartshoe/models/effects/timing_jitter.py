@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-
-from smartshoe.models.effects._sensor_evidence import (
-    ONE_SIDED,
-    SLOPE,
-    Evidence,
-    Waveformless,
-    keeps_rhythm,
-    local_variance,
-    variance_score,
-)
+from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, Evidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Array, Conditions, Effect
 
 
@@ -32,13 +22,10 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
 
     Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
     """
-    local = local_variance(residual, prediction, sample_time_s)
-    if local is None:
+    found = growing_noise(residual, prediction, sample_time_s, SLOPE)
+    if found is None:
         return None
-    value, growth = variance_score(local, SLOPE)
-    if value <= ONE_SIDED or growth <= 0.0 or keeps_rhythm(residual, np.abs(np.gradient(prediction))):
-        return None
-    strength = sqrt(growth)
+    value, strength, local = found
     jitter_s = strength / sqrt(float(local.slope_squared.max()))
     says = f"the noise grows with the slope of the pressure, as from {1e3 * jitter_s:.2g} ms of jitter in the sampling"
     return Evidence("log_variance_on_slope", value, ONE_SIDED, says, strength)

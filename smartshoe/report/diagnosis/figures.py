@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.diagnosis.result import Trace
 from smartshoe.report.diagnosis.views import (
     BINS,
@@ -209,8 +210,7 @@ def _held_out_spans(found: Evidence) -> list[tuple[float, float]]:
     mask = found.held_out
     if not mask.any() or mask.all():
         return []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(float(found.time_s[a]), float(found.time_s[b - 1])) for a, b in zip(edges[0::2], edges[1::2], strict=True)]
+    return [(float(found.time_s[a]), float(found.time_s[b - 1])) for a, b in zip(*runs_of(mask), strict=True)]
 
 
 def _same_limits(*axes: Any) -> None:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from smartshoe.atomic import write_text
+from smartshoe.atomic import json_text, write_text
 from smartshoe.diagnosis.result import Diagnosis
 from smartshoe.report.diagnosis.page import write_diagnosis_page
 from smartshoe.report.diagnosis.protocol_file import protocol_text, table_name
 
 
-def publish_diagnosis(
-    folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str], result_json: str
-) -> dict[str, Path]:
+def publish_diagnosis(folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str]) -> dict[str, Path]:
     """Write ``diagnosis.html``, ``diagnosis.json`` and the next protocol below ``folder``.
 
     Returns those to tell of, by what they are.
@@ -26,6 +24,6 @@ def publish_diagnosis(
         protocol_file = f"{table_name(following.steps.name)}.toml"
         written["next protocol"] = folder / protocol_file
         write_text(folder / protocol_file, protocol_text(following.steps, [following.says]))
-    write_text(folder / "diagnosis.json", result_json)
+    write_text(folder / "diagnosis.json", json_text(found.to_dict()))
     write_diagnosis_page(page, found, f"Diagnosis of {title}", facts, protocol_file)
     return written
