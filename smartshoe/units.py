@@ -58,7 +58,7 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("kN", "kn", "force", 1e3, 0.0, ("kilonewton", "千牛")),
     ("mN", "millinewton", "force", 1e-3, 0.0, ()),
     ("daN", "dan", "force", 10.0, 0.0, ()),
-    ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "公斤力")),
+    ("kgf", "kgf", "force", 9.80665, 0.0, ("kp", "kg", "公斤力")),  # of a load cell that reads mass
     ("gf", "gf", "force", 9.80665e-3, 0.0, ()),
     ("lbf", "lbf", "force", 4.4482216152605, 0.0, ("lb", "lbs")),
     ("Pa", "pa", "pressure", 1.0, 0.0, ("pascal", "帕")),
@@ -68,7 +68,11 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("mbar", "mbar", "pressure", 100.0, 0.0, ("毫巴",)),
     ("bar", "bar", "pressure", 1e5, 0.0, ("巴",)),
     ("psi", "psi", "pressure", 6894.757293168, 0.0, ()),
-    ("mmHg", "mmhg", "pressure", 133.322387415, 0.0, ()),
+    ("mmHg", "mmhg", "pressure", 133.322387415, 0.0, ("torr",)),
+    ("cmH2O", "cmh2o", "pressure", 98.0665, 0.0, ()),
+    ("inHg", "inhg", "pressure", 3386.389, 0.0, ()),
+    ("atm", "atm", "pressure", 101325.0, 0.0, ()),
+    ("kgf/cm2", "kgf_per_cm2", "pressure", 98066.5, 0.0, ("kg/cm2",)),
     ("m", "m", "length", 1.0, 0.0, ("meter", "metre", "米")),
     ("cm", "cm", "length", 1e-2, 0.0, ("厘米",)),
     ("mm", "mm", "length", 1e-3, 0.0, ("millimeter", "millimetre", "毫米")),
@@ -78,9 +82,17 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("°C", "c", "temperature", 1.0, 273.15, ("degc", "deg c", "celsius", "℃", "摄氏度")),
     ("V", "v", "voltage", 1.0, 0.0, ("volt", "volts", "伏")),
     ("mV", "mv", "voltage", 1e-3, 0.0, ("millivolt", "毫伏")),
+    ("uV", "uv", "voltage", 1e-6, 0.0, ("µV",)),
+    ("mV/V", "mv_per_v", "ratio", 1e-3, 0.0, ()),
     ("A", "a", "current", 1.0, 0.0, ("ampere",)),
+    ("mA", "ma", "current", 1e-3, 0.0, ()),
     ("ohm", "ohm", "resistance", 1.0, 0.0, ("Ω", "ohms")),
     ("kohm", "kohm", "resistance", 1e3, 0.0, ("kΩ",)),
+    ("Mohm", "megaohm", "resistance", 1e6, 0.0, ("MΩ",)),
+    ("pF", "pf", "capacitance", 1e-12, 0.0, ()),
+    ("nF", "nf", "capacitance", 1e-9, 0.0, ()),
+    ("rad", "rad", "angle", 1.0, 0.0, ()),
+    ("deg", "deg", "angle", 0.017453292519943295, 0.0, ("°",)),
     ("counts", "counts", "counts", 1.0, 0.0, ("count", "cnt", "lsb", "adc")),
     ("m/s", "m_per_s", "velocity", 1.0, 0.0, ()),
     ("mm/s", "mm_per_s", "velocity", 1e-3, 0.0, ()),
@@ -90,7 +102,13 @@ _TABLE: list[tuple[str, str, str, float, float, tuple[str, ...]]] = [
     ("Hz", "hz", "frequency", 1.0, 0.0, ()),
     ("%", "percent", "ratio", 1e-2, 0.0, ("percent",)),
     ("mm/mm", "mm_per_mm", "ratio", 1.0, 0.0, ()),
-    ("1", "1", "dimensionless", 1.0, 0.0, ("-",)),
+    ("1", "1", "dimensionless", 1.0, 0.0, ("-", "a.u.", "au")),
+]
+# A pressure as the reference of a sensor that is pressed all over: the force on 1 cm².
+_TABLE += [
+    (f"{symbol}·cm²", f"{suffix}_cm2", "force", 1e-4 * scale, 0.0, ())
+    for symbol, suffix, quantity, scale, _, _ in _TABLE
+    if quantity == "pressure"
 ]
 
 # Symbols are case sensitive where case carries meaning (mN and MN, K and k); everything else is not.
@@ -120,6 +138,11 @@ def unit(text: str) -> Unit:
     if found is None:
         raise UnitError(f"unit {text!r} is not known: use one of {', '.join(row[0] for row in _TABLE)}")
     return found
+
+
+def on_one_cm2(pressure: Unit) -> Unit:
+    """The unit of the force that a ``pressure`` of its unit exerts on 1 cm²: bar·cm² (10 N) for bar."""
+    return unit(f"{pressure.symbol}·cm²")
 
 
 def unit_of_suffix(suffix: str) -> Unit | None:

@@ -27,7 +27,7 @@ def column_options(command: _F) -> _F:
         click.option(
             "--time",
             metavar="COLUMN",
-            help="The time column, by name or 1-based number, with its unit: '1[ms]'.",
+            help="The time column, by name or 1-based number, with its unit: '1[ms]'; 'rows[49Hz]' for none.",
         ),
     ):
         command = decorate(command)
@@ -40,8 +40,19 @@ def read_all(
     """Every experiment as a recording; a machine's log and a data logger's are joined. Notes go to stderr."""
     from smartshoe.cli.output import show_notes
     from smartshoe.devices.joining import join_pairs
+    from smartshoe.errors import MissingChannelError
     from smartshoe.logs import read
 
-    recordings = join_pairs([read(file, time=time, force=force, sensors=list(sensors), unit=unit) for file in files])
+    def one(file: str) -> Recording:
+        try:
+            return read(file, time=time, force=force, sensors=list(sensors), unit=unit)
+        except MissingChannelError:
+            # One of two logs of a test may hold the load only, or the reading only.
+            half = read(file, time=time, force=force, sensors=list(sensors), unit=unit, partly=True)
+            if len(files) == 1 or bool(half.of_role("load")) == bool(half.sensors):
+                raise
+            return half
+
+    recordings = join_pairs([one(file) for file in files])
     show_notes(recordings)
     return recordings

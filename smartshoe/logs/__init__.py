@@ -67,12 +67,16 @@ def read(
     sensors: Sequence[str] = (),
     unit: str | None = None,
     name: str | None = None,
+    partly: bool = False,
 ) -> Recording:
     """Any readable file as a `Recording`.
 
     ``time``, ``force`` and ``sensors`` choose columns where names and units do not tell: ``NAME``, ``NAME[unit]``
-    or, by 1-based number, ``3`` and ``3[bar]``. ``unit`` names the sensing unit (``left_toe``) and ``name`` the
-    recording in place of what the file says. Raises `InputError` and its kin, naming file and line.
+    or, by 1-based number, ``3`` and ``3[bar]``; the time also ``rows[49Hz]``, or ``NAME[49Hz]`` for a column that
+    counts samples at that rate. A reference that is a pressure is taken for the force on 1 cm². Where the file is
+    ``partly`` what the choices are of (one of two logs), those that name no column of it are passed over. ``unit``
+    names the sensing unit (``left_toe``) and ``name`` the recording in place of what the file says. Raises
+    `InputError` and its kin, naming file and line.
     """
     from smartshoe.logs.columns import recording_from
 
@@ -82,7 +86,7 @@ def read(
     except csv.Error as error:
         raise FormatError(f"{path} is no table of numbers ({error}): export it again") from error
     chosen = (sensors,) if isinstance(sensors, str) else tuple(sensors)
-    return recording_from(sheet, time=time, force=force, sensors=chosen, unit=unit, name=name)
+    return recording_from(sheet, time=time, force=force, sensors=chosen, unit=unit, name=name, partly=partly)
 
 
 def write(recording: Recording, path: Path | str) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.errors import InputError
+from smartshoe.logs.picks import Pick, names_a_column, need_quantity, need_unit, pick, titles, unit_in_file
 from smartshoe.logs.sheet import Column, Sheet
+from smartshoe.logs.times import check_increasing, time_of
 from smartshoe.recording import (
     COMMAND_NAME,
     LOAD_NAME,
@@ -20,147 +22,16 @@ from smartshoe.recording import (
     Recording,
     Role,
 )
-from smartshoe.units import SECOND, Unit, declared, find_unit
+from smartshoe.units import Unit, declared, on_one_cm2
 
 Array = NDArray[np.float64]
 
-_CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
 _COMMANDS = re.compile(r"command(ed)?|demand|set[ _-]?point|target|soll(wert)?", re.IGNORECASE)
 _ESTIMATE = re.compile(r"estimate", re.IGNORECASE)
-_TIME_NAMES = frozenset({"time", "t", "x_value", "zeit", "czas", "temps", "tijd", "tiempo", "时间"})
 _MACHINE_LOGS = frozenset({"bluehill", "labview", "tdms"})  # what a testing machine or its logger writes
 _NEGATIVE_SHARE = 5.0  # a load that reaches this many times further below zero than above it is compression
 
 
-@dataclass(frozen=True, slots=True)
-class _Pick:
-    index: int
-    unit: Unit | None  # what the user's brackets say, else what the file says
-
-
-def _unit_in_file(column: Column) -> Unit | None:
-    text = column.unit.strip()
-    if not text.strip("()[]{} "):
-        return None
-    return find_unit(text) or declared(text.strip("()[]{} "))
-
-
-def _titles(sheet: Sheet) -> str:
-    return ", ".join(column.label or column.name or "''" for column in sheet.columns)
-
-
-def _named(columns: Sequence[Column], wanted: str) -> list[int]:
-    """The columns of that name or header text: exactly, or else apart from case."""
-    for alike in (str, str.casefold):
-        found = [i for i, c in enumerate(columns) if alike(wanted) in (alike(c.label), alike(c.name)) and wanted]
-        if found:
-            return found
-    return []
-
-
-def _pick(sheet: Sheet, choice: str, option: str) -> _Pick:
-    """The column that a user's ``choice`` names; raises `InputError` where none or several fit."""
-    columns = sheet.columns
-    bracket = _CHOICE.fullmatch(choice)
-    base, said = choice.strip(), None
-    found = _named(columns, base)
-    if not found and bracket:
-        base, said = bracket["base"].strip(), find_unit(bracket["unit"])
-        if said is None:
-            raise UnitError(
-                f"{sheet.path}: unit {bracket['unit']!r} in {option} {choice!r} is not known: use one such as s, N,"
-                " kN, mbar, bar, V, counts, ohm or mm"
-            )
-        found = _named(columns, base)
-        if len(found) > 1:
-            found = [i for i in found if _unit_in_file(columns[i]) == said] or found
-    if len(found) > 1:
-        raise InputError(
-            f"{sheet.path}: {option} {choice!r} fits {len(found)} columns: add the unit in brackets, or rename one"
-            f" of them (columns: {_titles(sheet)})"
-        )
-    if not found and base.isascii() and base.isdigit() and 1 <= int(base) <= len(columns):
-        found = [int(base) - 1]
-    if not found:
-        raise MissingChannelError(
-            f"{sheet.path} has no column {base!r} for {option}: choose one of its columns ({_titles(sheet)}) by name"
-            f" or by number from 1 to {len(columns)}"
-        )
-    return _united(sheet, found[0], said, option)
-
-
-def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> _Pick:
-    column = sheet.columns[index]
-    of_file = _unit_in_file(column)
-    if said is not None and of_file is not None and of_file.quantity != "unknown" and said != of_file:
-        raise UnitError(
-            f"{sheet.path}: column {column.name!r} is in {of_file.symbol} by the file, {option} says {said.symbol}:"
-            " leave the unit out"
-        )
-    return _Pick(index, said or of_file)
-
-
-def _need_quantity(sheet: Sheet, pick: _Pick, option: str, quantity: str, example: str) -> Unit:
-    column = sheet.columns[pick.index]
-    if pick.unit is None:
-        raise InputError(
-            f"{sheet.path} gives column {column.name!r} no unit: add it in brackets, for example"
-            f" {option} '{column.name}[{example}]'"
-        )
-    if pick.unit.quantity != quantity:
-        raise UnitError(
-            f"{sheet.path}: column {column.name!r} for {option} is in {pick.unit.symbol}, which is no {quantity}:"
-            f" choose a column in a unit such as {example}"
-        )
-    return pick.unit
-
-
-# -- time ----------------------------------------------------------------------------------------------------
-def _time_column(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> _Pick:
-    if choice is not None:
-        return _pick(sheet, choice, "--time")
-    of_time = [i for i, u in enumerate(units) if u is not None and u.quantity == "time"]
-    named = [i for i in of_time if sheet.columns[i].name.casefold() in _TIME_NAMES]
-    for found in (named[:1], [0] if 0 in of_time else [], of_time if len(of_time) == 1 else []):
-        if found:
-            return _Pick(found[0], units[found[0]])
-    for index, column in enumerate(sheet.columns):
-        if units[index] is None and (column.name == "t" or column.name.casefold() in _TIME_NAMES - {"t"}):
-            if sheet.format == "labview" and column.name.casefold() == "x_value":
-                return _Pick(index, SECOND)  # LabVIEW's X_Dimension is time in seconds unless the file says more
-            return _Pick(index, None)
-    example = "NAME[s]" if sheet.has_header else "1[ms]"
-    raise InputError(
-        f"{sheet.path} has no column that is time by its unit: name it, for example --time '{example}'"
-        f" (columns: {_titles(sheet)})"
-    )
-
-
-def _seconds(sheet: Sheet, column: Column, in_unit: Unit) -> Array:
-    values = column.values
-    absent = ~np.isfinite(values)
-    if absent.any():
-        raise InputError(
-            f"{sheet.place(int(np.argmax(absent)))} has no time in column {column.name!r}: give every row a time,"
-            " or remove that row"
-        )
-    if in_unit.scale < 1.0:
-        return values / (1.0 / in_unit.scale)  # 11 ms is 0.011 s to the last bit; a product may miss it
-    return in_unit.to_si(values)
-
-
-def _check_increasing(sheet: Sheet, time_s: Array) -> None:
-    step = np.diff(time_s)
-    if step.size and not (step > 0).all():
-        at = int(np.argmax(~(step > 0)))
-        fault = "repeats" if step[at] == 0 else "goes back"
-        raise InputError(
-            f"{sheet.place(at + 1)}: time {fault} ({time_s[at]:.9g} s, then {time_s[at + 1]:.9g} s): remove or"
-            " re-time that row"
-        )
-
-
-# -- roles ---------------------------------------------------------------------------------------------------
 def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
     """The roles that channels have by name and unit alone (the plain table's names first).
 
@@ -240,7 +111,7 @@ def _channel(sheet: Sheet, name: str, column: Column, unit_: Unit, role: Role, n
         if role != "auxiliary":
             raise InputError(
                 f"{sheet.place(0)}: every sample of column {column.name!r} is missing from here on: choose another"
-                f" column (columns: {_titles(sheet)})"
+                f" column (columns: {titles(sheet)})"
             )
         notes.append(f"Column {column.name} holds no sample and was left out.")
         return None
@@ -255,6 +126,7 @@ def recording_from(
     sensors: Sequence[str] = (),
     unit: str | None = None,
     name: str | None = None,
+    partly: bool = False,
 ) -> Recording:
     """The recording that ``sheet`` holds; the choices are those of `smartshoe.logs.read`.
 
@@ -263,36 +135,36 @@ def recording_from(
     """
     if not sheet.columns or sheet.columns[0].values.size == 0:
         raise InputError(f"{sheet.path} holds no samples below its header: give a file with data rows")
-    units: list[Unit | None] = [_unit_in_file(column) for column in sheet.columns]
+    units: list[Unit | None] = [unit_in_file(column) for column in sheet.columns]
     roles: list[Role | None] = [column.role for column in sheet.columns]
     notes = list(sheet.notes)
 
-    time_pick = _time_column(sheet, units, time)
-    time_unit = _need_quantity(sheet, time_pick, "--time", "time", "s")
-    at_time = time_pick.index
-    time_s = _seconds(sheet, sheet.columns[at_time], time_unit)
+    if time is not None and partly and not names_a_column(sheet, time):
+        time = None
+    at_time, time_s = time_of(sheet, units, time)
 
     chosen: set[int] = set()
-    if force is not None:
-        pick = _pick(sheet, force, "--force")
-        units[pick.index] = _need_quantity(sheet, pick, "--force", "force", "N")
+    if force is not None and not (partly and not names_a_column(sheet, force)):
+        found = pick(sheet, force, "--force")
+        in_unit = need_unit(sheet, found, "--force", "N")
+        if in_unit.quantity == "pressure":
+            name_ = sheet.columns[found.index].name
+            notes.append(f"Column {name_} is a pressure: as the load it is taken for the force on 1 cm².")
+            found = Pick(found.index, on_one_cm2(in_unit))
+        units[found.index] = need_quantity(sheet, found, "--force", "force", "N")
         roles = [None if role == "load" else role for role in roles]
-        roles[pick.index] = "load"
-        chosen.add(pick.index)
-    if sensors:
+        roles[found.index] = "load"
+        chosen.add(found.index)
+    named = [choice for choice in sensors if not (partly and not names_a_column(sheet, choice))]
+    if named:
         roles = [None if role == "sensor" else role for role in roles]
-    for choice in sensors:
-        pick = _pick(sheet, choice, "--sensor")
-        column = sheet.columns[pick.index]
-        if pick.unit is None:
-            raise InputError(
-                f"{sheet.path} gives column {column.name!r} no unit: add it in brackets, for example"
-                f" --sensor '{column.name}[mbar]'"
-            )
-        if pick.index in chosen or pick.index == at_time:
-            raise InputError(f"{sheet.path}: column {column.name!r} is chosen twice: choose another for --sensor")
-        units[pick.index], roles[pick.index] = pick.unit, "sensor"
-        chosen.add(pick.index)
+    for choice in named:
+        found = pick(sheet, choice, "--sensor")
+        if found.index in chosen or found.index == at_time:
+            name_ = sheet.columns[found.index].name
+            raise InputError(f"{sheet.path}: column {name_!r} is chosen twice: choose another for --sensor")
+        units[found.index], roles[found.index] = need_unit(sheet, found, "--sensor", "mbar"), "sensor"
+        chosen.add(found.index)
 
     columns = [i for i in range(len(sheet.columns)) if i != at_time]
     free = [i for i in columns if i not in chosen]
@@ -323,7 +195,7 @@ def recording_from(
             lines=None if sheet.lines is None else sheet.lines[1:],
         )
     time_s = time_s[keep]
-    _check_increasing(sheet, time_s)
+    check_increasing(sheet, time_s)
 
     channels: dict[str, Channel] = {}
     for position, index in enumerate(columns):

@@ -232,3 +232,27 @@ def test_wrong_choices_of_the_fit_are_named(
         write(machine.run(dynamic_protocol((800.0,))), tmp_path / "one.csv")
     assert run_command(["identify", str(tmp_path / "one.csv"), *words]) == 2
     assert says in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_one_choice_of_columns_serves_both_logs_of_a_pair(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A reference in rows and bar, a sensor in counts with times of its own: joined by what both follow."""
+    time_s = np.arange(0.0, 60.0, 0.02)
+    chamber_bar = 1.0 + np.interp(time_s % 12.0, [0.0, 6.0, 12.0], [0.0, 2.0, 0.0]) * (0.5 + time_s // 12.0 % 2)
+    rows = "\n".join(f"{k},{value:.5f}" for k, value in enumerate(chamber_bar))
+    (tmp_path / "chamber.csv").write_text(f"row,P\n{rows}\n")
+    slow = np.empty_like(chamber_bar)
+    slow[0] = chamber_bar[0]
+    for k in range(1, slow.size):
+        slow[k] = slow[k - 1] + 0.02 / 3.0 * (chamber_bar[k] - slow[k - 1])
+    counts = 240.0 - np.interp(time_s - 0.5, time_s, 30.0 * chamber_bar + 10.0 * slow)
+    taxel = "\n".join(f"{t:.3f},{value:.3f}" for t, value in zip(time_s, counts, strict=True))
+    (tmp_path / "taxel.csv").write_text(f"t_s,taxel_counts\n{taxel}\n")
+    files = [str(tmp_path / name) for name in ("chamber.csv", "taxel.csv")]
+    columns = ["--time", "row[50Hz]", "--force", "P[bar]", "--sensor", "taxel_counts"]
+    assert run_command(["identify", *files, *columns, "--json", str(tmp_path / "found.json")]) == 0
+    said = capsys.readouterr().err
+    assert "joined with" in said
+    found = json.loads((tmp_path / "found.json").read_text())
+    gain = found["parameters"]["b1"]["value"] / found["parameters"]["a1"]["value"]
+    assert gain == pytest.approx(-10.0 / 40.0, rel=0.02)  # N on 1 cm² for each count
+    assert run_command(["identify", files[1], *columns]) == 3

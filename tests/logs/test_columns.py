@@ -130,3 +130,31 @@ def test_a_channel_without_samples() -> None:
     assert "spare" in found.notes[0]
     with pytest.raises(InputError, match="every sample of column 'spare'"):
         recording_from(log, sensors=["spare"])
+
+
+def test_rows_without_times_take_a_rate() -> None:
+    found = recording_from(sheet("row|", "Load|N", "Pin|V"), time="rows[50Hz]")
+    assert found.time_s.tolist() == [0.0, 0.02, 0.04]
+    assert "row" in found.channels
+    counted = sheet("row|", "Load|N", "Pin|V")
+    counted.columns[0].values = np.array([10.0, 12.0, 13.0])
+    assert recording_from(counted, time="row[0.05 kHz]").time_s == pytest.approx([0.2, 0.24, 0.26])
+    with pytest.raises(InputError, match="no rate above 0"):
+        recording_from(counted, time="row[0Hz]")
+
+
+def test_a_pressure_as_the_reference_is_the_force_on_a_square_centimetre() -> None:
+    found = recording_from(sheet("time|s", "chamber|bar", "taxel|counts"), force="chamber", sensors=["taxel"])
+    assert found.load.values.tolist() == RAMP.tolist()  # as logged
+    assert found.force_n == pytest.approx(10.0 * RAMP)
+    assert "1 cm²" in found.notes[-1]
+
+
+def test_a_choice_that_the_other_log_of_a_pair_holds_is_passed_over() -> None:
+    choices = {"time": "row[50Hz]", "force": "chamber", "sensors": ["taxel"]}
+    machine = recording_from(sheet("row|", "chamber|bar"), partly=True, **choices)
+    logger = recording_from(sheet("time|s", "taxel|counts"), partly=True, **choices)
+    assert len(machine.of_role("load")) == 1
+    assert not machine.sensors
+    assert len(logger.sensors) == 1
+    assert not logger.of_role("load")
