@@ -1,0 +1,27 @@
+"""A person in two shoes: walking, running, standing, tiptoe, starts, stops and turns; true loads and true events.
+
+>>> from simulators.gait import Person, Walk, trial
+>>> made = trial(Person(body_weight_n=700.0), Walk(speed_m_per_s=1.3), duration_s=20.0, sensors=False)
+>>> sorted(made.unit_n)[0]
+'left_heel'
+"""
+
+from simulators.gait.events import TrueEvent
+from simulators.gait.person import Person, Run, Stand, Tiptoe, Walk, move_at
+from simulators.gait.plan import Plan, plan
+from simulators.gait.trial import Trial, blocks, trial
+
+__all__ = [
+    "Person",
+    "Plan",
+    "Run",
+    "Stand",
+    "Tiptoe",
+    "Trial",
+    "TrueEvent",
+    "Walk",
+    "blocks",
+    "move_at",
+    "plan",
+    "trial",
+]
