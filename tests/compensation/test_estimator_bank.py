@@ -1,4 +1,4 @@
-"""Which estimator is best on simulated truth, and by how much, at which speed and noise: the table of docs/estimators.md.
+"""Which estimator is best on simulated truth, by how much, at which speed and noise: the table of docs/estimators.md.
 
 ``pytest -m bank tests/compensation/test_estimator_bank.py -s``
 """

@@ -10,9 +10,9 @@ Mask = NDArray[np.bool_]
 
 BLOCK = 16  # samples: 80 ms at 200 Hz, shorter than a swing
 CALM = 0.2  # of the blocks: less than the share of a stride in which a foot swings or stands still
-# A block's mean square over its expectation is chi-square with 16/1.94 degrees of freedom, since second differences of
-# white noise correlate by -2/3 and 1/6 (sum of squares 1.94): the mean of its lowest fifth, its 99 % quantile, and the mean
-# below that.
+# A block's mean square over its expectation is chi-square with 16/1.94 degrees of freedom, since second differences
+# of white noise correlate by -2/3 and 1/6 (sum of squares 1.94): the mean of its lowest fifth, its 99 % quantile, and
+# the mean below that.
 LOWEST_FIFTH, HIGHEST, BELOW_HIGHEST = 0.424, 2.48, 0.982
 ROUNDS = 20
 
