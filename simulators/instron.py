@@ -16,13 +16,14 @@ from simulators.bladder import TUBE_DIAMETER_M, SimulatedBladder
 from simulators.daq import MyRioParameters, SimulatedMyRio, sampled
 from simulators.effects.room import Neighbour, Room
 from simulators.sensor import SimulatedHdiSensor
-from smartshoe.devices.base import ChannelDescription, TestMachine
+from smartshoe.devices.base import ChannelDescription, Shoe, TestMachine
 from smartshoe.errors import LimitError
 from smartshoe.protocol import MachineLimits, Protocol
 from smartshoe.recording import Channel, Recording, Role
 from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
 
 if TYPE_CHECKING:
+    from simulators.bench import Bench
     from simulators.twin import SimulatedTwin
 
 Array = NDArray[np.float64]
@@ -95,6 +96,7 @@ class SimulatedInstron(TestMachine):
         self._channel_rng, self._room_rng = rng.spawn(2)
         self._seed = seed
         self._logs: tuple[Recording, ...] = ()
+        self._bench: Bench | None = None
 
     def __str__(self) -> str:
         return f"simulated Instron 5944 with {self.specimen.name}"
@@ -108,6 +110,22 @@ class SimulatedInstron(TestMachine):
     def logs(self) -> tuple[Recording, ...]:
         """Bluehill's log (own clock) and the myRIO's (voltages) of the last run."""
         return self._logs
+
+    @property
+    def is_instant(self) -> bool:
+        """A run takes as long as its arithmetic."""
+        return True
+
+    def under(self, shoe: Shoe, unit: str) -> None:
+        """Press that unit of a simulated shoe from now on, while the shoe streams (`simulators.bench`)."""
+        from simulators.bench import Bench
+        from simulators.shoe import SimulatedShoe
+
+        if isinstance(shoe, SimulatedShoe):
+            p = shoe.parameters
+            bench = Bench(shoe, unit, self._rng, skew_ppm=p.clock_skew_ppm, offset_s=p.clock_offset_s)
+            shoe.bench = self._bench = bench
+            self.specimen = bench.specimen
 
     def describe(self) -> tuple[ChannelDescription, ...]:
         """The joined recording's channels."""
@@ -178,6 +196,8 @@ class SimulatedInstron(TestMachine):
         }
         # One load cell, one amplifier: both logs see the same electrical noise only where they sample together,
         # which two free clocks do not.
+        if self._bench is not None:
+            self._bench.press(truth)
         machine = self._bluehill(truth, protocol, metadata)
         voltages = self._myrio(truth, protocol, metadata)
         self._logs = (machine, voltages)

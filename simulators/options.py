@@ -18,8 +18,9 @@ from simulators.effects.logging import ReadingChannel
 from simulators.effects.outside import Wander
 from simulators.effects.room import Neighbour, Room
 from simulators.effects.sensing import Curve, Drift, Limit, Noise
+from simulators.gait.person import BODY_WEIGHT_N
 from simulators.instron import InstronParameters
-from simulators.profiles import BODY_WEIGHT_N, Gait
+from simulators.profiles import Gait
 from simulators.sensor import HdiParameters
 from simulators.shoe import ShoeParameters
 
@@ -146,26 +147,33 @@ class UnitOptions(_Options):
 
 
 class ShoeOptions(_Options):
-    """A shoe of four units; ``units`` maps a unit's name (``left_toe``) to what differs from its preset."""
+    """A shoe of four units, or both; ``units`` maps a unit's name (``left_toe``) to what differs from its preset."""
 
-    side: Literal["left", "right"] = "left"
+    side: Literal["left", "right", "both"] = "left"
     units: dict[str, UnitOptions] = Field(default_factory=dict)
     sample_rate_hz: Annotated[float, Field(gt=0, le=2000)] = 200.0
     duration_s: Positive = 60.0
     block_samples: Annotated[int, Field(ge=1)] = 20
     adc_bits: Annotated[int, Field(ge=4, le=24)] = 12
+    clock_skew_ppm: Annotated[float, Field(ge=-1000, le=1000)] | None = None
+    clock_offset_s: NotNegative | None = None
     body_weight_n: Positive = BODY_WEIGHT_N
     coverage: Annotated[float, Field(gt=0, le=1)] = 1.0
-    cadence_steps_per_min: Annotated[float, Field(ge=20, le=250)] = 110.0
-    stance_share: Annotated[float, Field(gt=0.1, lt=0.95)] = 0.62
-    stride_time_cv: Annotated[float, Field(ge=0, le=0.2)] = 0.018
-    load_cv: Annotated[float, Field(ge=0, le=0.5)] = 0.03
-    sway_cv: Annotated[float, Field(ge=0, le=0.2)] = 0.02
+    outside: Literal["midfoot", "even"] = "midfoot"
+    speed_m_per_s: Annotated[float, Field(ge=0.3, le=8)] | None = None
+    cadence_steps_per_min: Annotated[float, Field(ge=20, le=250)] | None = None
+    stance_share: Annotated[float, Field(gt=0.1, lt=0.95)] | None = None
+    stride_time_cv: Annotated[float, Field(ge=0, le=0.2)] | None = None
+    load_cv: Annotated[float, Field(ge=0, le=0.5)] | None = None
+    load_asymmetry: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    time_asymmetry: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    turning: Annotated[float, Field(ge=-1, le=1)] = 0.0
+    sway_cv: Annotated[float, Field(ge=0, le=0.2)] = 0.03
     first_contact_s: NotNegative = 0.5
 
     def parameters(self) -> ShoeParameters:
         """The stream."""
-        return ShoeParameters(self.sample_rate_hz, self.duration_s, self.block_samples, self.adc_bits)
+        return ShoeParameters(**self.model_dump(include=set(ShoeParameters.__dataclass_fields__)))
 
     def gait(self) -> Gait:
         """The foot."""

@@ -1,4 +1,5 @@
-"""The entry point "sim" of smartshoe's devices: ``sim:instron``, ``sim:walk``, ``sim:stand``."""
+"""The entry point "sim" of smartshoe's devices: ``sim:instron``, ``sim:walk``, ``sim:run``, ``sim:stand``,
+``sim:tiptoe``."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from simulators.shoe import SimulatedShoe
 
 MACHINES = ("instron",)
-SHOES = ("walk", "stand")
+SHOES = ("walk", "stand", "run", "tiptoe")
 DEFAULT_UNIT = "left_toe"
 
 
@@ -60,7 +61,7 @@ class Provider:
     def open_shoe(
         self, target: str, options: Mapping[str, Any] | None = None, rng: np.random.Generator | None = None
     ) -> SimulatedShoe:
-        """A shoe (closed, to be used in a with block) for ``target`` 'walk' or 'stand'.
+        """A shoe (closed, to be used in a with block) for ``target`` 'walk', 'stand', 'run' or 'tiptoe'.
 
         ``options`` are `simulators.options.ShoeOptions`; raises as `open_machine` does.
         """
@@ -74,7 +75,10 @@ class Provider:
         from simulators.shoe import SimulatedShoe
 
         given = dict(options or {})
-        names = [f"{given.get('side', 'left')}_{region}" for region in REGIONS]
+        side = given.get("side", "left")
+        names = [
+            f"{foot}_{region}" for foot in (("left", "right") if side == "both" else (side,)) for region in REGIONS
+        ]
         units = given.get("units", {})
         if isinstance(units, dict):
             given["units"] = {n: with_preset(n, units.get(n, {})) for n in [*names, *(set(units) - set(names))]}

@@ -9,9 +9,11 @@
 from simulators.gait.events import TrueEvent
 from simulators.gait.person import Person, Run, Stand, Tiptoe, Walk, move_at
 from simulators.gait.plan import Plan, plan
+from simulators.gait.plates import Measured, measured
 from simulators.gait.trial import Trial, blocks, trial
 
 __all__ = [
+    "Measured",
     "Person",
     "Plan",
     "Run",
@@ -21,6 +23,7 @@ __all__ = [
     "TrueEvent",
     "Walk",
     "blocks",
+    "measured",
     "move_at",
     "plan",
     "trial",

@@ -50,15 +50,19 @@ def events_of(foot: str, time_s: Array, loads_n: Array, body_weight_n: float) ->
         return found
     whole, heel = loads_n.sum(axis=1), loads_n[:, HEEL]
     fore = np.maximum(loads_n[:, META1], loads_n[:, META4])
-    for when, up in zip(*crossings(time_s, whole, level), strict=True):
-        found.append(TrueEvent(float(when), foot, "heel_strike" if up else "toe_off"))
-    bears = np.interp
-    for when, up in zip(*crossings(time_s, heel, level), strict=True):
-        if up and bears(when, time_s, fore) > level:
-            found.append(TrueEvent(float(when), foot, "foot_flat"))
-        if not up and bears(when, time_s, whole) > level:
-            found.append(TrueEvent(float(when), foot, "heel_off"))
-    for when, up in zip(*crossings(time_s, fore, level), strict=True):
-        if up and bears(when, time_s, heel) > level:
-            found.append(TrueEvent(float(when), foot, "foot_flat"))
+
+    def add(event: str, times_s: Array) -> None:
+        found.extend(TrueEvent(float(when), foot, event) for when in times_s)
+
+    def bears(times_s: Array, signal: Array) -> NDArray[np.bool_]:
+        return np.asarray(np.interp(times_s, time_s, signal) > level)
+
+    times_s, up = crossings(time_s, whole, level)
+    add("heel_strike", times_s[up])
+    add("toe_off", times_s[~up])
+    times_s, up = crossings(time_s, heel, level)
+    add("foot_flat", times_s[up & bears(times_s, fore)])
+    add("heel_off", times_s[~up & bears(times_s, whole)])
+    times_s, up = crossings(time_s, fore, level)
+    add("foot_flat", times_s[up & bears(times_s, heel)])
     return sorted(found, key=lambda event: event.time_s)

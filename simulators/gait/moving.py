@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 PHASE_SD = {"walk": 0.020, "run": 0.030}  # of the shift of a region's course, as a share of stance
-STANCE_OF_STRIDE_CV = 0.5  # a stance varies half as much again as its stride does
+STANCE_OF_STRIDE_CV = 0.3  # what a stance varies beside its stride, over the stride time's own variation
 TURN_LEAN = 0.35  # of a metatarsal's load that a tight turn moves to the other
 TURN_TIME = 0.10  # longer stance of the inner foot in a tight turn, as a share
 SHORTEST_BOTH = 0.02  # of a stride: least double support or flight
@@ -78,8 +78,8 @@ def _stance_s(
     cv = np.array([move.resolved_stride_time_cv for move in moves])[owner]
     turning = np.array([move.turning for move in moves])[owner]
     runs = np.array([isinstance(move, Run) for move in moves])[owner]
-    stride_s = own_s.copy()
-    stride_s[:-2] = strike_s[2:] - strike_s[:-2]
+    # A contact lasts as its own time does, so that a late step makes it longer and not harder.
+    stride_s = 2.0 * _own_time_s(strike_s) if strike_s.size > 1 else own_s
     sign = np.where(side == 1, 1.0, -1.0)
     share = share * (1.0 + 0.5 * sign * (person.time_asymmetry - TURN_TIME * turning))
     stance_s = stride_s * share * (1.0 + STANCE_OF_STRIDE_CV * cv * rng.standard_normal(side.size))

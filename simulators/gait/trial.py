@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.gait.events import TrueEvent, events_of
-from simulators.gait.person import Activity, Part, Person
+from simulators.gait.person import Activity, Part, Person, Walk
 from simulators.gait.plan import FEET, Plan, plan
+from simulators.gait.plates import Measured
 from simulators.gait.shape import COVERAGE, Outside
 from smartshoe.errors import UsageError
 from smartshoe.recording import REGIONS, Recording
@@ -47,7 +48,7 @@ class Trial:
 
 def trial(
     person: Person | None = None,
-    activity: Activity | Sequence[Part] | None = None,
+    activity: Activity | Sequence[Part] | Measured | None = None,
     duration_s: float | None = 60.0,
     rng: np.random.Generator | None = None,
     **settings: Any,
@@ -58,7 +59,7 @@ def trial(
 
 def blocks(
     person: Person | None = None,
-    activity: Activity | Sequence[Part] | None = None,
+    activity: Activity | Sequence[Part] | Measured | None = None,
     duration_s: float | None = 60.0,
     rng: np.random.Generator | None = None,
     *,
@@ -79,7 +80,8 @@ def blocks(
     Parameters
     ----------
     activity: `Walk` (the default), `Run`, `Stand`, `Tiptoe`, or a sequence of (activity, seconds). With
-        ``duration_s`` None a sequence lasts as long as its parts; else the last part goes on until then.
+        ``duration_s`` None a sequence lasts as long as its parts; else the last part goes on until then. Or what
+        plates `measured`, which brings its own person, duration and coverage.
     sensors: through bladder, HDI sensor and converter, in mbar; False records the true loads in N.
     coverage: share of the impulse that passes through the coils; ``outside`` says how the rest is spread over a
         stance: "midfoot" with its own course, "even" the same share at each moment.
@@ -91,16 +93,18 @@ def blocks(
 
     Loads are linear between samples for the bladders. Raises `UsageError` on what cannot be.
     """
-    from simulators.gait.person import Walk
-
     if not sample_rate_hz > 0:
         raise UsageError(f"sample_rate_hz is {sample_rate_hz:g}: give a rate above 0 Hz")
     rng = rng if rng is not None else np.random.default_rng(0)
     plan_rng, unit_rng, noise_rng = rng.spawn(3)
-    made = plan(
-        person or Person(), activity or Walk(), duration_s, plan_rng,
-        coverage=coverage, outside=outside, first_contact_s=first_contact_s,
-    )  # fmt: skip
+    made: Plan | Measured
+    if isinstance(activity, Measured):
+        made, coverage = activity, activity.coverage
+    else:
+        made = plan(
+            person or Person(), Walk() if activity is None else activity, duration_s, plan_rng,
+            coverage=coverage, outside=outside, first_contact_s=first_contact_s,
+        )  # fmt: skip
     count = max(2, round(made.duration_s * sample_rate_hz))
     sampler = None
     if sensors:

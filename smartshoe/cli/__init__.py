@@ -19,8 +19,13 @@ _COMMANDS = {
     "compensate": "force from pressure, by a calibration",
     "validate": "judge a calibration on recordings, per loading rate",
     "diagnose": "what a simulation gets wrong, why, and what mending it gains",
+    "calibrate": "a session: a shoe under a machine, recorded, identified, judged and stored",
+    "stream": "live readings and forces from a shoe",
+    "gait": "events, phases, strides and forces of a trial",
     "export": "a calibration's compensator for firmware (C) or other tools",
     "convert": "convert any readable format to any writable one",
+    "check": "a shoe in the field: units that do not answer, zero, drift, body weight",
+    "calibrations": "the store of calibrations: list, show, compare, drift, add, swap, repair, retire",
 }
 
 

@@ -34,5 +34,9 @@ def command(scenario: str, seed: int | None, out_folder: str | None, json_path: 
             report = publish(result, folder, json_text(whole))
     if not emit_json(whole, json_path):
         print_summary(whole["units"])
+        if "trial" in whole:
+            from smartshoe.report.trial import print_trial
+
+            print_trial(whole["trial"])
         if report is not None:
             click.echo(f"report: {report}")

@@ -10,11 +10,14 @@ import click
 @click.option("--out", "out_folder", required=True, metavar="DIR", help="Where the recordings go.")
 @click.option("--seed", type=click.IntRange(min=0), help="In the place of the scenario's own seed.")
 def command(scenario: str, out_folder: str, seed: int | None) -> None:
-    """Run only the devices of SCENARIO and write one plain table per unit and experiment."""
+    """Run only the devices of SCENARIO and write one plain table per unit and experiment, and the trial's.
+
+    Of a simulated trial the true loads are written too, as NAME_truth.csv.
+    """
     from smartshoe.atomic import make_folder
     from smartshoe.cli.output import progress
     from smartshoe.logs import write
-    from smartshoe.scenario import load, simulate
+    from smartshoe.scenario import load, simulate, simulate_trial
 
     loaded, source = load(scenario)
     if seed is not None:
@@ -26,6 +29,14 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
             for name, recording in recordings.items():
                 step(f"{unit}: writing {name}")
                 write(recording, folder / f"{unit}_{name}.csv")
+        recorded = simulate_trial(loaded, source, step)
+        trial = [] if recorded is None else [recorded.recording, recorded.true_loads()]
+        of_trial = [recording for recording in trial if recording is not None]
+        for recording in of_trial:
+            step(f"writing {recording.name}")
+            write(recording, folder / f"{recording.name}.csv")
+    for recording in of_trial:
+        click.echo(f"{folder / f'{recording.name}.csv'}: {len(recording)} samples, {recording.duration_s:.1f} s")
     for unit, recordings in made.items():
         for name, recording in recordings.items():
             click.echo(f"{folder / f'{unit}_{name}.csv'}: {len(recording)} samples, {recording.duration_s:.1f} s")

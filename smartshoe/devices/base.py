@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.devices.events import ShoeEvent
 from smartshoe.errors import DeviceError, LimitError
 from smartshoe.protocol import MachineLimits, Protocol
 from smartshoe.recording import Channel, Recording
@@ -37,13 +38,19 @@ class ChannelDescription:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Samples of a shoe: ``time_s`` (n,), ``readings`` (n, units) in ``unit``, ``missing`` (n, units)."""
+    """Samples of a shoe: ``time_s`` (n,), ``readings`` (n, units) in ``unit``, ``missing`` (n, units).
+
+    ``time_s`` is the device's own. A live shoe adds, both (n,) on the host's monotonic clock (`time.perf_counter`),
+    ``arrival_s``, when the bytes came, and ``host_time_s``, the device's time on the fitted clock.
+    """
 
     time_s: Array
     readings: Array
     missing: Mask
     names: tuple[str, ...]
     unit: Unit
+    host_time_s: Array | None = None
+    arrival_s: Array | None = None
 
     def __len__(self) -> int:
         return int(self.time_s.size)
@@ -148,9 +155,17 @@ class Shoe(Device):
         """Yield blocks until the stream ends."""
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks of samples in order of time, until the stream ends; raises `DeviceError` where it is not open."""
+        """Blocks of samples in order of time, until the stream ends; raises `DeviceError` where it is not open.
+
+        A live shoe that is silent yields an empty block now and then, so that the caller is never stuck.
+        """
         self._require_open()
         yield from self._blocks_internal()
+
+    @property
+    def events(self) -> tuple[ShoeEvent, ...]:
+        """What befell the stream since it was opened (gaps, reconnections, drops), oldest first."""
+        return ()
 
     @property
     @abstractmethod
@@ -215,3 +230,11 @@ class TestMachine(Device):
     def logs(self) -> tuple[Recording, ...]:
         """The instruments' own logs of the last run, before they were joined."""
         return ()
+
+    @property
+    def is_instant(self) -> bool:
+        """Whether ``run`` takes no time of the world's: a machine on a virtual clock."""
+        return False
+
+    def under(self, shoe: Shoe, unit: str) -> None:
+        """Take note that ``unit`` of ``shoe`` lies on the anvil; nothing to do for a machine that really presses."""

@@ -7,31 +7,42 @@ own) or, failing that, the reading that follows it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
+from smartshoe.devices.corners import follow_corners
+from smartshoe.devices.following import follow
 from smartshoe.errors import InputError
-from smartshoe.recording import Channel, Recording
+from smartshoe.recording import Channel, Recording, Role
 
 Array = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.8
 SAME_SIGNAL = 0.98
 ITERATIONS = 8
+LARGEST_MISFIT = 1.5
+LONGEST_BRIDGED_STEPS = 3.5
 
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle); sd of both; correlation."""
+    """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle); sd of both; correlation.
+
+    ``residual`` is what the fit left of the signal, at the logger's samples that lie within the machine's log;
+    ``by_corners`` says that delay and rate come from the load's corners alone.
+    """
 
     delay_s: float
     delay_sd_s: float
     rate: float
     rate_sd: float
     correlation: float
+    residual: Array = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
+    by_corners: bool = False
 
     def machine_time(self, logger_time_s: Array) -> Array:
         """Logger time (n,) on the machine's clock."""
@@ -40,21 +51,31 @@ class Alignment:
         return moved
 
 
-def _coarse(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> tuple[float, float]:
-    """Delay to within a step, and the correlation there, by cross-correlation on a common grid."""
+def coarse(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> tuple[float, float]:
+    """Delay to within a step, by cross-correlation on a common grid, and the correlation where the two overlap there.
+
+    One of them may cover a part of the other only.
+    """
     from scipy.signal import correlate
 
     step = float(max(np.median(np.diff(machine_s)), np.median(np.diff(logger_s))))
     first = np.interp(np.arange(machine_s[0], machine_s[-1], step), machine_s, load)
     second = np.interp(np.arange(logger_s[0], logger_s[-1], step), logger_s, signal)
-    first, second = first - first.mean(), second - second.mean()
-    size = np.sqrt(np.dot(first, first) * np.dot(second, second))
-    if size == 0.0:
-        return 0.0, 0.0
-    product = correlate(first, second, mode="full", method="fft")
-    best = int(np.argmax(np.abs(product)))
-    lag = best - (second.size - 1)
-    return float(machine_s[0] - logger_s[0] + lag * step), float(product[best] / size)
+    product = correlate(first - first.mean(), second - second.mean(), mode="full", method="fft")
+    lag = int(np.argmax(np.abs(product))) - (second.size - 1)
+    begin, end = max(lag, 0), min(first.size, lag + second.size)
+    ours, theirs = first[begin:end], second[begin - lag : end - lag]
+    ours, theirs = ours - ours.mean(), theirs - theirs.mean()
+    size = float(np.sqrt(np.dot(ours, ours) * np.dot(theirs, theirs)))
+    correlation = float(np.dot(ours, theirs)) / size if size > 0.0 else 0.0
+    return float(machine_s[0] - logger_s[0] + lag * step), correlation
+
+
+def _require_match(correlation: float) -> None:
+    if abs(correlation) < LEAST_CORRELATION:
+        raise InputError(
+            f"the two logs' loads do not match (correlation {correlation:.2f}): give the logs of one and the same test"
+        )
 
 
 @on_one_thread
@@ -64,15 +85,12 @@ def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alig
     A coarse search, then Gauss-Newton on signal(t) = offset + gain load(t + delay + rate (t - middle)). Raises
     `InputError` where the two do not correlate.
     """
-    delay, correlation = _coarse(machine_s, load, logger_s, signal)
-    if abs(correlation) < LEAST_CORRELATION:
-        raise InputError(
-            f"the two logs' loads do not match (correlation {correlation:.2f}): give the logs of one and the same test"
-        )
+    delay, correlation = coarse(machine_s, load, logger_s, signal)
+    _require_match(correlation)
     slope = np.gradient(load, machine_s)
     middle = 0.5 * (logger_s[0] + logger_s[-1])
     rate = 0.0
-    sd = np.zeros(2)
+    sd, error = np.zeros(2), np.zeros(0)
     for _ in range(ITERATIONS):
         at = logger_s + delay + rate * (logger_s - middle)
         inside = (at >= machine_s[0]) & (at <= machine_s[-1])
@@ -91,58 +109,101 @@ def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alig
         delay, rate = delay + float(change[0]), rate + float(change[1])
         if np.all(np.abs(change) <= 1e-3 * sd):
             break
-    return Alignment(delay, float(sd[0]), rate, float(sd[1]), correlation)
+    return Alignment(delay, float(sd[0]), rate, float(sd[1]), correlation, error)
 
 
-def join(machine_log: Recording, logger_log: Recording) -> Recording:
-    """One recording on the logger's time base: its readings, and the machine's load (and other channels) moved to it.
+@on_one_thread
+def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array) -> Alignment:
+    """Delay and clock rate between a load and a unit's reading that follows it, without the unit's own lag.
 
+    By a fit of the unit's model with them; where that leaves more than noise, by the load's corners alone. Raises
+    `InputError` where the two do not correlate.
+    """
+    delay, correlation = coarse(machine_s, load, logger_s, reading)
+    _require_match(correlation)
+    found = follow(machine_s, load, logger_s, reading, delay)
+    if found.misfit <= LARGEST_MISFIT:
+        return Alignment(found.delay_s, found.delay_sd_s, found.rate, found.rate_sd, correlation, found.residual)
+    return Alignment(*follow_corners(machine_s, load, logger_s, reading, delay), correlation, found.residual, True)
+
+
+def join(machine_log: Recording, logger_log: Recording, *, ticks: Literal["logger", "machine"] = "logger") -> Recording:
+    """One recording on the logger's clock, at the ``ticks`` of the one and with the channels of the other moved to it.
+
+    The slower one's ticks keep noise white: a signal that is read more often than it was sampled repeats its noise.
     Raises `InputError` where the logs do not belong together.
     """
     load = machine_log.load
     candidates = [c for c in logger_log.channels.values() if c.role != "sensor"]
     ranked = sorted(
-        ((abs(_coarse(machine_log.time_s, load.si, logger_log.time_s, c.values)[1]), c) for c in candidates),
+        ((abs(coarse(machine_log.time_s, load.si, logger_log.time_s, c.values)[1]), c) for c in candidates),
         key=lambda pair: pair[0],
     )
     if ranked and ranked[-1][0] >= SAME_SIGNAL:
         copy, caveat = ranked[-1][1], ""
     else:
-        copy, caveat = logger_log.sensor, "; the logger has no copy of the load, so the unit's own lag is in the delay"
+        copy, caveat = logger_log.sensor, "; the logger has no copy of the load"
     try:
-        found = align(machine_log.time_s, load.si, logger_log.time_s, copy.values)
+        fit = align_reading if copy.role == "sensor" else align
+        found = fit(machine_log.time_s, load.si, logger_log.time_s, copy.values)
     except InputError as error:
         raise InputError(f"{machine_log.label} and {logger_log.label}: {error}") from error
+    if copy.role == "sensor":
+        caveat += (
+            ", and the unit does more than its model says, so the load's corners alone were used"
+            if found.by_corners
+            else ", the unit's own lag was estimated too"
+        )
     at = found.machine_time(logger_log.time_s)
-    inside = (at >= machine_log.time_s[0]) & (at <= machine_log.time_s[-1])
+    machine_s = machine_log.time_s
+    if ticks == "logger":
+        inside = (at >= machine_s[0]) & (at <= machine_s[-1])
+        time_s, on_machine_s = logger_log.time_s[inside], at[inside]
+    else:
+        inside = (machine_s >= at[0]) & (machine_s <= at[-1])
+        time_s, on_machine_s = np.interp(machine_s[inside], at, logger_log.time_s), machine_s[inside]
     if inside.sum() < 2:
         raise InputError(f"{machine_log.label} and {logger_log.label} share no time: give the logs of one test")
-    kept = logger_log.taken(inside)
-    channels: dict[str, Channel] = {}
-    for channel in machine_log.channels.values():
-        values = np.interp(at[inside], machine_log.time_s, channel.values)
-        if channel.missing is not None:
-            gap = np.interp(at[inside], machine_log.time_s, channel.missing.astype(float)) > 0
-            values = np.where(gap, np.nan, values)
-        channels[channel.name] = Channel.from_values(channel.name, values, channel.unit, channel.role)
-    for channel in kept.channels.values():
+    ours, theirs = machine_log.channels.values(), logger_log.channels.values()
+    if ticks == "logger":
+        moved, kept = [_moved(c, machine_s, on_machine_s) for c in ours], [c.taken(inside) for c in theirs]
+    else:
+        moved, kept = [c.taken(inside) for c in ours], [_moved(c, at, on_machine_s) for c in theirs]
+    channels = {channel.name: channel for channel in moved}
+    for channel in kept:
         name = channel.name if channel.name not in channels else f"logger_{channel.name}"
-        channels[name] = Channel.from_values(
-            name, channel.with_nan(), channel.unit, "auxiliary" if channel.role == "load" else channel.role
-        )
+        role: Role = "auxiliary" if channel.role == "load" else channel.role
+        channels[name] = replace(channel, name=name, role=role)
     note = (
         f"joined with {machine_log.label} by {copy.name}: machine clock ahead by {found.delay_s:.4f} ±"
-        f" {found.delay_sd_s:.4f} s, rate {1e6 * found.rate:.0f} ± {1e6 * found.rate_sd:.0f} ppm{caveat}"
+        f" {found.delay_sd_s:.4f} s, rate {1e6 * found.rate:.1f} ± {1e6 * found.rate_sd:.1f} ppm{caveat}"
     )
     return Recording(
-        kept.time_s,
+        time_s,
         channels,
         name=logger_log.name,
         unit=logger_log.unit or machine_log.unit,
-        metadata={**machine_log.metadata, **logger_log.metadata, "join_delay_s": repr(found.delay_s)},
+        metadata={**machine_log.metadata, **logger_log.metadata, **_said(found)},
         source=logger_log.source,
         notes=(*machine_log.notes, *logger_log.notes, note),
     )
+
+
+def _moved(channel: Channel, own_s: Array, to_s: Array) -> Channel:
+    """The channel, sampled at ``own_s`` (n,), at the times ``to_s`` (m,), missing where it has a hole."""
+    values = np.interp(to_s, own_s, channel.values)
+    after = np.clip(np.searchsorted(own_s, to_s), 1, own_s.size - 1)
+    step = own_s[after] - own_s[after - 1]
+    hole = step > LONGEST_BRIDGED_STEPS * float(np.median(np.diff(own_s)))
+    if channel.missing is not None:
+        hole |= np.interp(to_s, own_s, channel.missing.astype(float)) > 0
+    made = Channel.from_values(channel.name, np.where(hole, np.nan, values), channel.unit, channel.role)
+    return replace(made, range_=channel.range_)
+
+
+def _said(found: Alignment) -> dict[str, str]:
+    numbers = {"delay_s": found.delay_s, "delay_sd_s": found.delay_sd_s, "rate": found.rate, "rate_sd": found.rate_sd}
+    return {f"join_{name}": repr(value) for name, value in numbers.items()}
 
 
 def join_pairs(recordings: Sequence[Recording]) -> list[Recording]:

@@ -14,6 +14,7 @@ from smartshoe.atomic import write_text
 from smartshoe.recording import Recording
 from smartshoe.report import figures
 from smartshoe.report.numbers import plain, with_sd
+from smartshoe.report.trial import COLUMNS, TrialSection
 from smartshoe.validation import Validation
 
 
@@ -67,7 +68,14 @@ def _drawn(unit: UnitReport) -> list[tuple[str, Markup]]:
     return [(title, Markup(svg)) for title, svg in pictures if svg is not None]
 
 
-def write_page(path: Path, title: str, about: str, facts: Mapping[str, str], units: Sequence[UnitReport]) -> Path:
+def write_page(
+    path: Path,
+    title: str,
+    about: str,
+    facts: Mapping[str, str],
+    units: Sequence[UnitReport],
+    trial: TrialSection | None = None,
+) -> Path:
     """Write the report to ``path``, whole or not at all, and return it."""
     environment = Environment(
         loader=PackageLoader("smartshoe.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
@@ -78,6 +86,8 @@ def write_page(path: Path, title: str, about: str, facts: Mapping[str, str], uni
         about=about,
         facts=facts,
         units=[(unit, verdict(unit), unit.validation.overall, _drawn(unit)) for unit in units],
+        trial=trial,
+        trial_columns=COLUMNS,
     )
     write_text(path, page)
     return path

@@ -7,6 +7,7 @@ from pathlib import Path
 import smartshoe
 from smartshoe.atomic import make_folder, write_text
 from smartshoe.report.page import DiagnosisLink, UnitReport, write_page
+from smartshoe.report.trial import TrialSection
 from smartshoe.scenario.run import ScenarioResult, UnitResult
 
 
@@ -25,6 +26,27 @@ def _publish_diagnosis(unit: UnitResult, folder: Path, result: ScenarioResult) -
         saved = found.calibration(unit=unit.name, sample_rate_hz=rate_hz)
         saved.save(folder / "calibrations" / f"{unit.name}_extended.json")
     return DiagnosisLink(found.says, page.relative_to(folder).as_posix())
+
+
+def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
+    """The trial's recording, true loads and own page in a folder of their own."""
+    from smartshoe.logs import write
+    from smartshoe.report.gait.folder import publish_gait
+    from smartshoe.report.trial import section
+
+    trial = result.trial
+    if trial is None:
+        return None
+    own = make_folder(folder / "trial")
+    write(trial.recording, own / f"{trial.name}.csv")
+    true = trial.recorded.true_loads()
+    if true is not None:
+        write(true, own / f"{trial.name}_truth.csv")
+    facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "shoe": trial.shoe}
+    page = publish_gait(own, trial.gait, trial.name, facts)["report"]
+    return section(
+        trial.to_dict(), trial.gait, trial.recording.time_s, trial.totals_n(), page.relative_to(folder).as_posix()
+    )
 
 
 def publish(result: ScenarioResult, folder: Path, result_json: str) -> Path:
@@ -51,4 +73,5 @@ def publish(result: ScenarioResult, folder: Path, result_json: str) -> Path:
         )
         for unit in result.units
     ]
-    return write_page(folder / "report.html", result.scenario.title, result.scenario.about, facts, units)
+    title, about, trial = result.scenario.title, result.scenario.about, _publish_trial(result, folder)
+    return write_page(folder / "report.html", title, about, facts, units, trial)

@@ -19,7 +19,8 @@ from smartshoe.identification import Identification, identify
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
-from smartshoe.scenario.schema import DiagnoseTable, Scenario, Source, UnitTable
+from smartshoe.scenario.schema import DiagnoseTable, Scenario, Source
+from smartshoe.scenario.trial import RecordedTrial, TrialResult, analyse_trial, record_trial
 from smartshoe.validation import Validation, validate
 
 if TYPE_CHECKING:
@@ -69,14 +70,16 @@ class UnitResult:
 
 @dataclass(frozen=True, eq=False)
 class ScenarioResult:
-    """All units of a scenario."""
+    """All units of a scenario, and its trial."""
 
     scenario: Scenario
     source: Path
     units: tuple[UnitResult, ...]
+    trial: TrialResult | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The whole result: schema ``smartshoe.run/1``."""
+        trial = {"trial": self.trial.to_dict()} if self.trial is not None else {}
         return {
             "schema": "smartshoe.run/1",
             "scenario": self.source.name,
@@ -84,12 +87,13 @@ class ScenarioResult:
             "seed": self.scenario.seed,
             "version": smartshoe.__version__,
             "units": [unit.to_dict() for unit in self.units],
+            **trial,
         }
 
 
-def _seed_of(scenario: Scenario, unit: UnitTable) -> int:
+def _seed_of(scenario: Scenario, name: str) -> int:
     """A unit's own seed: it depends on the unit's name, so that adding a unit leaves the others' noise alone."""
-    return int(np.random.SeedSequence([scenario.seed, zlib.crc32(unit.name.encode())]).generate_state(1)[0])
+    return int(np.random.SeedSequence([scenario.seed, zlib.crc32(name.encode())]).generate_state(1)[0])
 
 
 def _protocols(scenario: Scenario, source: Source) -> dict[str, Protocol]:
@@ -122,7 +126,7 @@ def _record(
         return found
     options = _beside(source, {**scenario.machine.options, **unit.options})
     try:
-        machine = open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit), **options)
+        machine = open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit.name), **options)
     except ValidationError as error:
         key = error.errors(include_url=False)[0]["loc"][:1]
         in_machine = bool(key) and key[0] in scenario.machine.options and key[0] not in unit.options
@@ -157,6 +161,14 @@ def simulate(scenario: Scenario, source: Source, progress: Progress = _silent) -
     }
 
 
+def simulate_trial(scenario: Scenario, source: Source, progress: Progress = _silent) -> RecordedTrial | None:
+    """Only the shoes: what the scenario's trial recorded; None where there is no ``[trial]``."""
+    if scenario.trial is None:
+        return None
+    progress(f"{scenario.trial.name}: recording")
+    return record_trial(scenario, source, _seed_of(scenario, f"trial/{scenario.trial.name}"))
+
+
 def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str, ...]:
     names = tuple(name for name in use if name in recordings)
     return names or tuple(recordings)
@@ -175,12 +187,19 @@ def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Dia
 
 
 def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> ScenarioResult:
-    """Devices, then identification, calibration and validation of each unit.
+    """Devices, then identification, calibration and validation of each unit, then the trial.
 
     Raises what the steps raise, with the unit's name in front.
     """
     settings = scenario.identify
     results: list[UnitResult] = []
+    # Before the fits, so that a trial that cannot be is told at once.
+    recorded = simulate_trial(scenario, source, progress)
+    if recorded is not None:
+        calibrated = {unit.name for unit in scenario.unit}
+        surplus = [channel.name for channel in recorded.recording.sensors if channel.name not in calibrated]
+        if surplus:
+            raise source.error(("trial",), f"{', '.join(surplus)} would not be calibrated: add a [[unit]] for each")
     for name, recordings in simulate(scenario, source, progress).items():
         fitted = _chosen(recordings, settings.use)
         judged = _chosen(recordings, scenario.validate_.use)
@@ -210,4 +229,8 @@ def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> Sce
         results.append(
             UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth), diagnosis)
         )
-    return ScenarioResult(scenario, source.path, tuple(results))
+    trial = None
+    if recorded is not None and scenario.trial is not None:
+        progress(f"{scenario.trial.name}: events, strides, forces")
+        trial = analyse_trial(scenario.trial, recorded, [unit.calibration for unit in results])
+    return ScenarioResult(scenario, source.path, tuple(results), trial)

@@ -153,6 +153,32 @@ class ValidateTable(_Table):
     use: tuple[str, ...] = ()
 
 
+class TrialGaitTable(_Table):
+    """``[trial.gait]``: what the analysis is told of the person and the units."""
+
+    body_weight_n: PositiveFloat | None = None
+    coverage: float = Field(default=1.0, gt=0.0, le=1.0)
+    coverage_course: Literal["even", "midfoot"] = "even"
+
+
+class TrialTable(BaseModel):
+    """``[trial]``: a person in the shoes. Every further key is the shoe's own and is checked by it.
+
+    ``name`` names the recording's file. A simulated shoe wears the units of the scenario, with their bladders and
+    sensors.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    name: str = Field(default="trial", pattern=r"^[A-Za-z0-9][A-Za-z0-9_\-]*$")
+    shoe: str = "sim:walk"
+    gait: TrialGaitTable = TrialGaitTable()
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keys beside the table's own."""
+        return dict(self.model_extra or {})
+
+
 class Scenario(_Table):
     """A whole scenario. ``seed`` is the root of every random draw."""
 
@@ -165,6 +191,7 @@ class Scenario(_Table):
     identify: IdentifyTable = IdentifyTable()
     validate_: ValidateTable = Field(ValidateTable(), alias="validate")
     diagnose: DiagnoseTable | None = None
+    trial: TrialTable | None = None
 
     @model_validator(mode="before")
     @classmethod

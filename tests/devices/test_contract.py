@@ -1,4 +1,4 @@
-"""One contract for every backend: simulated, replayed and logged."""
+"""One contract for every backend: simulated, replayed, logged and serial (a pseudo-terminal, or a real shoe)."""
 
 from __future__ import annotations
 
@@ -44,6 +44,20 @@ def shoe(request: pytest.FixtureRequest, tmp_path: Path) -> Shoe:
     return open_shoe(f"replay:{tmp_path / 'walk.csv'}")
 
 
+@pytest.fixture(params=["frames", "lines"])
+def serial_shoe(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Shoe]:
+    """The real backend at an emulated shoe."""
+    from simulators.firmware import Firmware
+    from simulators.pty_line import PtyLine
+    from simulators.serving import Emulator
+
+    with open_shoe("sim:walk", duration_s=5.0) as walking:
+        recording = walking.record()
+    emulator = Emulator(Firmware(ReplayedShoe(recording), request.param), PtyLine(tmp_path / "shoe0"))
+    with emulator.serving() as url:
+        yield open_shoe(f"{url}?side=left")
+
+
 @pytest.fixture(params=["simulated", "logged"])
 def machine(request: pytest.FixtureRequest, logs: tuple[Path, Path]) -> TestMachine:
     if request.param == "simulated":
@@ -53,6 +67,16 @@ def machine(request: pytest.FixtureRequest, logs: tuple[Path, Path]) -> TestMach
 
 def test_every_shoe_keeps_the_contract(shoe: Shoe) -> None:
     check_shoe(shoe)
+
+
+@pytest.mark.wire
+def test_a_serial_shoe_keeps_the_contract(serial_shoe: Shoe) -> None:
+    check_shoe(serial_shoe)
+
+
+@pytest.mark.hardware
+def test_a_real_shoe_keeps_the_contract(request: pytest.FixtureRequest) -> None:
+    check_shoe(open_shoe(request.config.getoption("--shoe-url")))
 
 
 def test_every_machine_keeps_the_contract(machine: TestMachine) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -66,3 +68,29 @@ def test_logs_of_different_tests_are_refused() -> None:
     other = Recording.from_arrays(time_s=logger.time_s, pressure_v=rng.normal(0, 1, len(logger)))
     with pytest.raises(InputError, match="one and the same test"):
         join(machine, other)
+
+
+@pytest.mark.parametrize("ticks", ["logger", "machine"])
+def test_a_join_may_stand_on_either_ones_ticks_and_keeps_the_noise_of_that_one(
+    ticks: Literal["logger", "machine"],
+) -> None:
+    machine, logger = _logs(0.35, 1e-4, 0.3, 4)
+    joined = join(machine, logger, ticks=ticks)
+    kept, source = (joined["pressure"], logger["pressure"]) if ticks == "logger" else (joined.load, machine.load)
+    assert set(kept.values) <= set(source.values)
+    line = np.polyfit(joined.sensor.values, joined.force_n, 1)
+    assert np.std(joined.force_n - np.polyval(line, joined.sensor.values)) < 0.6
+    assert joined.time_s[0] >= logger.time_s[0] - 1e-9
+    assert joined.time_s[-1] <= logger.time_s[-1] + 1e-9
+
+
+@pytest.mark.parametrize("ticks", ["logger", "machine"])
+def test_a_hole_in_a_log_is_missing_and_not_bridged(ticks: Literal["logger", "machine"]) -> None:
+    machine, logger = _logs(0.2, 0.0, 0.3, 5)
+    holed, whole = (machine, logger) if ticks == "logger" else (logger, machine)
+    hole = (holed.time_s > 5.0) & (holed.time_s < 6.0)
+    holed = holed.taken(~hole)
+    joined = join(holed, whole, ticks=ticks) if ticks == "logger" else join(whole, holed, ticks=ticks)
+    moved = joined.load if ticks == "logger" else joined["pressure"]
+    assert moved.missing is not None
+    assert 95 <= np.count_nonzero(moved.missing) <= 105

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from simulators import presets
 from simulators.daq import MyRioParameters, SimulatedMyRio
-from simulators.profiles import Gait, stand, walk
+from simulators.gait.shape import COLUMNS
+from simulators.profiles import Gait
 from simulators.provider import provider
 from simulators.sensor import HdiParameters, SimulatedHdiSensor
 from smartshoe.errors import DeviceError, LimitError, UsageError
@@ -190,7 +191,7 @@ def test_given_keys_override_the_preset_and_the_area_follows_them():
     assert provider.open_machine("instron").specimen.name == "left_toe"
 
 
-@pytest.mark.parametrize("target", ["walk", "stand"])
+@pytest.mark.parametrize("target", ["walk", "stand", "run", "tiptoe"])
 def test_shoe_streams_its_four_units_on_a_virtual_clock(target):
     with provider.open_shoe(target, {"duration_s": 4.0, "side": "right"}, rng()) as shoe:
         blocks = list(shoe.blocks())
@@ -206,26 +207,27 @@ def test_shoe_streams_its_four_units_on_a_virtual_clock(target):
 
 def test_walking_loads_heel_then_outer_then_inner_metatarsal_then_toe():
     time_s = np.arange(20_000) / 1000
-    loads = walk(Gait(first_contact_s=0.0, stride_time_cv=0.0), time_s, rng())
+    gait = Gait(first_contact_s=0.0, stride_time_cv=0.0, cadence_steps_per_min=110.0, stance_share=0.62)
+    loads = gait.plan("walk", 20.0, rng()).loads_n(time_s)[:, 0]
     stride = slice(1, int(1000 * 120 / 110))
-    onset = {r: int(np.argmax(loads[r][stride] > 5)) for r in REGIONS}
+    onset = {r: int(np.argmax(loads[stride, COLUMNS.index(r)] > 5)) for r in REGIONS}
     assert sorted(REGIONS, key=onset.__getitem__) == ["heel", "meta4", "meta1", "toe"]
-    total = sum(loads.values())
+    total = loads.sum(axis=1)
     assert np.mean(total > 0) == pytest.approx(0.62, abs=0.01)
     assert 0.8 < total.max() / 519.4 < 1.6
 
 
-def test_standing_bears_half_of_body_weight():
-    loads = stand(Gait(sway_cv=0.05), np.arange(1000, 60_000) / 1000, rng())
-    assert sum(loads.values()) == pytest.approx(np.full(59_000, 519.4 / 2))
-    assert all(load.min() > 0 for load in loads.values())
+def test_standing_bears_body_weight_on_two_feet():
+    loads = Gait(sway_cv=0.05).plan("stand", 60.0, rng()).loads_n(np.arange(2000, 60_000) / 1000)
+    assert loads.sum(axis=(1, 2)) == pytest.approx(np.full(58_000, 519.4))
+    assert loads[:, :, :4].min() > 0
 
 
 def test_unknown_targets_and_units_are_refused():
     with pytest.raises(UsageError, match="instron"):
         provider.open_machine("press", {}, rng())
     with pytest.raises(UsageError, match="walk, stand"):
-        provider.open_shoe("run", {}, rng())
+        provider.open_shoe("hop", {}, rng())
     with pytest.raises(UsageError, match=r"units\.left_thumb"):
         provider.open_shoe("walk", {"units": {"left_thumb": {}}}, rng())
     with pytest.raises(pydantic.ValidationError, match="side"):

@@ -1,0 +1,122 @@
+"""A pseudo-terminal that stands for a shoe's serial port: its path comes back after the peer was gone.
+
+Linux and macOS; the modules for it are imported when one is opened. Traits of a pseudo-terminal that matter here:
+control lines (dtr, rts) do not exist (OSError); when this end goes, the reader's ``read`` raises `SerialException` but
+its ``in_waiting`` a plain OSError; what is not read piles up to some 20 kB, then writes would block: they never do
+here, what does not fit is refused, as a radio does.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Self
+
+from smartshoe.errors import DeviceError, UsageError
+
+
+class PtyLine:
+    """The device's end of a line whose other end is the port ``link``, a symbolic link to the pseudo-terminal."""
+
+    def __init__(self, link: Path | str) -> None:
+        self.link = Path(link)
+        self._master: int | None = None
+        self._slave_path = ""
+
+    @property
+    def is_up(self) -> bool:
+        """Whether the port is there to be opened."""
+        return self._master is not None
+
+    def __enter__(self) -> Self:
+        self.appear()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.vanish()
+
+    def appear(self) -> None:
+        """Make the port: a new pseudo-terminal under the same link; raises where the link cannot be made."""
+        if self._master is not None:
+            return
+        try:
+            import pty
+            import tty
+        except ImportError as error:
+            raise DeviceError(
+                "this system has no pseudo-terminals: emulate on Linux or macOS, or join two ports with com0com"
+            ) from error
+        if self.link.exists() and not self.link.is_symlink():
+            raise UsageError(f"{self.link} is there already and is no link: give another place with --link")
+        master, slave = pty.openpty()
+        try:
+            # Echo would send our frames back to us as commands, until the reader has set its end raw.
+            tty.setraw(slave)
+            self._slave_path = os.ttyname(slave)
+        finally:
+            # Without an end of our own the line hangs up when the reader goes: `peer_is_there` sees it.
+            os.close(slave)
+        os.set_blocking(master, False)
+        self._master = master
+        fresh = self.link.with_name(f".{self.link.name}.{os.getpid()}")
+        try:
+            self.link.parent.mkdir(parents=True, exist_ok=True)
+            fresh.unlink(missing_ok=True)
+            fresh.symlink_to(self._slave_path)
+            fresh.replace(self.link)
+        except OSError as error:
+            self.vanish()
+            raise UsageError(f"link {self.link} cannot be made ({error.strerror}): give another place") from error
+
+    def vanish(self) -> None:
+        """Take the port away: the link goes, whoever reads it gets an error; what was not read is lost."""
+        if self._master is None:
+            return
+        if self.link.is_symlink() and str(self.link.readlink()) == self._slave_path:
+            self.link.unlink(missing_ok=True)
+        os.close(self._master)
+        self._master = None
+
+    @property
+    def peer_is_there(self) -> bool:
+        """Whether somebody has the port open."""
+        import select
+
+        if self._master is None:
+            return False
+        poll = select.poll()
+        poll.register(self._master, select.POLLIN)
+        return not any(flags & select.POLLHUP for _, flags in poll.poll(0))
+
+    def write(self, data: bytes) -> int:
+        """How many of ``data``'s first bytes fitted: all, some or none; never waits."""
+        if self._master is None or not data:
+            return 0
+        try:
+            return os.write(self._master, data)
+        except BlockingIOError:
+            return 0
+
+    def read(self, wait_s: float = 0.0) -> bytes:
+        """What the reader wrote (commands), within ``wait_s``; empty where it wrote nothing or is not there."""
+        import select
+
+        if self._master is not None:
+            ready, _, _ = select.select([self._master], [], [], max(wait_s, 0.0) if self.peer_is_there else 0.0)
+            if not ready:
+                return b""
+            try:
+                return os.read(self._master, 4096)
+            except OSError:  # EIO: the reader has closed its end, and all that it wrote is read
+                pass
+        time.sleep(max(wait_s, 0.0))
+        return b""
+
+    def wait_writable(self, wait_s: float) -> bool:
+        """Whether there is room for bytes, within ``wait_s``."""
+        import select
+
+        if self._master is None:
+            return False
+        return bool(select.select([], [self._master], [], wait_s)[1])

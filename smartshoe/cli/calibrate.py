@@ -1,0 +1,204 @@
+"""``smartshoe calibrate``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from smartshoe.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from smartshoe.devices.base import Block
+    from smartshoe.session import Plan, SessionFolder
+    from smartshoe.session.checks import Finding
+
+
+@click.command(
+    "calibrate",
+    epilog="Example: smartshoe calibrate --shoe sim:stand --machine sim:instron --protocol dynamic --unit left_toe"
+    " --out out/left_toe",
+)
+@click.option("--shoe", metavar="URL", help="The shoe: serial:///dev/rfcomm0, replay:FILE, sim:stand.")
+@click.option("--machine", metavar="URL", help="The machine: log:FILE or log:FOLDER (run by hand), sim:instron.")
+@click.option("--protocol", "protocols", multiple=True, metavar="NAME",
+              help="static, dynamic, or a TOML file with [protocol.NAME] (repeatable).")  # fmt: skip
+@click.option("--unit", metavar="NAME", help="The unit under the anvil, for example left_toe.")
+@click.option("--out", "out_folder", metavar="DIR", help="A new folder for the session.")
+@click.option("--serial-number", default="", metavar="S", help="Which unit it is; with it the result is stored.")
+@click.option("--store", metavar="DIR", help="The store of calibrations (default: the user's own).")
+@click.option("--resume", metavar="DIR", help="Go on with the session in DIR.")
+@click.option("--replay", metavar="DIR", help="Judge the session in DIR anew from its raw data; no device is used.")
+@click.option("--yes", is_flag=True, help="Ask nothing: confirm every step, repeat what is faulty.")
+@click.option("--repeats", type=click.IntRange(min=0), default=2, show_default=True,
+              help="How often a faulty experiment is pressed again.")  # fmt: skip
+@click.option("--wait", "wait_s", type=click.FloatRange(min=0.0), default=900.0, show_default=True, metavar="SECONDS",
+              help="How long a log is waited for, beyond the test's duration.")  # fmt: skip
+@click.option("--diagnose/--no-diagnose", "diagnosed", default=True, show_default=True,
+              help="Say what the model gets wrong.")  # fmt: skip
+@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
+def command(
+    out_folder: str | None, resume: str | None, replay: str | None, yes: bool, json_path: str | None, **options: Any
+) -> None:
+    """Calibrate a unit: a shoe streams while a machine presses, and what comes out is judged and stored."""
+    from smartshoe.kernels import warm_up
+
+    warm_up.begin()
+    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.session import analyse, conduct, publish
+
+    if replay is not None:
+        folder = _replayed(replay, resume, options)
+        target = Path(out_folder) if out_folder is not None else None
+    else:
+        folder = _begun(out_folder, resume, options)
+        target = folder.path
+    with folder:
+        for note in folder.notes:
+            click.echo(f"note: {folder.path}: {note}", err=True)
+        if replay is None:
+            asks = not yes and sys.stdin.isatty() and not folder.plan.machine.startswith("sim:")
+            try:
+                with _at_the_machine(asks) as operator:
+                    conduct(folder, operator)
+            except (KeyboardInterrupt, click.Abort):
+                click.echo(
+                    f"what was recorded is kept; go on with smartshoe calibrate --resume {folder.path}", err=True
+                )
+                raise
+        with progress() as step:
+            result = analyse(folder, step)
+            whole = result.to_dict()
+            step("writing the report")
+            written = publish(result, target) if target is not None else {}
+    if emit_json(whole, json_path):
+        return
+    from smartshoe.report.tables import print_identification, print_validation
+
+    print_identification(whole["identification"])
+    print_validation(whole["validation"])
+    for experiment in whole["experiments"]:
+        join = experiment["join"]
+        click.echo(
+            f"{experiment['name']}: machine's clock ahead of the shoe's by {join['delay_s']['value']:.4f} ±"
+            f" {join['delay_s']['sd']:.4f} s, {join['rate_ppm']['value']:.1f} ± {join['rate_ppm']['sd']:.1f} ppm fast"
+        )
+    if result.diagnosis is not None:
+        click.echo(f"diagnosis: {result.diagnosis.says}")
+    for name, path in written.items():
+        click.echo(f"{name}: {path}")
+
+
+def _replayed(replay: str, resume: str | None, options: dict[str, Any]) -> SessionFolder:
+    from smartshoe.session import SessionFolder
+
+    given = [name for name in ("shoe", "machine", "unit", "protocols") if options[name]]
+    if resume is not None or given:
+        raise UsageError(f"--replay takes everything from {replay}: leave --{'resume' if resume else given[0]} out")
+    return SessionFolder.open(replay)
+
+
+def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) -> SessionFolder:
+    from smartshoe.session import SessionFolder
+
+    if resume is None:
+        for name in ("shoe", "machine", "unit"):
+            if not options[name]:
+                raise UsageError(f"--{name} is missing: give --shoe, --machine, --protocol, --unit and --out")
+        if out_folder is None:
+            raise UsageError("--out is missing: give a new folder for the session's data and results")
+        return SessionFolder.begin(out_folder, _plan(options))
+    given = [name for name in ("shoe", "machine", "unit", "protocols") if options[name]]
+    if given or out_folder is not None:
+        name = "out" if out_folder is not None else given[0].removesuffix("s")
+        raise UsageError(f"--resume takes everything from {resume}: leave --{name} out")
+    return SessionFolder.resume(resume)
+
+
+def _plan(options: dict[str, Any]) -> Plan:
+    import datetime
+
+    import smartshoe
+    from smartshoe.session import Plan, protocols_named
+
+    if options["store"] is not None and not options["serial_number"]:
+        raise UsageError("--store needs --serial-number: the store keeps units by their serial number")
+    return Plan(
+        shoe=options["shoe"],
+        machine=options["machine"],
+        unit=options["unit"],
+        protocols=protocols_named(options["protocols"]),
+        serial_number=options["serial_number"],
+        store=options["store"],
+        created=datetime.datetime.now(datetime.UTC).date().isoformat(),
+        version=smartshoe.__version__,
+        diagnosed=options["diagnosed"],
+        largest_repeats=options["repeats"],
+        wait_s=options["wait_s"],
+    )
+
+
+class _AtTheMachine:
+    """Instructions on stderr; Enter confirms; live readings where stderr is a terminal."""
+
+    def __init__(self, asks: bool, table: Any = None) -> None:
+        self._asks, self._table = asks, table
+
+    def tell(self, sentence: str) -> None:
+        self._print(sentence)
+
+    def confirm(self, sentence: str, meanwhile: Callable[[], None]) -> None:
+        self._print(f"{sentence}{'; then press Enter' if self._asks else ''}")
+        if self._asks:
+            _answer(meanwhile)
+
+    def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
+        if self._table is not None:
+            self._table.show(block, experiment, elapsed_s)
+
+    def wants_repeat(self, finding: Finding, repeats_left: int) -> bool:
+        self._print(finding.says)
+        if repeats_left == 0:
+            return False
+        if not self._asks:
+            self._print(f"pressed again; {repeats_left} repeats are left")
+            return True
+        self._print(f"press again? [Y/n] ({repeats_left} repeats are left)")
+        return not _answer(lambda: None).strip().casefold().startswith("n")
+
+    def _print(self, sentence: str) -> None:
+        if self._table is not None:
+            self._table.print(sentence)
+        else:
+            click.echo(sentence, err=True)
+
+
+def _answer(meanwhile: Callable[[], None]) -> str:
+    """A line from the keyboard; ``meanwhile`` is called until it comes."""
+    from threading import Thread
+
+    lines: list[str] = []
+    reader = Thread(target=lambda: lines.append(sys.stdin.readline()), daemon=True)
+    reader.start()
+    while reader.is_alive():
+        meanwhile()
+    if not lines or lines[0] == "":
+        raise click.Abort
+    return lines[0]
+
+
+@contextmanager
+def _at_the_machine(asks: bool) -> Iterator[_AtTheMachine]:
+    if not sys.stderr.isatty():
+        yield _AtTheMachine(asks)
+        return
+    from smartshoe.cli.live import LiveReadings
+
+    with LiveReadings() as table:
+        yield _AtTheMachine(asks, table)

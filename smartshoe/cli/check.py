@@ -1,0 +1,82 @@
+"""``smartshoe check``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from smartshoe.field import Finding
+    from smartshoe.field.examination import Examination
+
+
+@click.command(
+    "check",
+    epilog="Example: smartshoe check walk.csv --calibration left_heel.json --body-weight 519.4",
+)
+@click.argument("files", nargs=-1, required=True)
+@click.option(
+    "--calibration", "calibration_paths", multiple=True, metavar="C.json", help="Of a unit in the files (repeatable)."
+)
+@click.option("--body-weight", "body_weight_n", type=float, metavar="N", help="Check the mean total force against it.")
+@click.option(
+    "--coverage", type=float, default=1.0, show_default=True, metavar="SHARE",
+    help="The share of the load that passes through the units.",
+)  # fmt: skip
+@click.option("--time", metavar="COLUMN", help="The time column, by name or 1-based number: '1[ms]'.")
+@click.option("--strict", is_flag=True, help="End with exit status 5 where anything is at fault.")
+@click.option("--json", "json_path", metavar="PATH", help="Write the findings as JSON (- for stdout).")
+def command(
+    files: tuple[str, ...],
+    calibration_paths: tuple[str, ...],
+    body_weight_n: float | None,
+    coverage: float,
+    time: str | None,
+    strict: bool,
+    json_path: str | None,
+) -> None:
+    """Check a shoe in the field: every unit answers, the zero holds, the forces add up to body weight.
+
+    Each FILE is a trial of one or two shoes; two FILES of one shoe each are weighed together. A rest of two seconds
+    before the first step lets the zero be checked.
+    """
+    from smartshoe.cli.inputs import read_all
+    from smartshoe.cli.output import emit_json
+    from smartshoe.compensation import Calibration
+    from smartshoe.errors import RefusedError
+    from smartshoe.field.examination import examine_trial
+
+    calibrations = [Calibration.load(path) for path in calibration_paths]
+    recordings = read_all(files, time=time, force=None, sensors=(), unit=None)
+    found = examine_trial(recordings, calibrations, body_weight_n=body_weight_n, coverage=coverage)
+    verdicts = {item.verdict for item in found}
+    verdict = next(said for said in ("fault", "warning", "ok", "unknown") if said in verdicts)
+    result = {"schema": "smartshoe.check/1", "verdict": verdict, "recordings": [item.to_dict() for item in found]}
+    if not emit_json(result, json_path):
+        for item in found:
+            _print(item)
+    if strict and verdict == "fault":
+        first = next(finding for item in found for finding in item.findings if finding.verdict == "fault")
+        raise RefusedError(first.says)
+
+
+def _print(found: Examination) -> None:
+    """A row a finding; of what is well, a row a kind, with the one that is furthest off."""
+    from smartshoe.report.tables import new_console, table_of
+
+    table = table_of(f"{found.name}: {found.verdict}", ["check", "unit", "verdict"])
+    table.add_column("what is found", justify="left")
+    well: dict[str, list[Finding]] = {}
+    for finding in found.findings:
+        if finding.verdict == "ok":
+            well.setdefault(finding.kind, []).append(finding)
+        else:
+            table.add_row(finding.kind.replace("_", " "), finding.unit or "all", finding.verdict, finding.says)
+    for kind, findings in well.items():
+        furthest = max(findings, key=lambda finding: abs(next(iter(finding.numbers.values()), 0.0)))
+        units = [finding.unit for finding in findings if finding.unit]
+        many = f"{len(units)} units" if len(units) > 1 else "".join(units) or "all"
+        says = f"furthest off: {furthest.says}" if len(findings) > 1 else furthest.says
+        table.add_row(kind.replace("_", " "), many, "ok", says)
+    new_console().print(table)

@@ -1,0 +1,99 @@
+"""``smartshoe gait``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command(
+    "gait",
+    epilog="Example: smartshoe gait walk.csv --calibration left_heel.json --calibration left_toe.json --out out/walk",
+)
+@click.argument("files", nargs=-1, required=True)
+@click.option(
+    "--calibration",
+    "calibration_paths",
+    multiple=True,
+    metavar="C.json",
+    help="A unit's calibration, from identify (repeatable); columns in N need none.",
+)
+@click.option("--body-weight", "body_weight_n", type=float, metavar="N", help="In newton; estimated where not given.")
+@click.option(
+    "--coverage", type=float, default=1.0, show_default=True, help="Share of the load that passes through the units."
+)
+@click.option(
+    "--coverage-course",
+    "course_path",
+    metavar="midfoot|FILE",
+    help="When in a stance the load passes beside the units: 'midfoot', or a file that learn_coverage gave; without it"
+    " the same share throughout.",
+)
+@click.option(
+    "--estimator",
+    metavar="NAME",
+    help="Forces with error bars: static, lead, inverse, kalman, smoother or imm; without it the calibrations' filter.",
+)
+@click.option("--time", metavar="COLUMN", help="The time column, by name or 1-based number: '1[ms]'.")
+@click.option("--reference", metavar="FILE", help="A trial whose mean strides are the pattern to compare with.")
+@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
+@click.option("--c3d", "c3d_path", metavar="OUT.c3d", help="Write forces and events as C3D (needs ezc3d).")
+@click.option("--out", "out_folder", metavar="DIR", help="Write gait.html, gait.json, events, strides, forces as CSV.")
+def command(
+    files: tuple[str, ...],
+    calibration_paths: tuple[str, ...],
+    body_weight_n: float | None,
+    coverage: float,
+    course_path: str | None,
+    estimator: str | None,
+    time: str | None,
+    reference: str | None,
+    json_path: str | None,
+    c3d_path: str | None,
+    out_folder: str | None,
+) -> None:
+    """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
+    from smartshoe.atomic import make_folder
+    from smartshoe.cli.output import emit_json, progress, show_notes
+    from smartshoe.gait.analysis import analyse
+    from smartshoe.gait.coverage import Coverage
+    from smartshoe.logs import read
+
+    recordings = [read(file, time=time) for file in files]
+    show_notes(recordings)
+    calibrations = []
+    if calibration_paths:
+        from smartshoe.compensation import Calibration
+
+        calibrations = [Calibration.load(path) for path in calibration_paths]
+    if course_path == "midfoot":
+        covered = Coverage.midfoot(coverage)
+    else:
+        covered = Coverage(coverage) if course_path is None else Coverage.load(course_path)
+    folder = make_folder(out_folder) if out_folder is not None else None
+    written: dict[str, Path] = {}
+    with progress() as step:
+        step("events, strides, forces")
+        wanted = None
+        if reference is not None:
+            wanted = analyse([read(reference, time=time)], calibrations, body_weight_n, covered, estimator=estimator)
+        found = analyse(recordings, calibrations, body_weight_n, covered, wanted, estimator)
+        title = ", ".join(recording.name for recording in recordings)
+        if folder is not None:
+            step("writing the report")
+            from smartshoe.report.gait.folder import publish_gait
+
+            written = publish_gait(folder, found, title, {"files": ", ".join(Path(file).name for file in files)})
+        if c3d_path is not None:
+            from smartshoe.gait.c3d import write_c3d
+
+            write_c3d(c3d_path, found)
+            written["c3d"] = Path(c3d_path)
+    if emit_json(found.to_dict(), json_path):
+        return
+    from smartshoe.report.gait.terminal import print_gait
+
+    print_gait(found, title)
+    for name, path in written.items():
+        click.echo(f"{name}: {path}")

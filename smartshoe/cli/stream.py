@@ -1,0 +1,131 @@
+"""``smartshoe stream``."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from smartshoe.devices.base import Shoe
+    from smartshoe.session.streaming import Forces
+
+
+@click.command("stream", epilog="Example: smartshoe stream --shoe sim:walk --calibration left_heel.json --out walk.csv")
+@click.option("--shoe", "url", required=True, metavar="URL", help="serial:///dev/rfcomm0, replay:FILE, sim:walk.")
+@click.option("--calibration", "calibrations", multiple=True, metavar="C.json",
+              help="A unit's calibration: its force is shown and written (repeatable).")  # fmt: skip
+@click.option("--duration", "duration_s", type=click.FloatRange(min=0.0, min_open=True), metavar="S",
+              help="Stop after this long (default: the stream's end, or Ctrl-C).")  # fmt: skip
+@click.option("--out", metavar="FILE", help="Write every sample to a new plain table.")
+def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, out: str | None) -> None:
+    """Live readings and forces from a shoe: a line a second, every sample to FILE; Ctrl-C ends it."""
+    from smartshoe.compensation import Calibration
+    from smartshoe.devices import open_shoe
+    from smartshoe.errors import UsageError
+    from smartshoe.session.streaming import Forces
+
+    loaded = [Calibration.load(path) for path in calibrations]
+    if out is not None and Path(out).exists():
+        raise UsageError(f"{out} is there already and is not overwritten: choose another name for --out")
+    run = _Run(out)
+    try:
+        with _interrupts(run), open_shoe(url) as shoe:
+            run.until(shoe, Forces(loaded, shoe), duration_s)
+    except KeyboardInterrupt:
+        run.is_stopped = True
+    finally:
+        run.close()
+
+
+@contextmanager
+def _interrupts(run: _Run) -> Iterator[None]:
+    """Ctrl-C, or a request to end from outside, ends the run after the block it is at, or before the first."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if run.is_stopped or not run.has_begun:
+            raise KeyboardInterrupt
+        run.is_stopped = True
+
+    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class _Run:
+    """Counts and the table of one call."""
+
+    def __init__(self, out: str | None) -> None:
+        from smartshoe.session.streaming import StreamTable
+
+        self.is_stopped = self.has_begun = False
+        self._out = out
+        self._table: StreamTable | None = None
+        self._samples = self._told = 0
+
+    def until(self, shoe: Shoe, forces: Forces, duration_s: float | None) -> None:
+        """Read until ``duration_s`` of the device's time have passed, or the stream ends."""
+        from smartshoe.errors import DeviceError
+        from smartshoe.session.streaming import StreamTable, last_of
+
+        start_s, due_s = None, 0.0
+        for block in shoe.blocks():
+            self._tell_events(shoe)
+            if self.is_stopped:
+                break
+            if not len(block):
+                continue
+            self.has_begun = True
+            if start_s is None:
+                start_s = due_s = float(block.time_s[0])
+                if self._out is not None:
+                    facts = {"shoe": str(shoe), "sample_rate_hz": repr(shoe.sample_rate_hz)}
+                    self._table = StreamTable(self._out, block, forces.names, facts)
+            force_n = forces.push(block)
+            if self._table is not None:
+                self._table.append(block, force_n)
+            self._samples += len(block)
+            last_s = float(block.time_s[-1])
+            if last_s >= due_s:
+                click.echo(f"{last_of(block, force_n, self._samples).says}  lost {self._lost(shoe)}")
+                due_s += int(last_s - due_s) + 1
+            if duration_s is not None and last_s - start_s >= duration_s:
+                break
+        if start_s is None and not self.is_stopped:
+            raise DeviceError(f"{shoe} sent no samples: see that the shoe is switched on and streams")
+        self._tell_events(shoe)
+
+    @staticmethod
+    def _lost(shoe: Shoe) -> int:
+        from smartshoe.devices.events import Dropped, Gap
+
+        events = shoe.events
+        lost = sum(event.lost for event in events if isinstance(event, Gap))
+        return lost + sum(event.samples for event in events if isinstance(event, Dropped))
+
+    def _tell_events(self, shoe: Shoe) -> None:
+        events = shoe.events
+        for event in events[self._told :]:
+            click.echo(f"note: {event.says}", err=True)
+        self._told = len(events)
+
+    def close(self) -> None:
+        """Close the table and say where it is."""
+        if self.is_stopped:
+            click.echo("stopped", err=True)
+        if self._table is None:
+            return
+        self._table.close()
+        click.echo(f"{self._out}: {self._samples} samples")

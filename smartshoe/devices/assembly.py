@@ -1,0 +1,111 @@
+"""From decoded samples and their arrival to blocks and events; no I/O, so that it runs on any clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.devices.base import Block
+from smartshoe.devices.events import Gap, Restarted, ShoeEvent
+from smartshoe.devices.inbox import joined
+from smartshoe.errors import DeviceError
+from smartshoe.units import Unit
+from smartshoe.wire.clock import DeviceClock
+from smartshoe.wire.information import Information
+from smartshoe.wire.samples import Samples
+
+Array = NDArray[np.float64]
+
+RATE_STEPS = 20
+
+
+class Assembler:
+    """Scales and names the samples, keeps their time increasing over restarts, fits the device's clock to the host's.
+
+    ``first`` are samples of the stream, for their names and unit; ``to`` is the unit of the blocks, the samples' own
+    where it is None. ``counts_samples`` is False where the device has no counter of its own (text lines): gaps are
+    then told from the time alone. A restarted device counts from nought: its time goes on where the host's clock says
+    that it must be, and the clock is fitted anew.
+    """
+
+    def __init__(
+        self,
+        first: Samples,
+        information: Information | None = None,
+        to: Unit | None = None,
+        named: Callable[[str], str] = str,
+        counts_samples: bool = True,
+    ) -> None:
+        self._information = information
+        scaled = self._scaled(first)
+        self.names = tuple(named(name) for name in scaled.names)
+        self.comes_in = scaled.unit
+        self.unit = to or scaled.unit
+        self.clock = DeviceClock()
+        self.rate_hz: float | None = None
+        self._counts_samples = counts_samples
+        self._steps_s: list[float] = []
+        self._shift_s = 0.0
+        self._last: tuple[int, int, float, float] | None = None  # boot, sequence, time and arrival of the last sample
+
+    def take(self, samples: Samples, arrival_s: float) -> tuple[Block, list[ShoeEvent]]:
+        """One block of ``samples`` (one at least), which came at ``arrival_s``, and what befell the stream before."""
+        events: list[ShoeEvent] = []
+        scaled = self._scaled(samples)
+        if scaled.unit != self.comes_in:
+            raise DeviceError(
+                f"the shoe's readings changed from {self.comes_in.symbol} to {scaled.unit.symbol}: open it again, or"
+                " say unit in its address"
+            )
+        boots = np.flatnonzero(np.diff(scaled.boot)) + 1
+        ends = [*boots.tolist(), len(scaled)]
+        blocks = [
+            self._take_boot(scaled, slice(start, end), arrival_s, events)
+            for start, end in zip([0, *ends], ends, strict=False)
+        ]
+        return joined(blocks), events
+
+    def _scaled(self, samples: Samples) -> Samples:
+        return samples if self._information is None else self._information.scale(samples)
+
+    def _take_boot(self, samples: Samples, part: slice, arrival_s: float, events: list[ShoeEvent]) -> Block:
+        """Samples of one boot."""
+        sequence, device_s, boot = samples.sequence[part], samples.device_time_s[part], int(samples.boot[part][0])
+        if self._last is not None and boot != self._last[0]:
+            # A restart within one arrival still has to move on: time increases, if by a microsecond.
+            resumes_s = self._last[2] + max(arrival_s - self._last[3], 1e-6)
+            self._shift_s = resumes_s - float(device_s[0])
+            self._last = None
+            self.clock = DeviceClock()
+            events.append(Restarted(arrival_s, resumes_s))
+        time_s = device_s + self._shift_s
+        self._find_gaps(sequence, time_s, arrival_s, events)
+        self._last = (boot, int(sequence[-1]), float(time_s[-1]), arrival_s)
+        arrivals_s = np.full(time_s.size, arrival_s)
+        self.clock.update(time_s, arrivals_s)
+        readings = self.comes_in.convert(samples.readings[part], self.unit)
+        return Block(
+            time_s, readings, samples.missing[part], self.names, self.unit, self.clock.host_time(time_s), arrivals_s
+        )
+
+    def _find_gaps(self, sequence: NDArray[np.int64], time_s: Array, arrival_s: float, events: list[ShoeEvent]) -> None:
+        if self._last is not None:
+            sequence, time_s = np.append(self._last[1], sequence), np.append(self._last[2], time_s)
+        if time_s.size < 2:
+            return
+        steps = self._steps(sequence, time_s)
+        events += [
+            Gap(arrival_s, int(steps[i]) - 1, float(time_s[i]), float(time_s[i + 1])) for i in np.flatnonzero(steps > 1)
+        ]
+        if self.rate_hz is None:
+            self._steps_s += (np.diff(time_s) / steps).tolist()
+            if len(self._steps_s) >= RATE_STEPS:
+                self.rate_hz = 1.0 / float(np.median(self._steps_s))
+
+    def _steps(self, sequence: NDArray[np.int64], time_s: Array) -> NDArray[np.int64]:
+        """Samples that the device took from each to the next, one at least."""
+        if self._counts_samples or self.rate_hz is None:
+            return np.diff(sequence)
+        return np.maximum(np.rint(np.diff(time_s) * self.rate_hz).astype(np.int64), 1)

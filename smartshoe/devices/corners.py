@@ -1,0 +1,103 @@
+"""Delay and clock rate from the corners of the load alone, where no model of the unit's own lag is to be trusted.
+
+Where the load's slope jumps, the reading's slope jumps at the same instant, whatever the unit's memory: springs,
+dampers, leaks, friction all answer smoothly between corners. Around each corner the reading is fitted by
+
+    r = cubic(t) + g F(tau) + a x^2 + b x^3,   x = max(tau - corner, 0),   tau = t + delay + rate (t - middle)
+
+with a cubic, a gain and a curvature after the corner of its own; delay and rate are common to all. This uses a small
+part of what a fit of the whole record would, and is unbiased where that is not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.errors import InputError
+
+Array = NDArray[np.float64]
+
+SLOPE_OVER_S = 0.15
+APART_S = 0.3
+LEAST_JUMP = 0.03  # of the largest
+LONGEST_SIDE_S = 2.0
+SHORTEST_SIDE_S = 0.15
+SHARE_OF_GAP = 0.9
+LEAST_SAMPLES = 30
+ITERATIONS = 10
+SETTLED = 1e-2
+
+
+def slope_of(time_s: Array, load: Array, over_s: float = SLOPE_OVER_S) -> Array:
+    """dF/dt (n,) by straight lines over ``over_s`` about each sample; evenly sampled."""
+    step = float(np.median(np.diff(time_s)))
+    half = max(1, round(0.5 * over_s / step))
+    place = np.arange(-half, half + 1) * step
+    padded = np.pad(load, half, mode="edge")
+    slope: Array = np.convolve(padded, place[::-1] / (place @ place), mode="valid")
+    return slope
+
+
+def corners(time_s: Array, load: Array) -> Array:
+    """The times (m,) at which the load's slope jumps, by more than noise and 3 % of the largest jump."""
+    step = float(np.median(np.diff(time_s)))
+    slope = slope_of(time_s, load)
+    half = max(1, round(0.5 * SLOPE_OVER_S / step))
+    jump = np.zeros(load.size)
+    jump[half:-half] = np.abs(slope[2 * half :] - slope[: -2 * half])
+    least = max(8.0 * float(np.median(jump)), LEAST_JUMP * float(jump.max()))
+    apart = max(1, round(APART_S / step))
+    found: list[int] = []
+    while jump.max() > least:
+        at = int(np.argmax(jump))
+        found.append(at)
+        jump[max(0, at - apart) : at + apart + 1] = 0.0
+    times: Array = time_s[np.sort(np.array(found, dtype=np.intp))]
+    return times
+
+
+def follow_corners(
+    machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
+) -> tuple[float, float, float, float]:
+    """Delay in s, its sd, rate, its sd, from ``delay_s`` on; raises `InputError` where the load has no two corners."""
+    at_corners = corners(machine_s, load)
+    gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))
+    sides = np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
+    middle = 0.5 * (logger_s[0] + logger_s[-1])
+    slope = slope_of(machine_s, load, 0.05)
+    delay, rate, sd = delay_s, 0.0, np.zeros(2)
+    for _ in range(ITERATIONS):
+        at = logger_s + delay + rate * (logger_s - middle)
+        normal, moment, scatter, freedom, used = np.zeros((2, 2)), np.zeros(2), 0.0, 0, 0
+        for corner, (before, after) in zip(at_corners, sides, strict=True):
+            first, last = np.searchsorted(at, [corner - before, corner + after])
+            if last - first < LEAST_SAMPLES or min(before, after) < SHORTEST_SIDE_S:
+                continue
+            tau = at[first:last]
+            place = (tau - corner) / max(before, after)
+            since = np.maximum(place, 0.0)
+            level = np.interp(tau, machine_s, load)
+            local = np.column_stack([place**k for k in range(4)] + [since**2, since**3, level / np.abs(level).max()])
+            basis, triangle = np.linalg.qr(local)
+            values = signal[first:last]
+            gain = np.linalg.solve(triangle, basis.T @ values)[-1] / np.abs(level).max()
+            tilt = gain * np.interp(tau, machine_s, slope)
+            tilts = np.column_stack([tilt, tilt * (logger_s[first:last] - middle)])
+            tilts -= basis @ (basis.T @ tilts)
+            left = values - basis @ (basis.T @ values)
+            normal += tilts.T @ tilts
+            moment += tilts.T @ left
+            scatter += float(left @ left)
+            freedom += left.size - local.shape[1]
+            used += 1
+        if used < 2:
+            raise InputError("the load has fewer than two corners: press ramps with rests between them")
+        size = np.sqrt(np.diag(normal))
+        scaled = normal / np.outer(size, size)
+        change = np.linalg.lstsq(scaled, moment / size, rcond=None)[0] / size
+        sd = np.sqrt(np.diag(np.linalg.pinv(scaled)) * scatter / freedom) / size
+        delay, rate = delay + float(change[0]), rate + float(change[1])
+        if np.all(np.abs(change) <= SETTLED * sd):
+            break
+    return delay, float(sd[0]), rate, float(sd[1])

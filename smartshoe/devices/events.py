@@ -1,0 +1,132 @@
+"""What befalls a live stream besides samples: gaps, silences, reconnections, drops; each with one sentence."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from threading import Lock
+from typing import Any, ClassVar
+
+
+@dataclass(frozen=True, slots=True)
+class ShoeEvent:
+    """``host_time_s`` is when the host saw it, on its monotonic clock (`time.perf_counter`)."""
+
+    kind: ClassVar[str] = "event"
+    host_time_s: float
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return self.kind
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON: ``kind``, the event's own numbers, ``says``."""
+        return {"kind": self.kind, **asdict(self), "says": self.says}
+
+
+@dataclass(frozen=True, slots=True)
+class Gap(ShoeEvent):
+    """``lost`` samples that the device took between ``from_s`` and ``to_s`` (its own time) never came."""
+
+    kind: ClassVar[str] = "gap"
+    lost: int
+    from_s: float
+    to_s: float
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"{self.lost} sample{'s' * (self.lost != 1)} lost between {self.from_s:.3f} and {self.to_s:.3f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class Silence(ShoeEvent):
+    """No valid frame for ``silent_s`` so far."""
+
+    kind: ClassVar[str] = "silence"
+    silent_s: float
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"no valid frame for {self.silent_s:.1f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class Disconnected(ShoeEvent):
+    """The port was closed, to be opened again; ``reason`` is what the operating system or the watchdog said."""
+
+    kind: ClassVar[str] = "disconnected"
+    reason: str
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"connection lost ({self.reason})"
+
+
+@dataclass(frozen=True, slots=True)
+class Reconnected(ShoeEvent):
+    """Valid frames come again, ``away_s`` after the last one, at the ``attempts``-th opening of the port."""
+
+    kind: ClassVar[str] = "reconnected"
+    away_s: float
+    attempts: int
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"connected again after {self.away_s:.1f} s, at attempt {self.attempts}"
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted(ShoeEvent):
+    """The device started its clock anew; its time goes on at ``resumes_s``, from the host's clock."""
+
+    kind: ClassVar[str] = "restarted"
+    resumes_s: float
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"the shoe restarted; its time goes on at {self.resumes_s:.3f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped(ShoeEvent):
+    """``samples`` between ``from_s`` and ``to_s`` (device time) arrived and were thrown away: nobody read them."""
+
+    kind: ClassVar[str] = "dropped"
+    samples: int
+    from_s: float
+    to_s: float
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return (
+            f"{self.samples} samples between {self.from_s:.3f} and {self.to_s:.3f} s dropped:"
+            " they were not read in time"
+        )
+
+
+class EventLog:
+    """Events in order of time, from any thread; beyond ``limit`` they are only counted."""
+
+    def __init__(self, limit: int = 100_000) -> None:
+        self._limit = limit
+        self._lock = Lock()
+        self._kept: list[ShoeEvent] = []
+        self.surplus = 0
+
+    def add(self, *events: ShoeEvent) -> None:
+        """Append ``events``."""
+        with self._lock:
+            room = self._limit - len(self._kept)
+            self._kept.extend(events[: max(room, 0)])
+            self.surplus += max(len(events) - max(room, 0), 0)
+
+    def all(self) -> tuple[ShoeEvent, ...]:
+        """Every event kept, oldest first."""
+        with self._lock:
+            return tuple(self._kept)

@@ -1,0 +1,21 @@
+"""Checks in the field: zero before use, auto-zero in swing, body weight, units that do not answer, temperature."""
+
+from smartshoe.field.at_rest import Zero, check_zero, zero
+from smartshoe.field.body_weight import check_body_weight
+from smartshoe.field.finding import Finding
+from smartshoe.field.silence import check_units
+from smartshoe.field.swing_zero import SwingZero
+from smartshoe.field.temperature import sealed_air_pa_per_k, temperature_of_zeros, temperature_sensitivity
+
+__all__ = [
+    "Finding",
+    "SwingZero",
+    "Zero",
+    "check_body_weight",
+    "check_units",
+    "check_zero",
+    "sealed_air_pa_per_k",
+    "temperature_of_zeros",
+    "temperature_sensitivity",
+    "zero",
+]

@@ -1,0 +1,41 @@
+"""The crisp phases of a stance: four states, cut at the events."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.gait.contact import Contacts
+
+Array = NDArray[np.float64]
+States = NDArray[np.int8]
+
+PHASES = ("swing", "heel", "flat", "push")
+SWING, HEEL, FLAT, PUSH = range(4)
+
+
+def crisp(contacts: Contacts, time_s: Array) -> States:
+    """The state (n,) at the times (n,), as an index into `PHASES`.
+
+    swing, then heel (heel strike to foot flat), flat (to heel off), push (to toe off). A stance without a foot flat
+    or a heel off has no heel or no push phase.
+    """
+    state = np.zeros(time_s.size, dtype=np.int8)
+    if len(contacts) == 0:
+        return state
+    strike_s = np.where(np.isfinite(contacts.strike_s), contacts.strike_s, time_s[0])
+    toe_off_s = np.where(np.isfinite(contacts.toe_off_s), contacts.toe_off_s, np.inf)
+    # A stance that the record's end cuts may still come to lie flat; a whole one that did not began flat.
+    unseen_s = np.where(np.isfinite(contacts.toe_off_s), strike_s, np.inf)
+    flat_s = np.where(np.isfinite(contacts.foot_flat_s), contacts.foot_flat_s, unseen_s)
+    heel_off_s = np.where(np.isfinite(contacts.heel_off_s), contacts.heel_off_s, toe_off_s)
+    # Out of order, the later event gives way: the sequence errors tell of it.
+    flat_s = np.clip(flat_s, strike_s, heel_off_s)
+    which = np.searchsorted(strike_s, time_s, side="right") - 1
+    on = which >= 0
+    k = np.maximum(which, 0)
+    on &= time_s < toe_off_s[k]
+    state[on] = HEEL
+    state[on & (time_s >= flat_s[k])] = FLAT
+    state[on & (time_s >= heel_off_s[k])] = PUSH
+    return state

@@ -1,0 +1,168 @@
+"""`GaitResult`: what is known of a trial, as numbers, as tables and as the contract's object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.errors import UsageError
+from smartshoe.gait.contact import Contacts
+from smartshoe.gait.coverage import Coverage
+from smartshoe.gait.flag import Flag
+from smartshoe.gait.phases import PHASES as STATES
+from smartshoe.gait.strides import Stride
+from smartshoe.gait.summary import Activity
+from smartshoe.gait.total import BodyWeight
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Table = Literal["strides", "events", "forces"]
+
+SCHEMA = "smartshoe.gait/1"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A gait event of one foot: heel_strike, foot_flat, heel_off or toe_off."""
+
+    time_s: float
+    foot: str
+    event: str
+
+
+@dataclass(frozen=True, eq=False)
+class FootCourse:
+    """One foot against time: everything (n,) or (n, r) on ``time_s`` (n,).
+
+    ``load`` (n, r) of its units above their floors, in N where ``is_force``; ``force_n`` (n,) the whole foot's,
+    coverage allowed for, None where the loads are no forces; ``sd_n`` (n,) its error bar by the estimator, None
+    without one (it knows nothing of what passes beside the units); ``centre`` (n, 2) of pressure, along and medial as
+    shares of the insole's length, NaN in swing; ``state`` (n,) an index into `smartshoe.gait.phases.PHASES`;
+    ``membership`` (n, 6) in `smartshoe.gait.membership.PHASES`, ``abnormality`` (n,).
+    """
+
+    name: str
+    time_s: Array
+    rate_hz: float
+    regions: tuple[str, ...]
+    symbol: str
+    is_force: bool
+    load: Array
+    force_n: Array | None
+    sd_n: Array | None
+    centre: Array
+    state: NDArray[np.int8]
+    membership: Array
+    abnormality: Array
+    missing: Mask
+    contacts: Contacts
+    usual_peak: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces of the whole body in N; None where they cannot be known."""
+
+    body_weight: BodyWeight | None
+    mean_total_n: float | None
+    standing_total_n: float | None
+    rmse_estimate_n: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class GaitResult:
+    """A trial: ``events`` in order of time, ``strides`` in order of their start, ``summary`` and ``indices`` by name.
+
+    ``feet`` holds each foot against time, ``total_time_s`` and ``total_n`` (n,) both feet's force, None where it is
+    not known. ``coverage`` is the share that the units bear, ``covering`` how it was allowed for. `to_dict` is the
+    object of ``smartshoe gait --json``.
+    """
+
+    activity: Activity
+    events: tuple[Event, ...]
+    strides: tuple[Stride, ...]
+    summary: Mapping[str, Any]
+    indices: Mapping[str, Mapping[str, float | None]]
+    forces: Forces
+    flags: tuple[Flag, ...]
+    feet: Mapping[str, FootCourse]
+    total_time_s: Array
+    total_n: Array | None
+    coverage: float
+    covering: Coverage
+    standing_s: Sequence[tuple[float, float]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema smartshoe.gait/1; no NaN, no infinity."""
+        weight = self.forces.body_weight
+        return {
+            "schema": SCHEMA,
+            "activity": self.activity,
+            "events": [{"time_s": e.time_s, "foot": e.foot, "event": e.event} for e in self.events],
+            "strides": [stride.to_dict() for stride in self.strides],
+            "summary": dict(self.summary),
+            "indices": {foot: dict(values) for foot, values in self.indices.items()},
+            "forces": {
+                "body_weight_n": None if weight is None else {"value": weight.value, "sd": weight.sd},
+                "body_weight_source": None if weight is None else weight.source,
+                "mean_total_n": self.forces.mean_total_n,
+                "standing_total_n": self.forces.standing_total_n,
+                "rmse_estimate_n": self.forces.rmse_estimate_n,
+                "coverage": self.coverage,
+            },
+            "flags": [flag.to_dict() for flag in self.flags],
+        }
+
+    def to_frame(self, table: Table = "strides") -> pd.DataFrame:
+        """A pandas DataFrame: ``strides`` (one row each), ``events``, or ``forces`` (one row a sample)."""
+        import pandas as pd
+
+        if table == "strides":
+            columns = list(Stride.__dataclass_fields__)
+            return pd.DataFrame([stride.to_dict() for stride in self.strides], columns=columns)
+        if table == "events":
+            return pd.DataFrame([(e.time_s, e.foot, e.event) for e in self.events], columns=["time_s", "foot", "event"])
+        if table == "forces":
+            forces = self.columns()
+            for name in self.feet:
+                forces[f"{name}_phase"] = pd.Categorical.from_codes(forces[f"{name}_phase"], pd.Index(STATES))
+            return pd.DataFrame(forces)
+        raise UsageError(f"table {table!r} is not known: use strides, events or forces")
+
+    def columns(self) -> dict[str, Any]:
+        """The table of forces by column: units, feet, total, centre of pressure (% of the insole), phase (0 swing,
+        1 heel, 2 flat, 3 push).
+
+        On the first foot's times; the other's are interpolated where its clock differs. NaN where nothing is known.
+        """
+        base = next(iter(self.feet.values())).time_s
+        found: dict[str, Any] = {"time_s": base}
+        for name, foot in self.feet.items():
+            suffix = "n" if foot.is_force else foot.symbol.casefold()
+            for column, region in enumerate(foot.regions):
+                found[f"{name}_{region}_{suffix}"] = _on(base, foot, foot.load[:, column])
+            if foot.force_n is not None:
+                found[f"{name}_total_n"] = _on(base, foot, foot.force_n)
+            if foot.sd_n is not None:
+                found[f"{name}_total_sd_n"] = _on(base, foot, foot.sd_n)
+        if self.total_n is not None:
+            found["total_n"] = np.interp(base, self.total_time_s, self.total_n, left=np.nan, right=np.nan)
+        for name, foot in self.feet.items():
+            for column, way in enumerate(("along", "medial")):
+                found[f"{name}_centre_{way}_percent"] = 100.0 * _on(base, foot, foot.centre[:, column])
+            nearest = np.clip(np.round((base - foot.time_s[0]) * foot.rate_hz).astype(int), 0, foot.time_s.size - 1)
+            found[f"{name}_phase"] = foot.state[nearest]
+        return found
+
+
+def _on(base: Array, foot: FootCourse, values: Array) -> Array:
+    if base is foot.time_s:
+        return values
+    return np.asarray(np.interp(base, foot.time_s, values, left=np.nan, right=np.nan))

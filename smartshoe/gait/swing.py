@@ -1,0 +1,159 @@
+"""Where a foot is in the air: the coarse cut of a foot's load into swings and contacts, blind to offset and scale.
+
+A foot's load has a floor while it swings. The floor is found from the load itself, so that an offset does not matter,
+and the cut lies at shares of the load's height above it, so that body weight does not matter. Sway and shifts of
+weight have minima too, but round ones; a swing's walls are steep. A minimum counts where its width a tenth of the way
+up is at least `LEAST_SQUARENESS` of its width three tenths up (0.58 for a parabola, 0.9 for a swing).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+OFF, ON, UP = 0.10, 0.15, 0.30  # of the load's height above its floor: swing below, contact above, wall
+LEAST_SQUARENESS = 0.67
+LEAST_SWING_S = 0.18  # the valley of slow walking that dips below OFF is shorter
+LEAST_CONTACT_S = 0.08
+SCUFF_S, SCUFF_SHARE = 0.16, 0.35  # a touch shorter and lighter (of the median peak) is no stance
+LEAST_OF_LEVEL = 0.15  # of its own level, that a load must vary for a swing to be in it
+LEAST_OF_SCALE = 0.3  # of the loads so far
+NOISES = 12.0
+LIKE_FLOOR = 0.25  # of the scale, that a floor may differ from the last
+MOST_TRENDS = 4
+RHYTHM = 3  # swings that make a new floor believed
+SMOOTH_S, WIDE_S = 0.025, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Swings [``start``, ``stop``) (k,) in samples, in order; all else is contact. ``noise`` is a sample's sd."""
+
+    start: Index
+    stop: Index
+    noise: float
+
+
+def boxcar(signal: Array, count: int) -> Array:
+    """Centred mean (n,) over ``count`` (made odd) samples, fewer at the ends."""
+    half = count // 2
+    if half == 0 or signal.size == 0:
+        return signal
+    total = np.concatenate([[0.0], np.cumsum(signal - signal[0])])
+    at = np.arange(signal.size)
+    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, signal.size)
+    return np.asarray((total[high] - total[low]) / (high - low) + signal[0])
+
+
+def noise_of(signal: Array) -> float:
+    """A sample's sd from the median of second differences: a steady slope counts for nothing."""
+    if signal.size < 4:
+        return 0.0
+    return float(np.median(np.abs(np.diff(signal, 2))) / 0.6745 / np.sqrt(6.0))
+
+
+def cut(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
+    """The swings in a stretch of a foot's whole load (n,); None where the load does not vary as a swing makes it.
+
+    ``scale`` and ``floor`` are those of the stretch before, None where nothing is known.
+    """
+    found = _cut_level(load, rate_hz, least_load, scale, floor)
+    for _ in range(MOST_TRENDS):
+        # A floor that drifts hides the swings far from the lowest one; those that are seen tell its slope.
+        if found is None or found.start.size < 2:
+            return found
+        trend = _trend(load, found)
+        level = None if floor is None else floor - trend[0]
+        again = _cut_level(load - trend, rate_hz, least_load, scale, level)
+        if again is None or again.start.size <= found.start.size:
+            return found
+        found = again
+    return found
+
+
+def _trend(load: Array, found: Cut) -> Array:
+    """The straight line (n,) that the floor follows, nought in the middle: the median of all slopes between swings."""
+    total = np.concatenate([[0.0], np.cumsum(load)])
+    level = (total[found.stop] - total[found.start]) / (found.stop - found.start)
+    place = 0.5 * (found.stop + found.start)
+    first, second = np.triu_indices(place.size, 1)
+    slope = float(np.median((level[second] - level[first]) / (place[second] - place[first])))
+    return np.asarray(slope * (np.arange(load.size) - 0.5 * (load.size - 1)))
+
+
+def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
+    noise = noise_of(load)
+    wide = boxcar(load, round(WIDE_S * rate_hz))
+    low, high = float(wide.min()), float(wide.max())
+    top = float(np.quantile(wide[wide >= low + 0.15 * (high - low)], 0.9))
+    height = top - low
+    least = max(least_load, NOISES * noise, LEAST_OF_LEVEL * abs(top), LEAST_OF_SCALE * (scale or 0.0))
+    if not height > least:
+        return None
+    smooth = boxcar(load, round(SMOOTH_S * rate_hz))
+    start, stop = _low_runs(smooth, low + OFF * height, low + ON * height)
+    start, stop = _without_short(start, stop, smooth.size, rate_hz)
+    start, stop = _square(smooth, start, stop, low, height, rate_hz)
+    if start.size and floor is not None and scale is not None and start.size < RHYTHM:
+        total = np.concatenate([[0.0], np.cumsum(smooth)])
+        level = (total[stop] - total[start]) / (stop - start)
+        like = np.abs(level - floor) < LIKE_FLOOR * scale
+        start, stop = start[like], stop[like]
+    if start.size == 0:
+        return None
+    start, stop = _without_scuffs(smooth, start, stop, low, rate_hz)
+    return Cut(start, stop, noise)
+
+
+def _low_runs(smooth: Array, off: float, on: float) -> tuple[Index, Index]:
+    code = np.where(smooth >= on, 1, np.where(smooth < off, 0, -1))
+    known = np.flatnonzero(code >= 0)
+    if known.size == 0:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    last = np.maximum.accumulate(np.where(code >= 0, np.arange(code.size), known[0]))
+    up = code[last]
+    edge = np.flatnonzero(np.diff(np.concatenate([[1], up, [1]])))
+    return edge[0::2], edge[1::2]
+
+
+def _without_short(start: Index, stop: Index, size: int, rate_hz: float) -> tuple[Index, Index]:
+    """Short swings filled, then short contacts removed; those that touch the stretch's ends may be longer outside."""
+    keep = ((stop - start) >= LEAST_SWING_S * rate_hz) | (start == 0) | (stop == size)
+    start, stop = start[keep], stop[keep]
+    return _joined(start, stop, (start[1:] - stop[:-1]) >= LEAST_CONTACT_S * rate_hz)
+
+
+def _joined(start: Index, stop: Index, apart: NDArray[np.bool_]) -> tuple[Index, Index]:
+    if start.size < 2:
+        return start, stop
+    return start[np.concatenate([[True], apart])], stop[np.concatenate([apart, [True]])]
+
+
+def _square(smooth: Array, start: Index, stop: Index, low: float, height: float, rate_hz: float) -> tuple[Index, Index]:
+    at = np.arange(smooth.size)
+    wall = smooth > low + UP * height
+    before = np.maximum.accumulate(np.where(wall, at, -1))
+    after = np.minimum.accumulate(np.where(wall, at, smooth.size)[::-1])[::-1]
+    if start.size == 0:
+        return start, stop
+    below = np.concatenate([[0], np.cumsum(smooth < low + OFF * height)])
+    inner = below[stop] - below[start]
+    middle = (start + stop) // 2
+    outer = after[middle] - before[middle] - 1
+    long = inner >= 0.3 * LEAST_SWING_S * rate_hz
+    keep = long & (inner >= LEAST_SQUARENESS * np.maximum(outer, 1))
+    return start[keep], stop[keep]
+
+
+def _without_scuffs(smooth: Array, start: Index, stop: Index, low: float, rate_hz: float) -> tuple[Index, Index]:
+    if start.size < 3:
+        return start, stop
+    begins, ends = stop[:-1], start[1:]
+    peak = np.maximum.reduceat(smooth, np.column_stack([begins, ends]).ravel())[::2] - low
+    scuff = ((ends - begins) < SCUFF_S * rate_hz) & (peak < SCUFF_SHARE * np.median(peak))
+    return _joined(start, stop, ~scuff)

@@ -1,0 +1,1 @@
+"""A trial as a table, as figures, as a page and as files."""

@@ -1,0 +1,47 @@
+"""A trial as files: the page, the result and its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smartshoe.atomic import json_text, write_text
+from smartshoe.gait.result import GaitResult
+from smartshoe.report.gait.page import write_gait_page
+
+DIGITS = 9  # of a number in the tables of strides and events
+TIME_FORMAT, FORMAT = "%.9g", "%.6g"  # of the forces: a load is not known to a millionth of itself
+
+
+def publish_gait(folder: Path, found: GaitResult, title: str, facts: Mapping[str, str]) -> dict[str, Path]:
+    """Write ``gait.html``, ``gait.json``, ``strides.csv``, ``events.csv`` and ``forces.csv`` below ``folder``.
+
+    Returns them by what they are. ``forces.csv`` is a plain table, a trial again for ``smartshoe gait``.
+    """
+    import smartshoe
+
+    names = {"report": "gait.html", "result": "gait.json"}
+    names |= {table: f"{table}.csv" for table in ("strides", "events", "forces")}
+    written = {what: folder / name for what, name in names.items()}
+    write_text(written["result"], json_text(found.to_dict()))
+    for table in ("strides", "events"):
+        frame = found.to_frame("strides" if table == "strides" else "events")
+        text = frame.to_csv(index=False, float_format=f"%.{DIGITS}g", lineterminator="\n")
+        write_text(written[table], text)
+    write_text(written["forces"], forces_text(found.columns()))
+    write_gait_page(written["report"], found, f"Gait: {title}", {**facts, "smartshoe": smartshoe.__version__})
+    return written
+
+
+def forces_text(columns: Mapping[str, Any]) -> str:
+    """The plain table of equally long columns, time first; nothing where a number is NaN.
+
+    One format for the whole table: pandas, number by number, takes four times as long.
+    """
+    numbers = np.column_stack([np.asarray(values, dtype=float) for values in columns.values()])
+    row = ",".join([TIME_FORMAT] + [FORMAT] * (numbers.shape[1] - 1)) + "\n"
+    body = (row * len(numbers)) % tuple(numbers.ravel())
+    return ",".join(columns) + "\n" + body.replace("nan", "")

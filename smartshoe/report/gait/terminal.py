@@ -1,0 +1,76 @@
+"""A trial on a terminal: a short table for a person."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from smartshoe.gait.result import GaitResult
+from smartshoe.report.numbers import plain, with_sd
+from smartshoe.report.tables import new_console, table_of
+
+
+def _cv(spread: dict[str, Any] | None, digits: int = 3) -> str:
+    if not spread or spread["mean"] is None:
+        return "–"
+    cv = spread["cv_percent"]
+    return plain(spread["mean"], digits) + ("" if cv is None else f" ({cv:.1f} %)")
+
+
+def by_foot(found: GaitResult) -> list[tuple[str, list[str]]]:
+    """Rows of the table: what, and each foot's cell; rows that say nothing are left out."""
+    summary = found.summary
+    feet = list(found.feet)
+    rows: list[tuple[str, list[str]]] = [
+        ("strides", [str(summary["strides"].get(foot, 0)) for foot in feet]),
+        ("stride time (s)", [_cv(summary["stride_time_s"].get(foot)) for foot in feet]),
+        ("step time on to it (s)", [_cv(summary["step_time_s"].get(foot)) for foot in feet]),
+        ("stance (% of stride)", [plain(summary["stance_percent"].get(foot)) for foot in feet]),
+        ("peak force (N)", [_cv(summary["peak_n"].get(foot)) for foot in feet]),
+        ("impulse (N s)", [_cv(summary["impulse_n_s"].get(foot)) for foot in feet]),
+        ("loading rate (N/s)", [_cv(summary["loading_rate_n_per_s"].get(foot)) for foot in feet]),
+        ("sequence errors (%)", [plain(found.indices[foot]["sequence_error_percent"], 2) for foot in feet]),
+        ("deviation from pattern (%)", [plain(found.indices[foot]["deviation_percent"], 2) for foot in feet]),
+        ("abnormality (%)", [plain(found.indices[foot]["abnormality_percent"], 2) for foot in feet]),
+    ]
+    return [(name, cells) for name, cells in rows if any(cell not in ("–", "0") for cell in cells)]
+
+
+def print_gait(found: GaitResult, title: str) -> None:
+    """Times and forces by foot, then what concerns both, then the flags."""
+    summary = found.summary
+    table = table_of(f"{title}: {found.activity}; mean (variation)", ["", *found.feet])
+    for name, cells in by_foot(found):
+        table.add_row(name, *cells)
+    console = new_console()
+    if table.row_count:
+        console.print(table)
+    else:
+        console.print(f"{title}: {found.activity}")
+    said = [
+        ("cadence", summary["cadence_steps_per_min"], " steps/min"),
+        ("double support", summary["double_support_percent"], " %"),
+        ("flight", summary["flight_percent"] or None, " %"),
+        ("asymmetry", summary["asymmetry_percent"], " %"),
+    ]
+    line = ", ".join(f"{name} {plain(value)}{unit}" for name, value, unit in said if value is not None)
+    if line:
+        console.print(line, soft_wrap=True)
+    if summary["order_of_contact"]:
+        console.print(
+            f"order of contact: {', '.join(summary['order_of_contact'])}"
+            f" ({plain(summary['order_of_contact_percent'])} % of stances)",
+            soft_wrap=True,
+        )
+    forces = found.forces
+    if forces.body_weight is not None:
+        weight = forces.body_weight
+        line = f"body weight {with_sd({'value': weight.value, 'sd': weight.sd})} N ({weight.source.replace('_', ' ')})"
+        for name, value in (("mean total", forces.mean_total_n), ("standing total", forces.standing_total_n)):
+            if value is not None:
+                line += f", {name} {value:.1f} N"
+        if found.coverage != 1.0:
+            line += f", coverage {found.coverage:.3g}, {found.covering.says}"
+        console.print(line, soft_wrap=True)
+    for flag in found.flags:
+        where = "" if flag.where == "all" else f" ({flag.where})"
+        console.print(f"{flag.kind}: {flag.says}{where}", soft_wrap=True)

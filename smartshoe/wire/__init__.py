@@ -1,0 +1,1 @@
+"""What a shoe sends and is sent, as decoders and encoders without any input or output: see docs/wire.md."""

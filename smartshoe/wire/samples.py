@@ -1,0 +1,60 @@
+"""What a decoder gives: samples with their place in the device's count and on the device's clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.units import COUNTS, Unit
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+CHANNELS = ("toe", "meta1", "meta4", "heel")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples in order, none twice.
+
+    ``sequence`` (n,) counts samples and ``device_time_s`` (n,) is the device's clock, both unwrapped over the wire's
+    16 and 32 bits and over loss; ``boot`` (n,) counts how often the device had restarted by then: sequence and time
+    start anew with each. ``readings`` (n, channels) in ``unit``; where ``missing`` (n, channels), the last reading
+    that was there, or 0.
+    """
+
+    sequence: Integers
+    device_time_s: Array
+    readings: Array
+    missing: Mask
+    names: tuple[str, ...]
+    unit: Unit
+    boot: Integers
+
+    def __len__(self) -> int:
+        return int(self.sequence.size)
+
+    @classmethod
+    def empty(cls, names: tuple[str, ...] = CHANNELS, unit: Unit = COUNTS) -> Samples:
+        """No samples."""
+        none = np.zeros(0, dtype=np.int64)
+        shape = (0, len(names))
+        return cls(none, np.zeros(0), np.zeros(shape), np.zeros(shape, dtype=bool), names, unit, none)
+
+
+def join_samples(parts: Sequence[Samples]) -> Samples:
+    """Consecutive samples of one decoder as one; at least one part."""
+    if len(parts) == 1:
+        return parts[0]
+    return replace(
+        parts[0],
+        sequence=np.concatenate([part.sequence for part in parts]),
+        device_time_s=np.concatenate([part.device_time_s for part in parts]),
+        readings=np.concatenate([part.readings for part in parts]),
+        missing=np.concatenate([part.missing for part in parts]),
+        boot=np.concatenate([part.boot for part in parts]),
+    )

@@ -1,0 +1,228 @@
+"""Strides, phases, memberships and indices: laws, and numbers that are known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from trials import analysed, loads_of, ran, recorded, stood, times_of, walked
+
+from simulators.gait import Person, Walk, trial
+from smartshoe.atomic import json_text
+from smartshoe.errors import UsageError
+from smartshoe.gait import analyse, centre_of_pressure, memberships
+from smartshoe.gait.crossing import growth, level_places, rise_places, running_median
+from smartshoe.gait.insole import PLACES
+from smartshoe.gait.membership import PHASES
+from smartshoe.gait.strides import loading_rate
+from smartshoe.gait.summary import asymmetry
+from smartshoe.recording import REGIONS
+
+
+# -- onsets ------------------------------------------------------------------------------------------------
+@settings(max_examples=25)
+@given(power=st.floats(1.0, 2.4), place=st.floats(8.0, 20.0), height=st.floats(0.5, 50.0), bears=st.floats(0.0, 1.5))
+def test_the_way_down_a_power_law_is_exact(power: float, place: float, height: float, bears: float) -> None:
+    # Fine samples: what is left is the straight line between them.
+    at = np.arange(0.0, 60.0, 0.01)
+    load = np.tile(height * np.maximum(at - place, 0.0) ** power, (4, 1))
+    lowest = np.full(4, 0.05 * load.max())
+    crossed = rise_places(load, lowest[:, None] * np.array([1.0, 2.0, 4.0]), 5.0 * lowest)
+    ratio = growth(crossed, 1.5)
+    assert ratio == pytest.approx(2.0 ** (1.0 / power), rel=1e-3)
+    wanted = place + (bears * lowest[0] / height) ** (1.0 / power)
+    assert 0.01 * level_places(crossed, ratio, np.full(4, bears)) == pytest.approx(wanted, abs=0.05)
+
+
+def test_a_load_that_never_comes_has_no_onset() -> None:
+    crossed = rise_places(np.zeros((2, 30)), np.tile([1.0, 2.0, 4.0], (2, 1)), np.full(2, 5.0))
+    assert np.isnan(crossed).all()
+    assert growth(crossed, 1.7) == 1.7
+
+
+@given(values=arrays(float, st.integers(1, 30), elements=st.floats(-9, 9) | st.just(np.nan)))
+@settings(max_examples=20)
+def test_running_median_is_that_of_each_neighbourhood(values: np.ndarray) -> None:
+    found = running_median(values, 5)
+    for index in range(values.size):
+        near = values[max(0, index - 2) : index + 3]
+        near = near[np.isfinite(near)]
+        assert np.isnan(found[index]) if near.size == 0 else found[index] == pytest.approx(np.median(near))
+
+
+# -- membership, centre of pressure --------------------------------------------------------------------------
+LOADS = arrays(float, (7, 4), elements=st.floats(-20.0, 900.0))
+
+
+@settings(max_examples=25)
+@given(loads=LOADS, scale=st.floats(0.3, 3.0))
+def test_memberships_sum_to_one_and_do_not_know_body_weight(loads: np.ndarray, scale: float) -> None:
+    usual = np.array([200.0, 110.0, 260.0, 370.0])
+    member, abnormality = memberships(loads, REGIONS, usual)
+    assert member.sum(axis=1) == pytest.approx(1.0)
+    assert (member >= 0.0).all()
+    assert ((abnormality >= 0.0) & (abnormality <= 1.0)).all()
+    heavier, _ = memberships(scale * loads, REGIONS, scale * usual)
+    assert heavier == pytest.approx(member, abs=1e-9)
+
+
+def test_each_phase_is_found_where_its_loads_are() -> None:
+    usual = np.full(4, 100.0)
+    on = {
+        "initial_contact": {"heel"},
+        "loading_response": {"heel", "meta4"},
+        "mid_stance": {"heel", "meta4", "meta1"},
+        "terminal_stance": {"meta4", "meta1", "toe"},
+        "pre_swing": {"toe"},
+        "swing": set(),
+    }
+    loads = np.array([[80.0 if region in regions else 0.0 for region in REGIONS] for regions in on.values()])
+    member, abnormality = memberships(loads, REGIONS, usual)
+    assert [list(PHASES)[k] for k in member.argmax(axis=1)] == list(on)
+    assert (abnormality < 0.05).all()
+    # Heel and toe with nothing between them is no phase of gait.
+    _, odd = memberships(np.array([[80.0, 0.0, 0.0, 80.0]]), REGIONS, usual)
+    assert odd[0] > 0.9
+
+
+@settings(max_examples=25)
+@given(loads=LOADS, scale=st.floats(0.3, 3.0))
+def test_centre_of_pressure_stays_within_the_units(loads: np.ndarray, scale: float) -> None:
+    centre = centre_of_pressure(loads, REGIONS, 10.0)
+    places = np.array(list(PLACES.values()))
+    known = np.isfinite(centre[:, 0])
+    assert np.array_equal(known, np.maximum(loads, 0.0).sum(axis=1) > 10.0)
+    assert (centre[known] >= places.min(axis=0) - 1e-12).all()
+    assert (centre[known] <= places.max(axis=0) + 1e-12).all()
+    assert centre_of_pressure(scale * loads, REGIONS, scale * 10.0) == pytest.approx(centre, nan_ok=True)
+
+
+def test_the_centre_of_pressure_goes_from_heel_to_toe() -> None:
+    for foot in analysed().feet.values():
+        for stride in analysed().strides[2:8]:
+            if stride.foot != foot.name:
+                continue
+            at = stride.start_s + np.array([0.1, 0.9]) * (stride.toe_off_s - stride.start_s)
+            first, last = (foot.centre[int(np.searchsorted(foot.time_s, s)), 0] for s in at)
+            assert first == pytest.approx(PLACES["heel"][0], abs=0.01)
+            assert last > PLACES["meta1"][0]
+
+
+# -- strides and the summary ---------------------------------------------------------------------------------
+def test_loading_rate_of_a_ramp() -> None:
+    stance_n = np.concatenate([np.linspace(0.0, 600.0, 31), np.linspace(600.0, 0.0, 90)])
+    # 600 N in 30 samples of 5 ms.
+    assert loading_rate(stance_n, 200.0) == pytest.approx(4000.0)
+    assert loading_rate(np.zeros(20), 200.0) is None
+
+
+def test_asymmetry_is_right_less_left_over_their_mean() -> None:
+    assert asymmetry(90.0, 110.0) == pytest.approx(20.0)
+    assert asymmetry(5.0, 5.0) == 0.0
+
+
+@pytest.mark.parametrize(("load", "time"), [(0.0, 0.0), (0.2, 0.0), (0.0, 0.1), (-0.3, -0.1)])
+def test_asymmetry_of_load_and_time_is_found(load: float, time: float) -> None:
+    person = Person(load_asymmetry=load, time_asymmetry=time)
+    made = trial(person, Walk(1.3), 60.0, np.random.default_rng(21), sensors=False, outside="even")
+    found = analyse(made.recording, coverage=0.8).summary
+    # Fifty strides that vary by 3 % (loads) and 1.6 % (times) leave their mean uncertain by 0.5 and 0.3 %.
+    assert found["right_over_left_percent"]["impulse"] == pytest.approx(100.0 * load, abs=2.0)
+    assert found["right_over_left_percent"]["stance_time"] == pytest.approx(100.0 * time, abs=1.2)
+    assert found["asymmetry_percent"] == pytest.approx(abs(found["right_over_left_percent"]["impulse"]))
+
+
+def test_the_summary_is_that_of_the_true_events() -> None:
+    made, summary = walked(), analysed().summary
+    strike_s = {foot: made.times_s(foot, "heel_strike") for foot in ("left", "right")}
+    stride_s = {foot: np.diff(times) for foot, times in strike_s.items()}
+    both = np.concatenate(list(stride_s.values()))
+    assert summary["cadence_steps_per_min"] == pytest.approx(120.0 / both.mean(), rel=1e-3)
+    for foot, own in stride_s.items():
+        assert summary["stride_time_s"][foot]["mean"] == pytest.approx(own.mean(), rel=1e-3)
+        assert summary["stride_time_s"][foot]["cv_percent"] == pytest.approx(
+            100 * own.std(ddof=1) / own.mean(), abs=0.1
+        )
+        stance_s = made.times_s(foot, "toe_off")[: own.size] - strike_s[foot][:-1]
+        # Both events err by some 1 ms of a stride of 1.1 s.
+        assert summary["stance_percent"][foot] == pytest.approx(100 * np.mean(stance_s / own), abs=0.3)
+    double = sum(summary["stance_percent"].values()) - 100.0
+    assert summary["double_support_percent"] == pytest.approx(double, abs=0.5)
+    assert summary["order_of_contact"] == ["heel", "meta4", "meta1", "toe"]
+
+
+def test_the_four_phases_follow_each_other() -> None:
+    for foot in analysed().feet.values():
+        seen = foot.state[np.flatnonzero(np.diff(foot.state, prepend=-1))]
+        steps = np.diff(seen) % 4
+        assert (steps == 1).all()
+
+
+def test_indices_of_a_regular_gait_are_small_and_of_another_one_larger() -> None:
+    straight = analysed()
+    for values in straight.indices.values():
+        assert values["sequence_error_percent"] == 0.0
+        assert values["deviation_percent"] < 2.0
+    against = analyse(ran().recording, coverage=0.8, reference=straight)
+    assert against.indices["left"]["deviation_percent"] > 5.0
+    same = analyse(walked().recording, coverage=0.8, reference=straight)
+    assert same.indices == straight.indices
+    heavier = recorded(walked().time_s, {name: 1.7 * values for name, values in loads_of(walked()).items()})
+    moved = analyse(heavier, coverage=0.8, reference=straight)
+    assert moved.indices["left"]["deviation_percent"] == pytest.approx(straight.indices["left"]["deviation_percent"])
+
+
+# -- the result ----------------------------------------------------------------------------------------------
+def test_the_object_is_json_without_nan() -> None:
+    for found in (analysed(), analyse(stood().recording), analyse(ran().recording)):
+        assert json.loads(json_text(found.to_dict()))["schema"] == "smartshoe.gait/1"
+
+
+def test_frames_hold_strides_events_and_forces() -> None:
+    found = analysed()
+    strides = found.to_frame()
+    assert len(strides) == len(found.strides)
+    assert strides["peak_n"].tolist() == [stride.peak_n for stride in found.strides]
+    assert len(found.to_frame("events")) == len(found.events)
+    forces = found.to_frame("forces")
+    assert forces["total_n"].to_numpy() == pytest.approx(forces["left_total_n"] + forces["right_total_n"])
+    assert set(forces["left_phase"]) == {"swing", "heel", "flat", "push"}
+    with pytest.raises(UsageError, match="table 'steps' is not known"):
+        found.to_frame("steps")  # type: ignore[arg-type]
+
+
+def test_c3d_holds_loads_and_events_with_their_side(tmp_path: Path) -> None:
+    ezc3d = pytest.importorskip("ezc3d")
+    from smartshoe.gait.c3d import write_c3d
+
+    made = walked(60.0)
+    shifted = recorded(made.time_s + 100.0, loads_of(made))
+    found = analyse(shifted, coverage=0.8)
+    assert len(found.events) > 255
+    write_c3d(tmp_path / "walk.c3d", found)
+    read = ezc3d.c3d(str(tmp_path / "walk.c3d"))
+    group = read["parameters"]["EVENT"]
+    times = np.hstack([group[name]["value"] for name in ("TIMES", "TIMES2")])
+    contexts = [*group["CONTEXTS"]["value"], *group["CONTEXTS2"]["value"]]
+    labels = [*group["LABELS"]["value"], *group["LABELS2"]["value"]]
+    assert group["USED"]["value"][0] == len(found.events)
+    # Single precision holds a minute to 4 us.
+    assert 60.0 * times[0] + times[1] == pytest.approx([event.time_s - 100.0 for event in found.events], abs=1e-5)
+    assert contexts == [event.foot.capitalize() for event in found.events]
+    assert labels.count("Foot Strike") == sum(event.event == "heel_strike" for event in found.events)
+    analog = read["parameters"]["ANALOG"]
+    column = analog["LABELS"]["value"].index("left_total")
+    assert analog["UNITS"]["value"][column] == "N"
+    assert read["data"]["analogs"][0, column] == pytest.approx(found.feet["left"].force_n, abs=1e-3)
+    assert read["parameters"]["TRIAL"]["START_S"]["value"][0] == pytest.approx(100.0)
+
+
+def test_events_come_in_order_of_time() -> None:
+    times = [event.time_s for event in analysed().events]
+    assert times == sorted(times)
+    assert len(times_of(analysed(), "left", "heel_strike")) > 20
