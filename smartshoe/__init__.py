@@ -29,6 +29,7 @@ _HOME = {
     "lack_of_fit": "smartshoe.identification.lack_of_fit",
     "leave_one_rate_out": "smartshoe.identification.leave_out",
     "Calibration": "smartshoe.compensation",
+    "CalibrationStore": "smartshoe.store",
     "Compensator": "smartshoe.compensation",
     "stack": "smartshoe.compensation",
     "validate": "smartshoe.validation",
@@ -56,10 +57,12 @@ if TYPE_CHECKING:
     from smartshoe.models.extended import ExtendedModel
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
+    from smartshoe.store import CalibrationStore
     from smartshoe.validation import validate
 
 __all__ = [
     "Calibration",
+    "CalibrationStore",
     "Channel",
     "Compensator",
     "Diagnosis",
@@ -88,6 +91,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "gait":  # a room whose functions are called by its name: smartshoe.gait.analyse
+        return importlib.import_module("smartshoe.gait")
     home = _HOME.get(name)
     if home is None:
         raise AttributeError(f"module 'smartshoe' has no attribute {name!r}")
@@ -95,4 +100,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return sorted([*globals(), *_HOME, "gait"])

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 )
 @click.argument("files", nargs=-1, required=True)
 @click.option(
-    "--calibration", "calibration_paths", multiple=True, metavar="C.json", help="Of a unit in the files (repeatable)."
+    "--calibration", "calibration_paths", multiple=True, metavar="C.json", help="Of a unit, or a folder (repeatable)."
 )
 @click.option("--body-weight", "body_weight_n", type=float, metavar="N", help="Check the mean total force against it.")
 @click.option(
@@ -41,13 +41,12 @@ def command(
     Each FILE is a trial of one or two shoes; two FILES of one shoe each are weighed together. A rest of two seconds
     before the first step lets the zero be checked.
     """
-    from smartshoe.cli.inputs import read_all
+    from smartshoe.cli.inputs import load_calibrations, read_all
     from smartshoe.cli.output import emit_json
-    from smartshoe.compensation import Calibration
     from smartshoe.errors import RefusedError
     from smartshoe.field.examination import examine_trial
 
-    calibrations = [Calibration.load(path) for path in calibration_paths]
+    calibrations = load_calibrations(calibration_paths)
     recordings = read_all(files, time=time, force=None, sensors=(), unit=None)
     found = examine_trial(recordings, calibrations, body_weight_n=body_weight_n, coverage=coverage)
     verdicts = {item.verdict for item in found}

@@ -17,7 +17,7 @@ import click
     "calibration_paths",
     multiple=True,
     metavar="C.json",
-    help="A unit's calibration, from identify (repeatable); columns in N need none.",
+    help="A unit's calibration or a folder of them (repeatable); columns in N need none.",
 )
 @click.option("--body-weight", "body_weight_n", type=float, metavar="N", help="In newton; estimated where not given.")
 @click.option(
@@ -64,9 +64,9 @@ def command(
     show_notes(recordings)
     calibrations = []
     if calibration_paths:
-        from smartshoe.compensation import Calibration
+        from smartshoe.cli.inputs import load_calibrations
 
-        calibrations = [Calibration.load(path) for path in calibration_paths]
+        calibrations = load_calibrations(calibration_paths)
     if course_path == "midfoot":
         covered = Coverage.midfoot(coverage)
     else:

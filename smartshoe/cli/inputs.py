@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from smartshoe.recording import Recording
+
+if TYPE_CHECKING:
+    from smartshoe.compensation import Calibration
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -56,3 +59,26 @@ def read_all(
     recordings = join_pairs([one(file) for file in files])
     show_notes(recordings)
     return recordings
+
+
+def load_calibrations(paths: Sequence[str]) -> list[Calibration]:
+    """The calibrations in files and folders; in a folder a unit's extended one stands for its plain one.
+
+    Raises `InputError` for a folder that holds none.
+    """
+    from pathlib import Path
+
+    from smartshoe.compensation import Calibration
+    from smartshoe.errors import InputError
+
+    found: list[Calibration] = []
+    for path in paths:
+        if not Path(path).is_dir():
+            found.append(Calibration.load(path))
+            continue
+        inside = [Calibration.load(file) for file in sorted(Path(path).glob("*.json"))]
+        if not inside:
+            raise InputError(f"{path} holds no calibration: give a folder with .json files that identify wrote")
+        extended = {each.unit for each in inside if each.extended is not None}
+        found += [each for each in inside if each.extended is not None or each.unit not in extended]
+    return found

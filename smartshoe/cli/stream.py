@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 @click.option("--out", metavar="FILE", help="Write every sample to a new plain table.")
 def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, out: str | None) -> None:
     """Live readings and forces from a shoe: a line a second, every sample to FILE; Ctrl-C ends it."""
-    from smartshoe.compensation import Calibration
+    from smartshoe.cli.inputs import load_calibrations
     from smartshoe.devices import open_shoe
     from smartshoe.errors import UsageError
     from smartshoe.session.streaming import Forces
 
-    loaded = [Calibration.load(path) for path in calibrations]
+    loaded = load_calibrations(calibrations)
     if out is not None and Path(out).exists():
         raise UsageError(f"{out} is there already and is not overwritten: choose another name for --out")
     run = _Run(out)

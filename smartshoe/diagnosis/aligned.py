@@ -54,6 +54,20 @@ def common_drift(integrity: Integrity, recordings: Sequence[Recording]) -> float
     return float(np.mean(offsets / half_s))
 
 
+def drift_rates(integrity: Integrity, recordings: Sequence[Recording]) -> list[float]:
+    """How much faster one clock may run, if all recordings began together: from each lag seen, and its growth."""
+    half_s = [0.5 * recording.duration_s for recording in recordings]
+    offsets = [offset_s / half for offset_s, half in zip(integrity.clock_offset_s, half_s, strict=True)]
+    return [float(np.mean(offsets)), *offsets, *integrity.clock_rate]
+
+
+def on_one_clock(integrity: Integrity) -> Integrity:
+    """The findings where what looked like two clocks is something else."""
+    none = (0.0,) * len(integrity.clock_offset_s)
+    faults = tuple(fault for fault in integrity.faults if fault.kind != "two_clocks")
+    return replace(integrity, faults=faults, clock_offset_s=none, clock_rate=none)
+
+
 def put_right(recordings: Sequence[Recording], integrity: Integrity) -> tuple[list[Recording], list[Mask], list[str]]:
     """The recordings, sensors aligned, turned and zeroed where they must be; usable samples; a sentence for each."""
     made: list[Recording] = []

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 POLES_PER_S = np.geomspace(0.01, 20.0, 31)
 LATE_S = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28)
 TIMINGS = (*(("delay", (late,)) for late in LATE_S), *(("sensor_lag", (late, 0.1)) for late in LATE_S))
+ABOUT = (0.8, 1.0, 1.25)  # times a rate of two clocks that was seen without a model
 EARNED = 0.9  # of the error, for a delay that nobody asked for
 PLAINLY = 0.5  # the same where one is known: what looked like two clocks is a slow sensor
 LARGEST_SHARE = 5.0  # no wall relaxes by more: what looks like it is a lag or a permanent set
@@ -41,6 +42,20 @@ def start_of(sessions: Sequence[Session], scale: Scale, known: Timing | None = N
     others = [(*searched(sessions, scale, timing), timing) for timing in TIMINGS]
     lower, late, (name, values) = min(others, key=lambda one: one[0])
     return late.with_part(effect(name), np.array(values)) if lower < (PLAINLY if known else EARNED) * error else model
+
+
+def shared_timing(
+    sessions: Sequence[Session], moved: Sequence[Session], scale: Scale, rates: Sequence[float]
+) -> Timing | None:
+    """A delay, lag or drift of clocks (tried at and about ``rates``) that all ``sessions`` share; None where none does.
+
+    It must explain them as well as the baseline does those that were ``moved`` each by a clock of its own: one cause
+    comes before several.
+    """
+    drifts = [("clock_drift", (rate * part,)) for rate in {*rates} - {0.0} for part in ABOUT]
+    limit, _ = searched(moved, scale, None)
+    error, best = min((searched(sessions, scale, timing)[0], timing) for timing in (*TIMINGS, *drifts))
+    return best if error <= limit else None
 
 
 def has_idle_arm(model: ExtendedModel) -> bool:

@@ -15,14 +15,22 @@ Array = NDArray[np.float64]
 
 HALF_WIDTHS_S = (0.12, 0.06, 0.03)
 FEWEST = 7  # samples a line is drawn through
+CLIPPED = 4.0  # standard deviations: noise hardly comes by them
 UNLIKELY = 3.0  # standard deviations of a line's residual variance
 
 
 def noise_sd(signal: Array) -> float:
-    """White noise's standard deviation from third differences, which no ramp or bend reaches."""
+    """White noise's standard deviation from third differences, which no ramp or bend reaches.
+
+    The median finds the scale, the mean square of what lies within `CLIPPED` of it the value: on a converter's
+    lattice a median is a whole number of steps.
+    """
     if signal.size < 10:
         return 0.0
-    return float(np.median(np.abs(np.diff(signal, 3))) / (0.6745 * np.sqrt(20.0)))
+    third = np.abs(np.diff(signal, 3))
+    sd = float(np.median(third)) / 0.6745
+    inside = third <= CLIPPED * sd
+    return float(np.sqrt(np.mean(third[inside] ** 2) / 20.0))
 
 
 def without_noise(load: Array, step_s: float, sd: float) -> tuple[Array, float]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.noise import NoiseModel
+from smartshoe.diagnosis.screen import TARE, Rests
 from smartshoe.diagnosis.session import Session
+from smartshoe.identification.experiment import bridged
 from smartshoe.models.effects import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 
@@ -18,6 +20,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MOST_STEPS = 12
+QUICK_STEPS = 8  # of a fit that is only compared with others
 SETTLED = 0.05  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 LARGEST_LOG_STEP = 1.0
@@ -52,11 +55,6 @@ class Evidence:
     rest_sd: float
     kept: frozenset[str] = frozenset()
 
-    @property
-    def sample_time_s(self) -> float:
-        """Of the log, before thinning."""
-        return max(session.conditions.step_s / session.thinned for session in self.sessions)
-
     @cached_property
     def fitted(self) -> tuple[Session, ...]:
         """The sessions that a fit looks at."""
@@ -68,8 +66,11 @@ class Evidence:
         return tuple(session for session in self.sessions if session.judged.any())
 
     def residuals(self, model: ExtendedModel) -> list[Array]:
-        """Reading less simulation, a session each, in shares of full scale."""
-        return [session.reading - model.simulate(session.conditions) for session in self.sessions]
+        """Reading less simulation, a session each, in shares of full scale; bridged over samples that are faulty."""
+        return [
+            bridged(one.conditions.time_s, one.reading - model.simulate(one.conditions), one.usable)
+            for one in self.sessions
+        ]
 
     def cost(self, model: ExtendedModel) -> float:
         """Sum of whitened squares over what is fitted."""
@@ -93,6 +94,30 @@ class Evidence:
         residual = session.reading - model.simulate(session.conditions)
         white = self.noise.whitened(residual)[self.noise.counted(kept)]
         return float(white @ white)
+
+    def cost_of_corners(self, model: ExtendedModel) -> float:
+        """The cost of ``model`` under the measured load, less what that load's noise is expected to add to it.
+
+        A cleaned load has lost the rounding of its corners, by which a lag is told from a delay; a noisy one is fitted
+        best by a model that smooths it. So the noise stays in, and a draw of the same noise tells what it adds (after
+        Cook and Stefanski 1994). Up to half the Nyquist frequency: above it the two interpolate differently.
+        """
+        total = 0.0
+        for session in self.fitted:
+            if session.measured_load is None or session.load_noise is None:
+                return self.cost(model)
+            given, load = session.conditions, session.measured_load
+            reading = model.simulate(replace(given, load=load))
+            noisier = model.simulate(replace(given, load=given.load + session.load_noise))
+            total += self._slow_square(session.reading - reading, session)
+            total -= self._slow_square(noisier - model.simulate(given), session)
+        return total
+
+    def _slow_square(self, residual: Array, session: Session) -> float:
+        """Sum of whitened squares over what is fitted, of the lower half of all frequencies."""
+        white = np.where(self.noise.counted(session.fitted), self.noise.whitened(residual), 0.0)
+        power = np.abs(np.fft.rfft(white)) ** 2
+        return float(2.0 * power[1 : power.size // 2].sum() / white.size)
 
     def displacement_cost(self, model: ExtendedModel) -> float:
         """What the crosshead's displacement says against a model, on the scale of -2 log likelihood.
@@ -120,6 +145,12 @@ class Evidence:
     def _rest(self, model: ExtendedModel) -> Array:
         return (self.rest_load + tare_of(model)) / self.rest_sd
 
+    def rests(self, model: ExtendedModel, without: Mapping[str, ExtendedModel] | None = None) -> Rests:
+        """What the rests say of ``model``, and of the models ``without`` a part each."""
+        residual = self._rest(model)
+        shares = {name: self._rest(less) - residual for name, less in (without or {}).items()}
+        return Rests(residual, 1.0 / self.rest_sd, shares)
+
     def rows(self, model: ExtendedModel) -> tuple[Array, Array]:
         """Whitened residual (m,) and sensitivities (m, p) over what is fitted."""
         found, slopes = [], []
@@ -138,19 +169,27 @@ class Evidence:
         return np.concatenate([*found, rest]), np.concatenate([*slopes, column])
 
 
-TARE = "load_cell_tare"
-
-
 def tare_of(model: ExtendedModel) -> float:
     """Load in shares of full scale that the model adds to the measured one."""
     return next((float(part.values[0]) for part in model.parts if part.name == TARE), 0.0)
 
 
-def fit(evidence: Evidence, start: ExtendedModel, steps: int = MOST_STEPS, settled: float = SETTLED) -> Fit:
-    """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm."""
+def fit(
+    evidence: Evidence,
+    start: ExtendedModel,
+    steps: int = MOST_STEPS,
+    settled: float = SETTLED,
+    still: Collection[str] = (),
+) -> Fit:
+    """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
+
+    The parameters of the effects in ``still`` stay where they are.
+    """
     parameters = [parameter for _, parameter in start.parameters]
     logarithmic = np.array([_is_logarithmic(p) for p in parameters])
     low, high = np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
+    fixed = np.array([owner in still for owner, _ in start.parameters])
+    low, high = np.where(fixed, start.theta, low), np.where(fixed, start.theta, high)
     model = start.at(np.clip(start.theta, low, high))
     residual, slopes = evidence.rows(model)
     cost = float(residual @ residual)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis.remainder import Look, repeating, slow
 from smartshoe.diagnosis.session import Session
+from smartshoe.diagnosis.wander import Wander, wander_of
 
 Array = NDArray[np.float64]
 
@@ -19,26 +20,46 @@ SIGNIFICANT_Z = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Leftover:
-    """``rms`` of the structure in a residual (shares of full scale), by two looks; ``says`` where it is largest."""
+    """``rms`` of the structure in a residual (shares of full scale), by two looks; ``says`` where it is largest.
+
+    ``wander`` is what its slow part is made of: where that is noise, it is no structure, however slow.
+    """
 
     repeating: Look
     slow: Look
+    wander: Wander | None
     says: str
 
     @property
     def rms(self) -> float:
-        """The larger of the two looks that stand out of the noise."""
-        return max((one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z), default=0.0)
+        """The largest of the looks that stand out of the noise."""
+        return max(self._found, default=0.0)
 
     @property
     def significant(self) -> bool:
-        """Whether either look stands out of the noise."""
-        return max(self.repeating.z, self.slow.z) > SIGNIFICANT_Z
+        """Whether any look stands out of the noise."""
+        return bool(self._found)
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether nothing is left but noise, slow or not."""
+        return self.wander is not None and self.wander.is_noise and not self.significant
+
+    @property
+    def _found(self) -> list[float]:
+        noise, switches = (False, False) if self.wander is None else (self.wander.is_noise, self.wander.switches)
+        looks = [self.repeating] if noise else [self.repeating, self.slow]
+        found = [one.rms for one in looks if one.z > SIGNIFICANT_Z]
+        return [*found, self.wander.rms] if self.wander is not None and switches else found
 
 
 def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Leftover:
     """Both looks at the residuals, and the place of the largest part."""
-    return Leftover(repeating(sessions, residuals), slow(sessions, residuals, BLOCK_S), where(sessions, residuals))
+    wander = wander_of(sessions, residuals)
+    says = where(sessions, residuals)
+    if wander is not None and wander.switches:
+        says = f"it switches between two levels and stays at each for about {2.0 * wander.tau_s:.2g} s; {says}"
+    return Leftover(repeating(sessions, residuals), slow(sessions, residuals, BLOCK_S), wander, says)
 
 
 def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:

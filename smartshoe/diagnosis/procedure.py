@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
-from smartshoe.diagnosis.aligned import common_delay_s, common_drift, put_right
-from smartshoe.diagnosis.baseline import start_of
+from smartshoe.diagnosis.aligned import common_delay_s, common_drift, drift_rates, on_one_clock, put_right
+from smartshoe.diagnosis.baseline import Timing, shared_timing, start_of
 from smartshoe.diagnosis.confidence import SEPARATED, confidence, inseparable
 from smartshoe.diagnosis.course import course_of
 from smartshoe.diagnosis.decay import decay_of
@@ -17,13 +17,15 @@ from smartshoe.diagnosis.force import force_rmse_n
 from smartshoe.diagnosis.integrity import Integrity, examine
 from smartshoe.diagnosis.judgement import Errors, errors, gain
 from smartshoe.diagnosis.leftover import Leftover, leftover_of
+from smartshoe.diagnosis.margins import penalty
+from smartshoe.diagnosis.naming import MATERIAL
 from smartshoe.diagnosis.next_experiment import next_experiment
 from smartshoe.diagnosis.noise_kinds import noise_kinds
 from smartshoe.diagnosis.parameters import joint_parameters, parameters_of
 from smartshoe.diagnosis.ranges import ranges_of
 from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
-from smartshoe.diagnosis.selection import MATERIAL, Choice, Progress, choose, penalty
-from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis.selection import Choice, Progress, choose
+from smartshoe.diagnosis.session import REST_SHARE, Scale, Session, at_full_rate, full_scale, prepare, thinning
 from smartshoe.diagnosis.traits import Traits, traits_of
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import effect
@@ -113,14 +115,24 @@ def _seen(recording: Recording) -> str | None:
 def _diagnosed(
     recordings: Sequence[Recording], count: int, integrity: Integrity, material: float, progress: Progress
 ) -> Diagnosis:
-    recordings, usable, put = put_right(recordings, integrity)
+    drift = common_drift(integrity, recordings)
+    delay_s = 0.0 if drift else common_delay_s(integrity)
+    known: Timing | None = ("clock_drift", (drift,)) if drift else ("delay", (delay_s,)) if delay_s else None
+    given = recordings
+    recordings, usable, put = put_right(given, integrity)
     scale = full_scale(recordings[:count], usable[:count])
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
     sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
+    moved = known is None and (any(integrity.clock_offset_s) or any(integrity.clock_rate))
+    if moved:
+        as_given, usable_as_given, put_as_given = put_right(given, on_one_clock(integrity))
+        unmoved = prepare(as_given, usable_as_given, held, scale, thinning(as_given, scale))
+        known = shared_timing(unmoved, sessions, scale, drift_rates(integrity, given))
+        if known is not None:
+            recordings, usable, put, sessions, moved = as_given, usable_as_given, put_as_given, unmoved, False
+        if known is not None and known[0] == "sensor_lag":  # of a sensor or a wall: left to the search for effects
+            integrity, known = on_one_clock(integrity), None
     traits, ranges = traits_of(sessions), ranges_of(sessions, scale)
-    drift = common_drift(integrity, recordings)
-    delay_s = 0.0 if drift else common_delay_s(integrity)
-    known = ("clock_drift", (drift,)) if drift else ("delay", (delay_s,)) if delay_s else None
     start = start_of(sessions, scale, known)
     kept = frozenset(start.names if known else ())
     choice = choose(start, sessions, rest_loads(sessions), kept, material, progress)
@@ -130,13 +142,13 @@ def _diagnosed(
     fine = at_full_rate(sessions, usable, scale)
     baseline, best = errors(fine, choice.baseline.model), errors(fine, choice.fit.model)
     causes = [_cause(name, choice, fine, best, scale, traits) for name in choice.causes]
-    moved = not delay_s and not drift and (any(integrity.clock_offset_s) or any(integrity.clock_rate))
     # What is left of a delay after the clocks were put right is an error of the putting right.
     causes = [one for one in causes if _stands(one) and not (moved and one.effect.family == "timing")]
     causes, verdict = _judged(causes, before, after, material)
     # The less the baseline follows, the better must be what follows.
     needed = np.interp(baseline.fit_percent, *FIT_PERCENT_NEEDED)
-    follows = best.fit_percent >= needed
+    # Strong noise keeps every model from a good fit, and speaks against none.
+    follows = best.fit_percent >= needed or after.is_noise
     if not follows or (ranges.is_trap and causes):
         causes, verdict = [], "unexplained"
     # What the best model leaves is noise but for the structure in it.
@@ -148,7 +160,8 @@ def _diagnosed(
     extended = fitted.model
     wrong = float(np.sqrt(max(baseline.rmse**2 - noise_variance, 0.0)))
     # Structure that no effect explains would be taken for coloured noise.
-    noise = noise_kinds(fine, extended, integrity.faults, verdict in ("adequate", "explained"), material)
+    explained = verdict in ("adequate", "explained") or after.is_noise
+    noise = noise_kinds(fine, extended, integrity.faults, explained, material)
     named = [cause.name for cause in causes]
     parameters, covariance = joint_parameters(fitted, scale)
     return Diagnosis(
@@ -189,13 +202,15 @@ def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
     means = []
     commanded = all(session.recording.command_n is not None for session in sessions)
     for session in sessions:
-        command = session.recording.command_n
+        command, load = session.recording.command_n, session.conditions.load
         resting = session.resting & ~session.held_out
-        if command is not None and resting.any():
+        if command is not None:
+            # Told by the command alone: a large tare lifts the load out of what looks like a rest.
             full = float(np.max(np.abs(command))) or 1.0
-            resting &= np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
+            nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
+            resting = nothing & (np.abs(load - np.quantile(load, 0.02)) < REST_SHARE) & ~session.held_out
         if resting.sum() > 10:
-            means.append(float(np.mean(session.conditions.load[resting])))
+            means.append(float(np.mean(load[resting])))
     return np.array(means), COMMANDED_REST_SD if commanded else REST_SD
 
 

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 FEWEST_BLOCKS = 8
 COLOUR_S = (0.1, 0.2, 0.35, 0.6, 1.0)  # time constants of the noise's coloured part; slower ones count as structure
 NOISE_KNOWN_TO = 0.25
+CUT = 3.0  # medians of the size
 PLACES = 64  # of a cycle, when repeats are laid over each other
 ALIKE = 0.1  # in height and duration
 
@@ -121,14 +122,32 @@ def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float
         if rows.shape[0] < FEWEST_BLOCKS:
             continue
         means = rows.mean(axis=1)
-        expected = _mean_variance(rows - means[:, None], step_s)
+        expected = _mean_variance(rows - means[:, None], step_s) * _loudness(rows)
         excess += list(means**2 - expected)
         # The blocks' own scatter, and that the noise is known from them to some percent only.
-        spread += 2.0 * expected**2 * means.size + (NOISE_KNOWN_TO * expected * means.size) ** 2
+        spread += 2.0 * float(expected @ expected) + (NOISE_KNOWN_TO * float(expected.sum())) ** 2
     if not excess:
         return Look(0.0, 0.0, 0)
     mean = float(np.mean(excess))
     return Look(float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(float(np.sqrt(spread)), 1e-300), len(excess))
+
+
+def _quiet(rows: Array) -> NDArray[np.bool_]:
+    """(blocks,) the nine tenths with the least power: a block with a step in it tells nothing of noise."""
+    power = np.sum((rows - rows.mean(axis=1, keepdims=True)) ** 2, axis=1)
+    return np.asarray(power <= np.quantile(power, 0.9))
+
+
+def _loudness(rows: Array) -> Array:
+    """(blocks,) noise power of each block over that of the quiet ones, by differences of neighbours.
+
+    Noise that grows with load or slope is no structure; and structure hardly shows from one sample to the next.
+    """
+    fast = np.abs(np.diff(rows, axis=1))
+    # One jump in a block is no loud noise.
+    fast = np.mean(np.minimum(fast, CUT * np.median(fast, axis=1, keepdims=True)) ** 2, axis=1)
+    usual = float(fast[_quiet(rows)].mean())
+    return np.asarray(fast / usual) if usual > 0.0 else np.ones(fast.size)
 
 
 def _mean_variance(centred: Array, step_s: float) -> float:
@@ -138,8 +157,7 @@ def _mean_variance(centred: Array, step_s: float) -> float:
     """
     width = centred.shape[1]
     lags = np.arange(width // 2)
-    quiet = np.sum(centred**2, axis=1) <= np.quantile(np.sum(centred**2, axis=1), 0.9)
-    rows = centred[quiet]
+    rows = centred[_quiet(centred)]
     found = np.array([float(np.mean(rows[:, k:] * rows[:, : width - k])) for k in lags])
     place = np.arange(width)
     centring = np.eye(width) - 1.0 / width

@@ -15,6 +15,7 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
+TARE = "load_cell_tare"
 NOTHING = 1e-8  # of a column's squared norm: it lies within the others' span
 RIDGE = 1e-9
 
@@ -51,7 +52,7 @@ class Dictionary:
 
 
 # Found by tests of their own before any model is asked.
-NOT_BY_WAVEFORM = frozenset({"noise", "data", "saturation"})
+NOT_BY_WAVEFORM = frozenset({"noise", "data"})
 
 
 def available(sessions: Sequence[Session]) -> list[Effect]:
@@ -191,7 +192,24 @@ class Board:
         return part[:count, :count], product[:count], max(square, 0.0)
 
 
-def board(words: Dictionary, noise: NoiseModel, parts: Mapping[str, Sequence[Array]] | None = None) -> Board:
+@dataclass(frozen=True, eq=False)
+class Rests:
+    """What the loads in rests say of a tare: ``residual`` (m,) of the model, ``weight`` 1/sd of a load in a rest.
+
+    ``shares`` (m,): what each part takes off that residual.
+    """
+
+    residual: Array
+    weight: float
+    shares: Mapping[str, Array]
+
+
+def board(
+    words: Dictionary,
+    noise: NoiseModel,
+    parts: Mapping[str, Sequence[Array]] | None = None,
+    rests: Rests | None = None,
+) -> Board:
     """The inner products; ``parts`` are what each part adds to the reading, a session each (n,)."""
     shares = dict(parts or {})
     whitened, raw = [], []
@@ -202,13 +220,31 @@ def board(words: Dictionary, noise: NoiseModel, parts: Mapping[str, Sequence[Arr
         raw.append(rows[session.fitted])
     first = 1 + words.own[0].shape[1] + words.others[0].shape[1]
     places = {name: first + k for k, name in enumerate(shares)}
+    if rests is not None:
+        whitened.append(_rest_rows(words, rests, list(shares)))
     white_rows, raw_rows = np.concatenate(whitened), np.concatenate(raw)
     return Board(words, white_rows.T @ white_rows, raw_rows.T @ raw_rows, places)
 
 
-def screen(words: Dictionary, noise: NoiseModel) -> Screening:
+def _rest_rows(words: Dictionary, rests: Rests, parts: Sequence[str]) -> Array:
+    """(m, columns): without these rows a tare would be the like of an offset."""
+    first = 1 + words.own[0].shape[1]
+    rows = np.zeros((rests.residual.size, first + words.others[0].shape[1] + len(parts)))
+    rows[:, 0] = rests.residual
+    for k, (owner, _) in enumerate(words.model.parameters):
+        if owner == TARE:
+            rows[:, 1 + k] = -rests.weight
+    for candidate in words.candidates:
+        if candidate.effect.name == TARE:
+            rows[:, first + candidate.columns.start] = -rests.weight
+    for k, name in enumerate(parts):
+        rows[:, rows.shape[1] - len(parts) + k] = rests.shares.get(name, 0.0)
+    return rows
+
+
+def screen(words: Dictionary, noise: NoiseModel, rests: Rests | None = None) -> Screening:
     """The screen of a model as it is."""
-    return board(words, noise).screen()
+    return board(words, noise, None, rests).screen()
 
 
 def _explained(candidate: Candidate, gram: Array, products: Array) -> tuple[Array, float]:

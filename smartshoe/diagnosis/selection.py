@@ -10,63 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.baseline import has_idle_arm
-from smartshoe.diagnosis.fitting import Evidence, Fit, fit
+from smartshoe.diagnosis.fitting import QUICK_STEPS, Evidence, Fit, fit
+from smartshoe.diagnosis.margins import LATE, LEAST_FALL, Rival, is_better, margin, penalty, visible
+from smartshoe.diagnosis.naming import Settled, named, with_companions
 from smartshoe.diagnosis.noise import white
-from smartshoe.diagnosis.screen import Board, Screened, Screening, board, dictionary, noise_of, screen
+from smartshoe.diagnosis.screen import TARE, Board, Screened, Screening, board, dictionary, noise_of, screen
 from smartshoe.diagnosis.session import Session
-from smartshoe.models.effects import catalogue, effect
+from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel, Part
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-MATERIAL = 2e-4  # of the full-scale reading: what an effect must move the reading by to be a cause
 SLIGHT = 5e-5  # what is significant but moves the reading by less is left alone
-LEAST_FALL = 30.0  # of -2 log likelihood for an effect with one parameter
-FALL_A_PARAMETER = 8.0
-MOST_COUNTED = 2  # parameters beyond the first: those of shape bend little more
 BEST_WHITENED, BEST_OF_FAMILY, BEST_RAW = 6, 2, 1
 BEST_SWAPS = 3
 MOST_PARTS = 6
-QUICK_STEPS = 8
 FIRST_STEPS = 2
 CLOSE = 0.1  # of what the best candidate takes off the cost
 MOST_MERGED = 4
 WORTH_A_MERGER = 0.9
 WORTH_A_SWAP = 0.7  # of what an effect takes off: what another must promise by itself to be tried in its place
 HALF_MATERIAL = 1e-4
-NEIGHBOURING = (
-    frozenset({"hysteresis", "asymmetry", "rate"}),
-    frozenset({"softening", "gain_drift"}),
-    frozenset({"relaxation", "gas_heat", "timing"}),
-    frozenset({"rate", "asymmetry", "hysteresis", "timing"}),
-    frozenset({"leak", "zero"}),
-    frozenset({"static_curve", "dead_band"}),
-)
-SHAPE_OF_NEIGHBOUR = 0.1
-NAMED_OF_LARGEST = 0.05
 # No equation is exact: what is smaller than this beside another effect may be its error of shape.
 LEAST_OF_LARGEST = 0.02
-SHAPE_ERROR = 0.05
-TIMING_SHAPE_ERROR = 0.1
-UNSEEN_SHAPE_ERROR = 0.3  # the same within one sample of the log
 MERGED_SHAPE_ERROR = 0.02
 ARM = "second_relaxation"
 ARM_SHARE, ARM_RATES_PER_S = 0.08, np.geomspace(0.03, 10.0, 7)
-SEEN_CLEARLY = 10.0  # of -2 log likelihood
 BETTER = 6.0  # of -2 log likelihood, for a swap
 SECOND_OF_FAMILY = 0.05  # of what the first one moves the reading by
 CANCELLING_OTHERS = 25.0
 CANCELLING = 4.0  # times what an addition takes off the error: what it may move the reading by
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """Another effect in the place of a cause: ``margin`` is how much worse -2 log likelihood is, penalty included."""
-
-    effect: str
-    margin: float
-    fit: Fit | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,48 +69,9 @@ class Choice:
         return tuple(sorted(self.sizes, key=lambda name: -self.sizes[name]))
 
 
-def visible(evidence: Evidence, one: ExtendedModel, other: ExtendedModel) -> float:
-    """Root mean square of the difference of two simulations over usable samples, share of full scale."""
-    total, count = 0.0, 0
-    for session in evidence.sessions:
-        moved = (one.simulate(session.conditions) - other.simulate(session.conditions))[session.usable]
-        total += float(moved @ moved)
-        count += moved.size
-    return float(np.sqrt(total / max(count, 1)))
-
-
-def margin(evidence: Evidence, one: Fit, other: Fit, less: Fit) -> float:
-    """By how much -2 log likelihood is worse for ``one`` than for ``other``, which differ in the last effect.
-
-    ``less`` is the fit without either. Among static curves the pressure alone says little: no equation is exact, and
-    a truth that departs from its own by `SHAPE_ERROR` of the effect's size leaves SHAPE_ERROR^2 of the fall behind,
-    which another curve may follow better. There the displacement decides, where it was logged. Lags and delays differ
-    within milliseconds of a corner only, whose own rounding is not known.
-    """
-    names = one.model.names[-1], other.model.names[-1]
-    worse = one.cost - other.cost
-    more = penalty(names[0]) - penalty(names[1])
-    if all(effect(name).family == "timing" for name in names):
-        fall = max(less.cost - min(one.cost, other.cost), 0.0)
-        short = all(abs(float(each.model.parts[-1].values[0])) < evidence.sample_time_s for each in (one, other))
-        error = UNSEEN_SHAPE_ERROR if short else TIMING_SHAPE_ERROR
-        return worse / (1.0 + error**2 * fall / SEEN_CLEARLY) + more
-    seen = evidence.displacement_cost(other.model)
-    if seen == 0.0 or any(effect(name).family != "static_curve" for name in names):
-        return worse + more
-    fall = max(less.cost - min(one.cost, other.cost), 0.0)
-    return worse / (1.0 + SHAPE_ERROR**2 * fall / SEEN_CLEARLY) + more + evidence.displacement_cost(one.model) - seen
-
-
 def part_of(model: ExtendedModel, name: str) -> Part:
     """The part that holds an effect."""
     return next(part for part in model.parts if part.name == name)
-
-
-def penalty(name: str) -> float:
-    """What -2 log likelihood must fall by for an effect to be taken in."""
-    live = [p for p in catalogue()[name].parameters if not p.unit.endswith("/K")]
-    return LEAST_FALL + FALL_A_PARAMETER * min(len(live) - 1, MOST_COUNTED)
 
 
 def choose(
@@ -161,7 +96,7 @@ def choose(
         words = dictionary(current.model, evidence.fitted)
         evidence = replace(evidence, noise=noise_of(words))
         current = fit(evidence, current.model)
-        looked = screen(words, evidence.noise)
+        looked = screen(words, evidence.noise, evidence.rests(current.model))
         screening = screening or looked
         if len(current.model.parts) >= MOST_PARTS:
             break
@@ -175,19 +110,6 @@ def choose(
         seen.add(names)
     settled = _settled(evidence, current, set(), progress)
     return _concluded(evidence, settled, fit(evidence, replace(start, parts=())), screening, material)
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """A fit of which no part is needless and none is better replaced; the fits without each part, and the rivals.
-
-    ``sizes``: what the reading moves by without each part, the rest fitted anew.
-    """
-
-    fit: Fit
-    without: dict[str, Fit]
-    sizes: dict[str, float]
-    rivals: dict[str, tuple[Rival, ...]]
 
 
 def _added(evidence: Evidence, current: Fit, looked: Screening, progress: Progress) -> Fit | None:
@@ -222,7 +144,8 @@ def _worth_trying(looked: Screening) -> list[Screened]:
     white: list[Screened] = []
     families: dict[str, int] = {}
     for one in looked.ranked:
-        family = one.candidate.effect.family
+        # To a screen a lag and a delay are one.
+        family = "late" if one.candidate.effect.name in LATE else one.candidate.effect.family
         if one.fall > LEAST_FALL / 2 and len(white) < BEST_WHITENED and families.get(family, 0) < BEST_OF_FAMILY:
             white.append(one)
             families[family] = families.get(family, 0) + 1
@@ -248,6 +171,8 @@ def _refusal(evidence: Evidence, current: Fit, attempt: Fit) -> str | None:
     fall = current.cost - attempt.cost
     if fall < penalty(attempt.model.names[-1]):
         return "too little"
+    if attempt.model.names[-1] == TARE:  # told by the rests: an offset hides it from everything else
+        return None
     size = visible(evidence, attempt.model, current.model)
     if size < SLIGHT:
         return f"slight ({100 * size:.3f} % of full scale)"
@@ -285,7 +210,7 @@ def _settled(evidence: Evidence, current: Fit, seen: set[frozenset[str]], progre
         words = _board(evidence, current, without)
         rivals = {name: tuple(_swaps(evidence, current, less, words, name)) for name, less in without.items()}
         here = Settled(current, without, sizes, rivals)
-        if best is None or merged is not None or _score(evidence, current) < _score(evidence, best.fit):
+        if best is None or merged is not None or is_better(evidence, current, best.fit):
             best, merged = here, None
         following = _better(evidence, here, tried)
         if following is None:
@@ -310,24 +235,15 @@ def _fit_without(evidence: Evidence, model: ExtendedModel, name: str) -> Fit:
     return min(less, fit(evidence, arm, QUICK_STEPS), key=lambda one: one.cost)
 
 
-def _score(evidence: Evidence, one: Fit) -> float:
-    """What sets of effects are compared by."""
-    return one.cost + sum(penalty(name) for name in one.model.names) + _of_curves(evidence, one.model)
-
-
-def _of_curves(evidence: Evidence, model: ExtendedModel) -> float:
-    """What the displacement says of the static curve in a model."""
-    curved = any(part.effect.family == "static_curve" for part in model.parts)
-    return evidence.displacement_cost(model) if curved else 0.0
-
-
 def _better(evidence: Evidence, here: Settled, tried: set[frozenset[str]]) -> Fit | None:
     """The swap that gains most, to a set that was not tried and of which the newcomer would not be dropped again."""
     found = [
         (rival.margin, rival.fit, here.without[name])
         for name, rivals in here.rivals.items()
         for rival in rivals
-        if rival.fit is not None and rival.margin < -BETTER and frozenset(rival.fit.model.names) not in tried
+        if rival.fit is not None
+        and rival.margin < (0.0 if {name, rival.effect} == LATE else -BETTER)
+        and frozenset(rival.fit.model.names) not in tried
         # What was found before any fit may only turn into its like.
         if name not in evidence.kept or effect(rival.effect).family == effect(name).family
     ]
@@ -369,7 +285,8 @@ def _board(evidence: Evidence, current: Fit, without: dict[str, Fit]) -> Board:
         ]
         for name, less in without.items()
     }
-    return board(dictionary(current.model, evidence.fitted), evidence.noise, shares)
+    rests = evidence.rests(current.model, {name: less.model for name, less in without.items()})
+    return board(dictionary(current.model, evidence.fitted), evidence.noise, shares, rests)
 
 
 def _newcomers(looked: Screening, current: Fit, gone: Sequence[str]) -> list[Screened]:
@@ -391,8 +308,8 @@ def _needless(evidence: Evidence, current: Fit, without: dict[str, Fit], sizes: 
         if name not in evidence.kept
         and (
             less.cost - current.cost < penalty(name)
-            or sizes[name] < _least_size(name, sizes)
-            or evidence.held_out_square(less.model) <= judged
+            or (name != TARE and sizes[name] < _least_size(name, sizes))
+            or (name != TARE and evidence.held_out_square(less.model) <= judged)
         )
     }
     return min(missed, key=lambda name: missed[name] - penalty(name)) if missed else None
@@ -424,16 +341,7 @@ def _swaps(evidence: Evidence, current: Fit, less: Fit, words: Board, name: str)
     ]
 
 
-def _is_shape_error(name: str, sizes: dict[str, float]) -> bool:
-    """Whether an effect is small beside one whose equation, a little wrong, leaves just such a thing behind."""
-    family = effect(name).family
-    like = {one for group in NEIGHBOURING if family in group for one in group}
-    near = [size for other, size in sizes.items() if other != name and effect(other).family in like]
-    return bool(near) and sizes[name] < SHAPE_OF_NEIGHBOUR * max(near)
-
-
 def _concluded(evidence: Evidence, settled: Settled, baseline: Fit, screening: Screening, material: float) -> Choice:
-    sizes = settled.sizes
-    least = max(material, NAMED_OF_LARGEST * max(sizes.values(), default=0.0))
-    named = {name: size for name, size in sizes.items() if size >= least and not _is_shape_error(name, sizes)}
-    return Choice(settled.fit, baseline, evidence, screening, settled.rivals, settled.without, named)
+    settled = with_companions(evidence, settled)
+    sizes = named(evidence, settled, material)
+    return Choice(settled.fit, baseline, evidence, screening, settled.rivals, settled.without, sizes)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis.denoise import noise_sd, without_noise
 from smartshoe.diagnosis.integrity.fault import runs_of
+from smartshoe.diagnosis.jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification.experiment import bridged
 from smartshoe.loading import turning_points
@@ -37,6 +38,7 @@ FEWEST_CYCLES = 6
 REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
 LOWEST_SHARE = 0.02
 FEWEST_AT_REST = 10
+FEWEST_FOR_NOISE = 200  # samples: the noise is then known to 5 %
 REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
 
 
@@ -56,6 +58,7 @@ class Session:
     ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
     kept from every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
+    ``measured_load`` (n,) is the load with its noise, ``load_noise`` (n,) a draw of noise like it; None at full rate.
     """
 
     recording: Recording
@@ -68,6 +71,8 @@ class Session:
     resting: Mask
     thinned: int
     displacement: Array | None = None
+    measured_load: Array | None = None
+    load_noise: Array | None = None
 
     @property
     def fitted(self) -> Mask:
@@ -203,6 +208,7 @@ def _session(
     raw = load_n / scale.load_n
     raw_noise = noise_sd(raw)
     load, noise = without_noise(raw, step_s, raw_noise)
+    load = as_sampled(load, reading / scale.reading, step_s)
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)
     conditions = Conditions(
@@ -213,6 +219,11 @@ def _session(
         **{name: smoothed(values, weights, factor) for name, values in extra.items()},
         before=before,
     )
+    measured = drawn = None
+    if like is None:
+        white = np.random.default_rng(index).standard_normal(raw.size)
+        measured = smoothed(raw, weights, factor)
+        drawn = smoothed(_sd_at_rest(raw, load < base + REST_SHARE, raw_noise) * white, weights, factor)
     kept = smoothed(good.astype(float), weights, factor) > 0.7
     load = conditions.load
     if like is None:
@@ -231,7 +242,14 @@ def _session(
         np.abs(load - base) < REST_SHARE,
         factor,
         smoothed(displacement, weights, factor) if displacement is not None else None,
+        measured,
+        drawn,
     )
+
+
+def _sd_at_rest(load: Array, resting: Mask, everywhere: float) -> float:
+    """Noise of the load where it rests, if less than ``everywhere``: a load full of corners passes for a noisy one."""
+    return min(noise_sd(load[resting]), everywhere) if resting.sum() >= FEWEST_FOR_NOISE else everywhere
 
 
 def _rests_levelled(load: Array, level: float, noise: float) -> Array:

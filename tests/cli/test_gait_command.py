@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -197,3 +198,21 @@ def test_a_fault_is_one_sentence_and_leaves_no_file(
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert says in last
     assert not result.exists()
+
+
+def test_a_folder_of_calibrations_serves_with_the_extended_ones_before_the_plain(tmp_path: Path) -> None:
+    from smartshoe.cli.inputs import load_calibrations
+    from smartshoe.compensation import Calibration
+    from smartshoe.errors import InputError
+    from smartshoe.units import MILLIBAR
+
+    plain = Calibration(a1=0.2, b0=3.6, b1=0.85, reading_unit=MILLIBAR, unit="left_toe")
+    extended = replace(plain, extended=plain.model())
+    plain.save(tmp_path / "left_toe.json")
+    extended.save(tmp_path / "left_toe_extended.json")
+    replace(plain, unit="left_heel").save(tmp_path / "left_heel.json")
+    found = load_calibrations([str(tmp_path)])
+    assert [(each.unit, each.extended is not None) for each in found] == [("left_heel", False), ("left_toe", True)]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds no calibration"):
+        load_calibrations([str(tmp_path / "empty")])

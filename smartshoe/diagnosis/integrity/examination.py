@@ -8,7 +8,7 @@ import numpy as np
 
 from smartshoe.diagnosis.integrity.clocks import align, two_clocks
 from smartshoe.diagnosis.integrity.dropouts import dropouts
-from smartshoe.diagnosis.integrity.fault import DataFault, Finding, Integrity, Mask
+from smartshoe.diagnosis.integrity.fault import Array, DataFault, Finding, Integrity, Mask
 from smartshoe.diagnosis.integrity.following import does_not_follow_load, wrong_sign
 from smartshoe.diagnosis.integrity.held import held_samples
 from smartshoe.diagnosis.integrity.lattice import quantisation
@@ -41,6 +41,7 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     hum,
 )
 LEAST_USABLE = 0.5
+NONE: Array = np.zeros(0)
 
 
 def examine(recordings: Sequence[Recording]) -> Integrity:
@@ -55,8 +56,12 @@ def examine(recordings: Sequence[Recording]) -> Integrity:
     usable: list[Mask] = []
     offsets: list[tuple[float, float]] = []
     refusals: list[str] = []
-    for number, recording in enumerate(recordings):
-        findings, mask, clock = _examined(recording)
+    examined = [_examined(recording) for recording in recordings]
+    dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
+    if dropped_to.size and len(recordings) > 1:
+        # What one recording teaches about the unit holds for the others.
+        examined = [_examined(recording, dropped_to) for recording in recordings]
+    for number, (recording, (findings, mask, clock)) in enumerate(zip(recordings, examined, strict=True)):
         faults += [_fault(number, recording, finding) for finding in findings]
         refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
         if not refused and mask.mean() < LEAST_USABLE:
@@ -74,8 +79,8 @@ def examine(recordings: Sequence[Recording]) -> Integrity:
     )
 
 
-def _examined(recording: Recording) -> tuple[list[Finding], Mask, tuple[float, float]]:
-    """The findings of one recording, its usable samples, its clock's offset and rate."""
+def _examined(recording: Recording, dropped_to: Array = NONE) -> tuple[list[Finding], Mask, tuple[float, float]]:
+    """The findings of one recording, its usable samples, its clock's offset and rate; ``dropped_to`` as in `View`."""
     findings = [finding for detect in OF_RECORDING for finding in detect(recording)]
     usable = np.ones(len(recording), dtype=bool)
     for finding in findings:
@@ -86,7 +91,7 @@ def _examined(recording: Recording) -> tuple[list[Finding], Mask, tuple[float, f
     if lacking is not None:
         findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
     elif not any(finding.refuses for finding in findings):
-        view = _view(recording)
+        view = _view(recording, dropped_to)
         if view is None:
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
@@ -118,18 +123,18 @@ def _lacking(recording: Recording) -> str | None:
     )
 
 
-def _view(recording: Recording) -> View | None:
+def _view(recording: Recording, dropped_to: Array = NONE) -> View | None:
     """The recording where load and reading are both present, on one clock, the reading rising with load."""
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
     if index.size < 64:
         return None
     time_s, load_n, reading = recording.time_s[index], load.si[index], sensor.values[index]
-    view = View(recording, index, time_s, Signal(load_n), Signal(reading), 1)
+    view = View(recording, index, time_s, Signal(load_n), Signal(reading), 1, dropped_to=dropped_to)
     at, middle, _ = view.curve
     turned = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
     if turned:
-        view = View(recording, index, time_s, Signal(load_n), Signal(-reading), -1)
+        view = View(recording, index, time_s, Signal(load_n), Signal(-reading), -1, dropped_to=dropped_to)
     return align(view)
 
 

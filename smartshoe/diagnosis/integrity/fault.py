@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -44,6 +44,7 @@ class Finding:
     """What a detector hands back: ``at`` (n,) marks the samples at fault, over all samples of the recording.
 
     Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
+    ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded.
     """
 
     kind: str
@@ -52,6 +53,7 @@ class Finding:
     severity: Severity = "material"
     masks: bool = False
     refuses: str | None = None
+    values: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ SMALLEST_WIDTH = 0.15  # of the lattice step: what noise is taken for at least, 
 
 def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``held_samples``; masked, but for the first sample of a run, which was read."""
-    at = held(view) & ~bad
+    at = held(view, bad)
     if not at.any():
         return
     starts, stops = runs_of(at)
@@ -37,8 +37,8 @@ def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
     )
 
 
-def held(view: View) -> Mask:
-    """(m,) readings that repeat the last one although noise or motion must have changed it.
+def held(view: View, bad: Mask) -> Mask:
+    """(m,) readings that repeat the last one although noise or motion must have changed it; none that is ``bad``.
 
     The chance of an honest run is at most that of noise staying within one lattice step, however the step lies,
     while the signal moves on by d a sample. d is the least of three slopes: before the run, after it, and from its
@@ -47,7 +47,8 @@ def held(view: View) -> Mask:
     reading = view.reading
     y = reading.values
     at = np.zeros(y.size, dtype=bool)
-    same = (np.diff(y) == 0.0) & (np.diff(view.time_s) <= 1.6 * view.step_s)
+    # Runs at a dropout's value would pass for a logger that holds, and honest runs for its work.
+    same = (np.diff(y) == 0.0) & (np.diff(view.time_s) <= 1.6 * view.step_s) & ~bad[1:] & ~bad[:-1]
     starts, stops = runs_of(same)  # samples starts..stops, stops included
     if starts.size == 0 or view.span == 0.0:
         return at

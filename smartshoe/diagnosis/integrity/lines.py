@@ -19,6 +19,11 @@ SURE = 14.0  # beyond ln(frequencies) in units of the local mean power: a chance
 LEAST_SHARE = 0.0001  # of the span
 BESIDE_LATTICE = 0.6  # of the step, where noise does not dither it
 STEADY = 2.5  # first halves of the stretches against second ones: a ringing dies, a hum does not
+MAINS_COHERENT = 0.3  # of the parts' amplitude: mains wander by some hundredths of a hertz
+COHERENT, DOUBTS = 0.7, 3.0  # the same of any other line; standard deviations
+AS_STEADY = 1.5  # in power; 3 Hz with 1 % of damping loses more from half to half of a stretch of four seconds
+CLEAR, FEWEST_PARTS = 0.25, 4  # noise over the line in a part that must show it
+UNEVEN = 2.5  # times; that much noise makes it 1.7
 MAINS_HZ = (50.0, 60.0)
 HARMONICS = 3
 MOST_LINES = 5
@@ -116,6 +121,23 @@ def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[
     return residual, weight
 
 
+def _lasts(whole: float, own: Array, weight: Array, noise_power: Array) -> bool:
+    """Whether one phase and one power hold in all parts: a ringing begins anew with each move of the load, larger
+    or smaller, and dies.
+
+    ``whole`` amplitude over all parts, ``own`` (p,) and ``weight`` (p,) of each, first and second half of a stretch in
+    turn; ``noise_power`` (p,) of what noise beside the line adds to its square.
+    """
+    share = weight**2
+    power = share * (own**2 - noise_power)
+    doubt = DOUBTS * float(np.sqrt(share**2 @ (noise_power**2 + 2.0 * whole**2 * noise_power)))
+    coherent = whole**2 * float(share.sum()) > COHERENT**2 * (float(power.sum()) - doubt)
+    clear = own[noise_power < (CLEAR * max(whole, float(np.median(own)))) ** 2]
+    if clear.size >= FEWEST_PARTS and np.quantile(clear, 0.9) > UNEVEN * np.quantile(clear, 0.1):
+        return False
+    return coherent and float(power[0::2].sum()) < AS_STEADY * float(power[1::2].sum()) + doubt
+
+
 def _strongest(
     view: View, residual: Array, weight: Array, stretches: list[tuple[int, int]]
 ) -> tuple[float, float, Array] | None:
@@ -132,8 +154,8 @@ def _strongest(
         return None
     width = max(1, round(NEIGHBOURHOOD_HZ / float(frequency[1])) // 64)
     coarse = power[: power.size // width * width].reshape(-1, width)
-    level = median_filter(np.median(coarse, axis=1), 65, mode="mirror") / np.log(2.0)
-    local = level[np.minimum(np.arange(power.size) // width, level.size - 1)]
+    smooth = median_filter(np.median(coarse, axis=1), 65, mode="mirror") / np.log(2.0)
+    local = smooth[np.minimum(np.arange(power.size) // width, smooth.size - 1)]
     ratio = power / np.maximum(local, 1e-300)
     ratio[:first] = 0.0
     best = int(np.argmax(np.where(np.isfinite(ratio), power * (ratio > SURE + np.log(n)), 0.0)))
@@ -143,6 +165,8 @@ def _strongest(
     folded = 2.0 if 0 < best < size // 2 else 1.0
     whole = folded * np.dot(residual, carrier) / weight.sum()
     own, halves = [], np.zeros(2)
+    weights, noise_power = [], []
+    level = folded**2 * float(local[best]) / float(np.dot(weight, weight))
     for low, high in stretches:
         middle = (low + high) // 2
         for i, (a, b) in enumerate(pairwise((low, middle, high))):
@@ -151,11 +175,16 @@ def _strongest(
                 part = folded * np.dot(residual[a:b], carrier[a:b]) / total
                 halves[i] += abs(part) ** 2
                 own.append(abs(part))
+                weights.append(total)
+                noise_power.append(level * float(np.dot(weight[a:b], weight[a:b])) / total**2)
     amplitude = max(abs(whole), float(np.median(own)))
     step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
     least = max(LEAST_SHARE * view.span, BESIDE_LATTICE * step if noise < 0.5 * step else 0.0)
     steady = halves[0] < STEADY**2 * halves[1]
-    if amplitude < least or not steady or abs(whole) < 0.3 * amplitude:
+    if amplitude < least or not steady or abs(whole) < MAINS_COHERENT * amplitude:
+        return None
+    from_mains = aliases(float(frequency[best]), 1.0 / view.step_s, float(n * view.step_s))
+    if not from_mains and not _lasts(abs(whole), *map(np.array, (own, weights, noise_power))):
         return None
     course: Array = np.real(whole * np.conj(carrier))
     return float(frequency[best]), float(amplitude), course

@@ -10,9 +10,11 @@ from smartshoe.diagnosis.integrity.fault import Finding, Mask, runs_of
 from smartshoe.diagnosis.integrity.view import View
 
 LEAST_TIES = 5
+MOST_TIES = 10  # times as many: levels of a lattice at a peak differ by a few times
 LEAST_RUN = 3
 NOISY_RUN = 8  # ties in a row at which noise does not come to rest by chance
 FEW_BEYOND = 0.01  # of all samples: spikes may lie beyond the rail
+FEW_JUST_BEYOND = 0.1  # of those at the rail: the converter's own noise
 BAND = 0.1  # of the span: the stretch of the static curve beside the rail that gives its slope there
 STEPS = 3.0
 NOISES = 7.0
@@ -74,13 +76,24 @@ def _rail(view: View, bad: Mask, inward: float) -> float | None:
     tied = np.flatnonzero(count >= LEAST_TIES)
     if tied.size == 0 or count[: tied[0]].sum() > FEW_BEYOND * count.sum():
         return None
-    return float(levels[tied[0]])
+    # On a lattice the converter's noise ties beyond the rail too, but nowhere as often as at it.
+    outer = count[: 1 + int(np.searchsorted(np.cumsum(count), FEW_BEYOND * count.sum()))]
+    most = int(np.argmax(outer))
+    at = most if outer[most] > MOST_TIES * count[tied[0]] else int(tied[0])
+    # A rail cuts noise off: where readings lie just beyond, those that tie are held or lie on a lattice.
+    beyond = np.abs(levels[:at] - levels[at]) <= NOISES * view.reading.quiet_noise
+    return float(levels[at]) if count[:at][beyond].sum() <= FEW_JUST_BEYOND * count[at] else None
 
 
 def _noise_stands_still(view: View, tied: Mask, rail: float, inward: float) -> bool:
     """Whether readings tie for long although there is noise, and as much of it beside the rail as elsewhere."""
     starts, stops = runs_of(tied)
     size = stops - starts
+    # A soft knee ties beside its rail too.
+    far = np.abs(view.reading.values - rail) > NOISES * view.reading.quiet_noise
+    elsewhere = runs_of((np.diff(view.reading.values, prepend=np.nan) == 0.0) & far)
+    if int(((elsewhere[1] - elsewhere[0]) >= NOISY_RUN - 1).sum()) >= int((size >= NOISY_RUN).sum()):
+        return False  # the logger holds, at the rail as elsewhere
     if not view.reading.is_noisy or (size >= LEAST_RUN).sum() < LEAST_RUNS or int(size.max()) < NOISY_RUN:
         return False
     inside = inward * (view.reading.values - rail)

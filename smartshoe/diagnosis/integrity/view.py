@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,9 @@ NEAR_S = 0.1  # corners of load and reading this near to each other are taken fo
 NEAR_SAMPLES = 3
 UPPER_QUARTILE = 1.15  # of a normal deviate's absolute value
 LEAST_NOISE = 1e-4  # of the range: less is arithmetic
+STEEP, FLAT, FEWEST = 0.5, 0.05, 50  # of a steep slope; samples
+JITTERY = 3.0  # times: a second difference holds a ramp's corners too, which do not treble a median
+JITTERS = 5.0  # standard deviations
 DITHERED = 0.7  # of a lattice step: less noise than this may be the toggling between two levels
 
 
@@ -83,6 +86,7 @@ class View:
 
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
+    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out.
     """
 
     recording: Recording
@@ -93,6 +97,7 @@ class View:
     sign: int
     offset_s: float = 0.0
     rate: float = 0.0
+    dropped_to: Array = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def step_s(self) -> float:
@@ -217,6 +222,35 @@ class View:
         excess = np.where(np.abs(step) > allowed, step, 0.0)
         excess[np.diff(self.time_s) > 1.6 * self.step_s] = 0.0
         out: Array = excess
+        return out
+
+    @cached_property
+    def jitter_reach(self) -> Array:
+        """(m,) what an error of the sampling time may bring into each reading; 0 unless noise follows the slope.
+
+        Where ramps are much noisier than rests, noise over slope is an error of time, and a rest beside a ramp may
+        hold any reading that the ramp takes within a few of those.
+        """
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+        nothing = np.zeros(self.time_s.size)
+        slope = np.abs(np.gradient(self.expected_steadily, self.step_s))
+        usual = float(np.quantile(slope, 0.99))  # not the one corner that a step of load makes
+        steep, flat = slope > STEEP * usual, slope < FLAT * usual
+        if steep.sum() < FEWEST or flat.sum() < FEWEST:
+            return nothing
+        if np.median(self.reading.noise[steep]) < JITTERY * np.median(self.reading.noise[flat]):
+            return nothing
+        jitter_s = float(np.median(self.reading.noise[steep] / slope[steep]))
+        size = 2 * int(np.ceil(JITTERS * jitter_s / self.step_s)) + 1
+        high = maximum_filter1d(self.expected_steadily, size, mode="nearest")
+        out: Array = high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
+        return out
+
+    @cached_property
+    def expected_steadily(self) -> Array:
+        """(m,) the static curve at each sample's load, the load's noise averaged."""
+        out: Array = np.interp(self.steady_load, *self.curve[:2])
         return out
 
     def whole(self, at: Mask) -> Mask:

@@ -21,7 +21,7 @@ class GainDrift(Effect):
     says = "the gain moves steadily with time (with the temperature, where it is logged): peaks grow or shrink"
     parameters = (
         EffectParameter("drift_rate", "1/s", "share of the gain gained a second", 0.0, -1e-2, 1e-2, 1e-5),
-        EffectParameter("temperature_coefficient", "1/K", "share of the gain gained a kelvin", 0.0, -0.1, 0.1, 1e-3),
+        EffectParameter("temperature_coefficient", "1/K", "share of the gain gained a kelvin", 0.0, -0.3, 0.3, 1e-3),
     )
     exposed_by = frozenset({"repeats", "peaks", "pauses"})
     separated_by = {

@@ -1,0 +1,96 @@
+"""Slow noise is told as noise, and what only looks like it is not; a jittered clock smooths what it samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+from test_diagnosis_parts import RATE_HZ, recording, sessions_of
+
+from smartshoe.diagnosis.jittered import as_sampled, jitter_s
+from smartshoe.diagnosis.leftover import leftover_of
+from smartshoe.diagnosis.session import Session
+from smartshoe.diagnosis.wander import wander_of
+
+NOISE = 0.001
+
+
+@pytest.fixture(scope="module")
+def sessions() -> list[Session]:
+    return sessions_of(recording(seed=1), recording(seed=2), recording(seed=3))[0]
+
+
+def noises(sessions: list[Session], seed: int, tau_s: float = 0.0, rms: float = 0.0) -> list[np.ndarray]:
+    """White noise and noise that remembers, (n,) a session."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for session in sessions:
+        n, step_s = session.reading.size, session.conditions.step_s
+        keep = float(np.exp(-step_s / tau_s)) if tau_s > 0.0 else 0.0
+        drawn = np.sqrt(1.0 - keep**2) * rng.standard_normal(n + 2000)
+        out.append(NOISE * rng.standard_normal(n) + rms * lfilter([1.0], [1.0, -keep], drawn)[2000:])
+    return out
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 999), st.floats(0.3, 2.0), st.floats(0.003, 0.05))
+def test_first_order_noise_is_noise_however_strong(sessions, seed, tau_s, rms):
+    residuals = noises(sessions, seed, tau_s, rms)
+    found = wander_of(sessions, residuals)
+    assert found is not None
+    assert found.is_noise
+    assert found.rms == pytest.approx(rms, rel=0.4)
+    assert not leftover_of(sessions, residuals).significant
+
+
+def switching(session: Session, rng: np.random.Generator) -> np.ndarray:
+    step_s = session.conditions.step_s
+    return np.where(np.cumsum(rng.random(session.reading.size) < step_s / 3.0) % 2 == 0, -1.0, 1.0)
+
+
+def sine(session: Session, rng: np.random.Generator) -> np.ndarray:
+    return np.sqrt(2.0) * np.sin(2 * np.pi * session.conditions.time_s / 20.0 + rng.uniform(0, 6))
+
+
+def seated(session: Session, rng: np.random.Generator) -> np.ndarray:
+    return 2.0 * session.conditions.load * rng.standard_normal(int(session.cycle[-1]) + 1)[session.cycle]
+
+
+@pytest.mark.parametrize("unknown", [switching, sine, seated])
+def test_an_unknown_effect_is_no_noise(sessions, unknown):
+    rng = np.random.default_rng(4)
+    residuals = [noise + 0.01 * unknown(one, rng) for noise, one in zip(noises(sessions, 4), sessions, strict=True)]
+    found, left = wander_of(sessions, residuals), leftover_of(sessions, residuals)
+    assert found is not None
+    assert not found.is_noise
+    assert left.significant
+    assert not left.is_noise
+    assert found.switches == (unknown is switching)
+    assert ("switches between two levels" in left.says) == (unknown is switching)
+
+
+def test_too_little_tells_nothing(sessions):
+    assert wander_of([], []) is None
+    assert wander_of(sessions, [np.zeros(one.reading.size) for one in sessions]) is None
+
+
+# -- jitter ------------------------------------------------------------------------------------------------------------
+@settings(max_examples=6, deadline=None)
+@given(st.integers(0, 999), st.floats(0.04, 0.15))
+def test_jitter_is_known_by_its_noise_and_smooths_as_it_does(seed, truth_s):
+    rng = np.random.default_rng(seed)
+    clean = recording(noise=0.0)
+    t, load = clean.time_s, clean.force_n / 800.0
+    reading = np.interp(t + truth_s * rng.standard_normal(t.size), t, load) + NOISE * rng.standard_normal(t.size)
+    assert jitter_s(load, reading, 1 / RATE_HZ) == pytest.approx(truth_s, rel=0.2)
+    left = np.convolve(reading - as_sampled(load, reading, 1 / RATE_HZ), np.ones(25) / 25, "valid")
+    unsmoothed = np.convolve(reading - load, np.ones(25) / 25, "valid")
+    assert np.std(left) < np.std(unsmoothed)
+
+
+def test_without_jitter_the_load_stays_as_it_is():
+    one = recording(noise=NOISE)
+    load, reading = one.force_n / 800.0, one.sensor.values / 140.0
+    assert as_sampled(load, reading, 1 / RATE_HZ) is load
