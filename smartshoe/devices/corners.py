@@ -14,8 +14,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.errors import InputError
-
 Array = NDArray[np.float64]
 
 SLOPE_OVER_S = 0.15
@@ -27,6 +25,7 @@ SHARE_OF_GAP = 0.9
 LEAST_SAMPLES = 30
 ITERATIONS = 10
 SETTLED = 1e-2
+DEPENDENT = 1e-9
 
 
 def slope_of(time_s: Array, load: Array, over_s: float = SLOPE_OVER_S) -> Array:
@@ -59,8 +58,8 @@ def corners(time_s: Array, load: Array) -> Array:
 
 def follow_corners(
     machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float
-) -> tuple[float, float, float, float]:
-    """Delay in s, its sd, rate, its sd, from ``delay_s`` on; raises `InputError` where the load has no two corners."""
+) -> tuple[float, float, float, float] | None:
+    """Delay in s, its sd, rate, its sd, from ``delay_s`` on; None where the load has no two corners."""
     at_corners = corners(machine_s, load)
     gaps = np.diff(np.concatenate([machine_s[:1], at_corners, machine_s[-1:]]))
     sides = np.minimum(SHARE_OF_GAP * np.column_stack([gaps[:-1], gaps[1:]]), LONGEST_SIDE_S)
@@ -80,6 +79,8 @@ def follow_corners(
             level = np.interp(tau, machine_s, load)
             local = np.column_stack([place**k for k in range(4)] + [since**2, since**3, level / np.abs(level).max()])
             basis, triangle = np.linalg.qr(local)
+            if np.abs(np.diag(triangle)).min() < DEPENDENT * np.abs(triangle).max():
+                continue  # the load is a cubic here: no corner that a reading could show
             values = signal[first:last]
             gain = np.linalg.solve(triangle, basis.T @ values)[-1] / np.abs(level).max()
             tilt = gain * np.interp(tau, machine_s, slope)
@@ -92,7 +93,7 @@ def follow_corners(
             freedom += left.size - local.shape[1]
             used += 1
         if used < 2:
-            raise InputError("the load has fewer than two corners: press ramps with rests between them")
+            return None
         size = np.sqrt(np.diag(normal))
         scaled = normal / np.outer(size, size)
         change = np.linalg.lstsq(scaled, moment / size, rcond=None)[0] / size

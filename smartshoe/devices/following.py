@@ -27,6 +27,8 @@ SETTLED = 1e-2  # of a standard deviation
 STARTS_S = (3.0, 0.5)
 LAGS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 FASTEST_S, SLOWEST_S = 0.05, 60.0
+LONGEST_WAY_S = 3.0  # from where load and reading correlate best: more than any unit's lag moves that
+LARGEST_RATE = 1e-2
 LARGEST_STEP = 1.0  # of log p in one iteration
 
 
@@ -117,7 +119,8 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
         variance = float(residual @ residual) / max(at.size - design.shape[1], 1)
         normal = (design / size).T @ (design / size)
         sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)) * variance, 0.0)) / size
-        delay, rate = delay + float(change[4]), rate + float(change[5])
+        delay = float(np.clip(delay + change[4], delay_s - LONGEST_WAY_S, delay_s + LONGEST_WAY_S))
+        rate = float(np.clip(rate + change[5], -LARGEST_RATE, LARGEST_RATE))
         step = float(np.clip(change[6], -LARGEST_STEP, LARGEST_STEP))
         pole = float(np.clip(pole * np.exp(step), 1.0 / SLOWEST_S, 1.0 / FASTEST_S))
         if np.all(np.abs(change[4:6]) <= SETTLED * sd[4:6]):

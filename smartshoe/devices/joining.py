@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.8
 SAME_SIGNAL = 0.98
+COPY_CLOSER = 0.5  # a copy of the load is closer to it than the reading is; another sensor's channel is no closer
 ITERATIONS = 8
 LARGEST_MISFIT = 1.5
 LONGEST_BRIDGED_STEPS = 3.5
@@ -116,7 +117,8 @@ def align(machine_s: Array, load: Array, logger_s: Array, signal: Array) -> Alig
 def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array) -> Alignment:
     """Delay and clock rate between a load and a unit's reading that follows it, without the unit's own lag.
 
-    By a fit of the unit's model with them; where that leaves more than noise, by the load's corners alone. Raises
+    By a fit of the unit's model with them; where that leaves more than noise, by the load's corners alone; where it
+    has none, as if the reading were a copy of the load. Raises
     `InputError` where the two do not correlate.
     """
     delay, correlation = coarse(machine_s, load, logger_s, reading)
@@ -124,7 +126,10 @@ def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array
     found = follow(machine_s, load, logger_s, reading, delay)
     if found.misfit <= LARGEST_MISFIT:
         return Alignment(found.delay_s, found.delay_sd_s, found.rate, found.rate_sd, correlation, found.residual)
-    return Alignment(*follow_corners(machine_s, load, logger_s, reading, delay), correlation, found.residual, True)
+    at_corners = follow_corners(machine_s, load, logger_s, reading, delay)
+    if at_corners is None:  # then the unit's lag cannot be told from a delay, and stays in it
+        return align(machine_s, load, logger_s, reading)
+    return Alignment(*at_corners, correlation, found.residual, True)
 
 
 def join(machine_log: Recording, logger_log: Recording, *, ticks: Literal["logger", "machine"] = "logger") -> Recording:
@@ -139,7 +144,8 @@ def join(machine_log: Recording, logger_log: Recording, *, ticks: Literal["logge
         ((abs(coarse(machine_log.time_s, load.si, logger_log.time_s, c.values)[1]), c) for c in candidates),
         key=lambda pair: pair[0],
     )
-    if ranked and ranked[-1][0] >= SAME_SIGNAL:
+    apart = 1.0 - abs(coarse(machine_log.time_s, load.si, logger_log.time_s, logger_log.sensor.values)[1])
+    if ranked and ranked[-1][0] >= SAME_SIGNAL and 1.0 - ranked[-1][0] <= COPY_CLOSER * apart:
         copy, caveat = ranked[-1][1], ""
     else:
         copy, caveat = logger_log.sensor, "; the logger has no copy of the load"

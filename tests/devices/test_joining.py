@@ -94,3 +94,27 @@ def test_a_hole_in_a_log_is_missing_and_not_bridged(ticks: Literal["logger", "ma
     moved = joined.load if ticks == "logger" else joined["pressure"]
     assert moved.missing is not None
     assert 95 <= np.count_nonzero(moved.missing) <= 105
+
+
+def test_another_sensors_channel_is_no_copy_of_the_load() -> None:
+    """Two sensors that lag alike: the one that was not chosen must not lend its lag to the clocks."""
+    machine, logger = _logs(0.2, 0.0, 0.3, 4)
+    load, lagging = 200.0 * logger["load"].values, np.empty(len(logger))
+    lagging[0] = load[0]
+    for k in range(1, load.size):
+        lagging[k] = lagging[k - 1] + 0.01 / 0.3 * (load[k] - lagging[k - 1])
+    rng = np.random.default_rng(1)
+    alike = [lagging / 4.0 + rng.normal(0.0, 0.5, load.size) for _ in range(2)]
+    sensors = Recording.from_arrays(time_s=logger.time_s, pressure_counts=alike[0], other_counts=alike[1])
+    joined = join(machine, sensors)
+    assert "no copy of the load" in joined.notes[-1]
+    assert float(joined.metadata["join_delay_s"]) == pytest.approx(0.2, abs=0.02)  # not 0.3 s less
+
+
+def test_a_smooth_load_without_corners_is_joined_all_the_same() -> None:
+    time_s = np.arange(0.0, 60.0, 0.02)
+    load = 200.0 - 200.0 * np.cos(0.4 * time_s)
+    bent = (load / 400.0) ** 2  # more than the unit's model says
+    machine = Recording.from_arrays(time_s=time_s, force_n=load)
+    sensor = Recording.from_arrays(time_s=time_s, pressure_mbar=100.0 * np.interp(time_s - 0.5, time_s, bent))
+    assert float(join(machine, sensor).metadata["join_delay_s"]) == pytest.approx(-0.5, abs=0.2)

@@ -95,7 +95,9 @@ def test_corners_are_where_the_protocol_has_them_and_give_the_delay() -> None:
     reading = 3.0 + 0.2 * protocol.load_at(shoe_s + 0.2 + 1e-4 * (shoe_s - 0.5 * (shoe_s[0] + shoe_s[-1])))
     reading += rng.normal(0.0, 0.02, shoe_s.size)
     start, _ = coarse(time_s, load_n, shoe_s, reading)
-    delay_s, delay_sd, rate, rate_sd = follow_corners(time_s, load_n, shoe_s, reading, start)
+    found = follow_corners(time_s, load_n, shoe_s, reading, start)
+    assert found is not None
+    delay_s, delay_sd, rate, rate_sd = found
     assert delay_s == pytest.approx(0.2, abs=4.0 * delay_sd)
     assert rate == pytest.approx(1e-4, abs=4.0 * rate_sd)
     assert delay_sd < 1e-3
