@@ -11,6 +11,7 @@ from smartshoe.models.effects._wall_memory import Undone, dead_zone
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
 
 HALF_WIDTHS = np.geomspace(0.003, 0.5, 20)  # of full scale
+LEAST_LEVELLING = 0.5
 LEVELS = np.linspace(0.0, 1.0, 101)
 
 
@@ -20,7 +21,8 @@ class PlayHysteresis(Effect):
     Their greatest forces have a lognormal density about ``width`` (``spread`` its standard deviation in ln r).
     ``openness`` 1 weighs stop operators, which slide at any load and so keep a friction without load; 0 weighs relays
     that are all down without load, friction growing with load b as b (1 - levelling b), so that the loop closes at
-    zero (Mayergoyz 2003, ch. 1; Brokate and Sprekels 1996, ch. 2).
+    zero (Mayergoyz 2003, ch. 1; Brokate and Sprekels 1996, ch. 2). Friction that grows in proportion to the
+    load (levelling 0, openness 0) is another gain for unloading: that is `load_unload_asymmetry`, and no play.
     h is half of the greatest height of the loop from zero to full scale and back.
     """
 
@@ -30,7 +32,7 @@ class PlayHysteresis(Effect):
         EffectParameter("half_height", "FS_load", "half of the major loop's greatest height", 0.0, 0.0, 0.4, 0.01),
         EffectParameter("width", "FS_load", "half width of the play that matters most", None, 0.015, 0.3, 0.05),
         EffectParameter("spread", "1", "standard deviation of ln width over the plays", None, 0.3, 1.2, 0.5),
-        EffectParameter("levelling", "1", "how far friction stops growing towards full scale", None, 0.3, 0.9, 0.3),
+        EffectParameter("levelling", "1", "how far friction stops growing", None, LEAST_LEVELLING, 0.9, 0.3),
         EffectParameter("openness", "1", "share of friction that is there without load too", None, 0.0, 1.0, 0.3),
     )
     shapes = (
