@@ -34,6 +34,11 @@ def command(scenario: str, seed: int | None, out_folder: str | None, json_path: 
             report = publish(result, folder, json_text(whole))
     if not emit_json(whole, json_path):
         print_summary(whole["units"])
+        for unit in result.units:
+            if unit.diagnosis is not None:
+                from smartshoe.report.diagnosis.terminal import print_diagnosis
+
+                print_diagnosis(unit.diagnosis, unit.name)
         if "trial" in whole:
             from smartshoe.report.trial import print_trial
 

@@ -84,7 +84,7 @@ def with_companions(evidence: Evidence, settled: Settled) -> Settled:
     an offset in the place of a tare, which only the rests tell from it: there all but the baseline stays as it is.
     """
     without, sizes, whole = dict(settled.without), dict(settled.sizes), settled.fit
-    if any(effect(name).family == "zero" for name in sizes) and TARE in sizes:
+    if "zero_offset" in sizes and TARE in sizes:
         without[TARE] = fit(evidence, whole.model.without(TARE), QUICK_STEPS, still=whole.model.names)
         sizes[TARE] = visible(evidence, without[TARE].model, whole.model)
     for name in sorted(sizes, key=lambda one: -settled.without[one].cost):

@@ -1,0 +1,16 @@
+"""The scenario that shows the heart of it: what was hidden is found, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from smartshoe.cli import run_command
+
+
+def test_the_hidden_leak_and_warm_up_are_found_and_nothing_else(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["run", str(root / "scenarios" / "hidden_effect.toml")]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "it is known why" in printed
+    assert "linear leak and warm up account for it" in printed
