@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.baseline import has_idle_arm
-from smartshoe.diagnosis.fitting import QUICK_STEPS, Evidence, Fit, fit
+from smartshoe.diagnosis.fitting import MOST_STEPS, QUICK_STEPS, Evidence, Fit, fit
 from smartshoe.diagnosis.margins import LATE, LEAST_FALL, Rival, is_better, margin, penalty, visible
 from smartshoe.diagnosis.naming import Settled, named, with_companions
 from smartshoe.diagnosis.noise import white
@@ -26,6 +26,7 @@ SLIGHT = 5e-5  # what is significant but moves the reading by less is left alone
 BEST_WHITENED, BEST_OF_FAMILY, BEST_RAW = 6, 2, 1
 BEST_SWAPS = 3
 MOST_PARTS = 6
+LITTLE = 0.01  # of the strengths that the screen expects
 FIRST_STEPS = 2
 CLOSE = 0.1  # of what the best candidate takes off the cost
 MOST_MERGED = 4
@@ -158,8 +159,11 @@ def _raced(evidence: Evidence, current: Fit, candidates: Sequence[Screened]) -> 
     begun = []
     for one in candidates:
         added = one.candidate.effect
-        model = current.model.with_part(added, one.candidate.start(one.strengths))
-        begun.append(fit(evidence, model, FIRST_STEPS))
+        attempt = fit(evidence, current.model.with_part(added, one.candidate.start(one.strengths)), FIRST_STEPS)
+        if attempt.cost > current.cost:  # the screen's linear estimate led astray: from next to nothing then
+            little = current.model.with_part(added, one.candidate.start(LITTLE * one.strengths))
+            attempt = min(attempt, fit(evidence, little, MOST_STEPS), key=lambda other: other.cost)
+        begun.append(attempt)
     if not begun:
         return []
     best = min(one.cost for one in begun)
