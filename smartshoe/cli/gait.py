@@ -40,6 +40,13 @@ import click
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 @click.option("--c3d", "c3d_path", metavar="OUT.c3d", help="Write forces and events as C3D (needs ezc3d).")
 @click.option("--out", "out_folder", metavar="DIR", help="Write gait.html, gait.json, events, strides, forces as CSV.")
+@click.option(
+    "--stream/--whole",
+    "stream",
+    default=None,
+    help="In bounded memory, a day at a time: no page, no forces against time, no C3D. By itself for plain tables above"
+    " 64 MB; --whole takes any size into memory.",
+)
 def command(
     files: tuple[str, ...],
     calibration_paths: tuple[str, ...],
@@ -52,15 +59,22 @@ def command(
     json_path: str | None,
     c3d_path: str | None,
     out_folder: str | None,
+    stream: bool | None,
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
     from smartshoe.atomic import make_folder
+    from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
     from smartshoe.cli.output import emit_json, progress, show_notes
     from smartshoe.gait.analysis import analyse
     from smartshoe.gait.coverage import Coverage
     from smartshoe.logs import read
 
-    recordings = [read(file, time=time) for file in files]
+    streamed = is_streamed(files, stream)
+    if streamed:
+        refuse_with({"--estimator": estimator, "--reference": reference, "--c3d": c3d_path})
+        if stream is None:
+            click.echo("note: a large recording goes through as a stream (--whole takes it into memory)", err=True)
+    recordings = [] if streamed else [read(file, time=time) for file in files]
     show_notes(recordings)
     calibrations = []
     if calibration_paths:
@@ -72,6 +86,9 @@ def command(
     else:
         covered = Coverage(coverage) if course_path is None else Coverage.load(course_path)
     folder = make_folder(out_folder) if out_folder is not None else None
+    if streamed:
+        gait_of_stream(files, calibrations, body_weight_n, covered, time, json_path, folder)
+        return
     written: dict[str, Path] = {}
     with progress() as step:
         step("events, strides, forces")

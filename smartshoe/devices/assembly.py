@@ -18,7 +18,12 @@ from smartshoe.wire.samples import Samples
 
 Array = NDArray[np.float64]
 
-RATE_STEPS = 20
+RATED_S = 1.0
+# A step this many times the usual one is a hole; below, a rounded clock's (1 and 2 ms at 700 Hz) count as steps.
+HOLE_STEPS = 2.5
+# Text lines' unit of time is a guess: a clock that seems this much slower than the host's is in another one.
+SLOWEST_CLOCK = 0.1
+WATCHED_S = 3.0
 
 
 class Assembler:
@@ -47,6 +52,8 @@ class Assembler:
         self.rate_hz: float | None = None
         self._counts_samples = counts_samples
         self._steps_s: list[float] = []
+        self._is_rated = False
+        self._watched_s = [0.0, 0.0]  # of the device's clock, of the host's, while samples flowed
         self._shift_s = 0.0
         self._last: tuple[int, int, float, float] | None = None  # boot, sequence, time and arrival of the last sample
 
@@ -81,6 +88,7 @@ class Assembler:
             self.clock = DeviceClock()
             events.append(Restarted(arrival_s, resumes_s))
         time_s = device_s + self._shift_s
+        self._require_seconds(float(time_s[-1]), arrival_s)
         self._find_gaps(sequence, time_s, arrival_s, events)
         self._last = (boot, int(sequence[-1]), float(time_s[-1]), arrival_s)
         arrivals_s = np.full(time_s.size, arrival_s)
@@ -99,13 +107,32 @@ class Assembler:
         events += [
             Gap(arrival_s, int(steps[i]) - 1, float(time_s[i]), float(time_s[i + 1])) for i in np.flatnonzero(steps > 1)
         ]
-        if self.rate_hz is None:
+        if not self._is_rated:
             self._steps_s += (np.diff(time_s) / steps).tolist()
-            if len(self._steps_s) >= RATE_STEPS:
-                self.rate_hz = 1.0 / float(np.median(self._steps_s))
+            self._is_rated = sum(self._steps_s) >= RATED_S
+            self.rate_hz = rate_of(np.array(self._steps_s))
+
+    def _require_seconds(self, time_s: float, arrival_s: float) -> None:
+        """Raises `DeviceError` where text lines' times go by far slower than the host's clock."""
+        if self._counts_samples or self._last is None or arrival_s - self._last[3] > WATCHED_S:
+            return
+        self._watched_s[0] += time_s - self._last[2]
+        self._watched_s[1] += arrival_s - self._last[3]
+        device_s, host_s = self._watched_s
+        if host_s >= WATCHED_S and device_s < SLOWEST_CLOCK * host_s:
+            raise DeviceError(
+                f"the shoe's times went on by {device_s:.3g} s in {host_s:.1f} s: say their unit in its address,"
+                " with time=s, time=ms or time=us"
+            )
 
     def _steps(self, sequence: NDArray[np.int64], time_s: Array) -> NDArray[np.int64]:
         """Samples that the device took from each to the next, one at least."""
         if self._counts_samples or self.rate_hz is None:
             return np.diff(sequence)
         return np.maximum(np.rint(np.diff(time_s) * self.rate_hz).astype(np.int64), 1)
+
+
+def rate_of(steps_s: Array) -> float:
+    """Samples a second of a device whose samples are ``steps_s`` (n,) apart, holes left out; n is 1 at least."""
+    usual = steps_s <= HOLE_STEPS * float(np.median(steps_s))
+    return 1.0 / float(steps_s[usual].mean())

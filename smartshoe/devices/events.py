@@ -110,6 +110,19 @@ class Dropped(ShoeEvent):
         )
 
 
+@dataclass(frozen=True, slots=True)
+class ToldLate(ShoeEvent):
+    """The device said what it is when its readings were being given out as counts already; counts they stay."""
+
+    kind: ClassVar[str] = "told_late"
+    serial_number: str
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"shoe {self.serial_number} said its units only now: readings stay counts until it is opened again"
+
+
 class EventLog:
     """Events in order of time, from any thread; beyond ``limit`` they are only counted."""
 

@@ -17,6 +17,10 @@ from smartshoe.wire.sniff import guess, looks_like
 # A device that is silent until it is told to start gets this long to begin by itself.
 LISTEN_S = 0.3
 ASK_AGAIN_S = 1.0
+# A device that takes no commands tells of itself once a second (docs/wire.md); one telling may be lost.
+INFORMATION_WAIT_S = 2.2
+# Text lines do not say their rate: times rounded to a millisecond give it within 0.1 % over this long.
+RATED_S = 1.0
 SNIFFED_BYTES = 4096
 
 Decoder = FrameDecoder | LineDecoder
@@ -35,10 +39,14 @@ class Greeting:
         return isinstance(self.decoder, FrameDecoder)
 
     def is_complete(self, now_s: float) -> bool:
-        """Whether samples came, and the information with them or no more to be waited for."""
+        """Whether samples came, and what they do not say: frames' information, lines' rate; each is waited for."""
         if not self.first:
             return False
-        return not self.takes_commands or self.information is not None or now_s > self.first[0][1] + ASK_AGAIN_S
+        waited_s = now_s - self.first[0][1]
+        if self.takes_commands:
+            return self.information is not None or waited_s > INFORMATION_WAIT_S
+        first, last = self.first[0][0], self.first[-1][0]
+        return waited_s > RATED_S or float(last.device_time_s[-1] - first.device_time_s[0]) >= RATED_S
 
     def has_other_channels(self, samples: Samples) -> bool:
         """Whether the device has another number of channels than its decoder was made for."""
@@ -73,8 +81,8 @@ def farewell() -> bytes:
 def greet(name: str, port: Port, settings: SerialSettings, clock: Callable[[], float], until_s: float) -> Greeting:
     """Talk until samples come; raises `DeviceTimeoutError`, with what the bytes look like, at ``until_s`` of ``clock``.
 
-    Frames are waited for together with the information frame; where samples come without it for a second, they are
-    taken as counts.
+    Frames are waited for together with the information frame; where samples come without it for `INFORMATION_WAIT_S`,
+    they are taken as counts. Of text lines `RATED_S` are taken, for their rate.
     """
     begin_s = clock()
     asked_s = begin_s - ASK_AGAIN_S if settings.format == "frames" else begin_s + LISTEN_S - ASK_AGAIN_S
@@ -114,5 +122,8 @@ def _what(settings: SerialSettings, greeting: Greeting | None) -> str:
 
 def _why(settings: SerialSettings, seen: bytes) -> str:
     if not seen:
-        return "no byte came; switch the shoe on, and see that this is its port and that its sketch sends"
+        return (
+            "no byte came; switch the shoe on, see that this is its port and that its sketch sends, or give a longer"
+            " wait_s in the address"
+        )
     return f"what came is {looks_like(seen, len(settings.columns))}; check baud, format and columns in the address"

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 from smartshoe.devices.assembly import Assembler
-from smartshoe.devices.events import Disconnected, EventLog, Reconnected, Silence
+from smartshoe.devices.events import Disconnected, EventLog, Reconnected, Silence, ToldLate
 from smartshoe.devices.greeting import Decoder, Greeting, farewell, hello
 from smartshoe.devices.inbox import Inbox
 from smartshoe.devices.reconnect import Backoff
@@ -18,6 +18,7 @@ from smartshoe.wire.samples import Samples
 # Reading waits 50 ms, writing 500 ms; only an operating system that hangs in opening a port takes longer.
 JOIN_S = 2.0
 MOST_DOUBLINGS = 3
+PAUSE_SAMPLES = 5.0
 
 
 class SerialReader:
@@ -109,7 +110,13 @@ class SerialReader:
 
     def _require_the_same_shoe(self) -> None:
         said = self.greeting.information
-        if said is not None and self._serial_number is not None and said.serial_number != self._serial_number:
+        if said is None:
+            return
+        if self._serial_number is None:
+            self._serial_number = said.serial_number
+            if self.greeting.takes_commands:
+                self.log.add(ToldLate(self._clock(), said.serial_number))
+        elif said.serial_number != self._serial_number:
             raise DeviceError(
                 f"{self._name}: shoe {said.serial_number} answers where shoe {self._serial_number} was:"
                 " bring that one back, or open again to go on with this one"
@@ -130,7 +137,7 @@ class SerialReader:
     def _watch(self, now_s: float) -> None:
         """Silence becomes an event, then a new start command, then a new opening of the port, then an error."""
         silent_s = now_s - self._valid_s
-        if silent_s > self._settings.silence_s and not self._is_silent:
+        if silent_s > max(self._settings.silence_s, self._pause_s()) and not self._is_silent:
             self._is_silent = True
             self.log.add(Silence(now_s, silent_s))
             # It may have booted anew and wait to be started.
@@ -139,9 +146,14 @@ class SerialReader:
         if now_s - max(self._valid_s, self._opened_s) > self._patience_s():
             raise _LostError(f"no valid frame for {silent_s:.1f} s")
 
+    def _pause_s(self) -> float:
+        """What is no silence yet of a shoe that sends seldom."""
+        rate_hz = self.assembler.rate_hz
+        return 0.0 if rate_hz is None else PAUSE_SAMPLES / rate_hz
+
     def _patience_s(self) -> float:
         """How long an open port may be silent: longer each time, as Bluetooth may take seconds to connect behind it."""
-        return self._settings.reopen_s * 2.0 ** min(self._openings, MOST_DOUBLINGS)
+        return max(self._settings.reopen_s * 2.0 ** min(self._openings, MOST_DOUBLINGS), self._pause_s())
 
     def _give_up_in_time(self, now_s: float, reason: str) -> None:
         if now_s - self._valid_s > self._settings.give_up_s:

@@ -24,6 +24,7 @@ USUAL_FULL_SCALE_N = 800.0  # of the paper's protocols
 REST_LONGEST_S = 5.0
 STEPS_ON = 0.05  # of full scale: what a unit moves by when the shoe is stepped into
 BEFORE_S = 0.3  # of the rest is left out before that: a hand on the shoe
+LOADED_NOISES = 50.0  # of a reading's noise: a step moves it by more, a rest never
 DRIFT_TOLD = 0.02  # of full scale
 ZERO_REPEATS = 0.002  # of full scale: how well a sensor's zero repeats from day to day (HDI data sheet: 0.1 % typical)
 WORST: tuple[Verdict, ...] = ("fault", "warning", "unknown", "ok")
@@ -193,7 +194,16 @@ def _side(name: str) -> str:
 
 
 def _full_scale(name: str, channel: Channel, by_unit: Mapping[str, Calibration]) -> float:
-    """Of a reading: its sensor's range, what the calibration's largest load reads, or what is seen."""
+    """Of a reading: what it is known to be, or what is seen."""
+    known = _known_full_scale(name, channel, by_unit)
+    if known is not None:
+        return known
+    seen = float(np.ptp(channel.values))
+    return seen if seen > 0.0 else 1.0
+
+
+def _known_full_scale(name: str, channel: Channel, by_unit: Mapping[str, Calibration]) -> float | None:
+    """Its sensor's range, or what the calibration's largest load reads; None where there is neither."""
     if channel.unit.quantity == "force":
         return float(channel.unit.from_si(USUAL_FULL_SCALE_N))
     if channel.range_ is not None:
@@ -202,8 +212,7 @@ def _full_scale(name: str, channel: Channel, by_unit: Mapping[str, Calibration])
     if calibration is not None and calibration.reading_unit == channel.unit:
         load_n = (calibration.load_range_n or (0.0, USUAL_FULL_SCALE_N))[1]
         return load_n * calibration.a1 / calibration.b1
-    seen = float(np.ptp(channel.values))
-    return seen if seen > 0.0 else 1.0
+    return None
 
 
 def _expected(name: str, channel: Channel, by_unit: Mapping[str, Calibration]) -> float:
@@ -224,6 +233,13 @@ def _at_rest(
     first = np.median(held[: max(2, int(0.2 / np.median(np.diff(time_s))))], axis=0)
     noise = np.array([white_noise(column) for column in held.T])
     moved = np.abs(held - first) > np.maximum(STEPS_ON * scale, 6.0 * noise)
+    unscaled = [name for name, channel in group.items() if _known_full_scale(name, channel, by_unit) is None]
+    if unscaled and (np.ptp(held, axis=0) <= LOADED_NOISES * noise).all():
+        says = (
+            f"nobody stepped in, and no range or calibration says how much a reading of {', '.join(unscaled)} is: the"
+            " zero is not checked, give --calibration"
+        )
+        return [Finding("zero", "unknown", says, ", ".join(group))]
     on = int(np.argmax(moved.any(axis=1))) if moved.any() else time_s.size
     end_s = float(time_s[on] - BEFORE_S) if on < time_s.size else float(time_s[-1])
     stop = int(np.searchsorted(time_s, min(end_s, float(time_s[0]) + REST_LONGEST_S), side="right"))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 _HOME = {
     "analyse": "smartshoe.gait.analysis",
+    "analyse_stream": "smartshoe.gait.day",
     "GaitResult": "smartshoe.gait.result",
     "Contacts": "smartshoe.gait.contact",
     "ContactDetector": "smartshoe.gait.contact",
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from smartshoe.gait.analysis import analyse
     from smartshoe.gait.contact import ContactDetector, Contacts
     from smartshoe.gait.coverage import Coverage, learn_coverage
+    from smartshoe.gait.day import analyse_stream
     from smartshoe.gait.insole import centre_of_pressure
     from smartshoe.gait.membership import memberships
     from smartshoe.gait.result import GaitResult
@@ -30,6 +32,7 @@ __all__ = [
     "Coverage",
     "GaitResult",
     "analyse",
+    "analyse_stream",
     "centre_of_pressure",
     "learn_coverage",
     "memberships",

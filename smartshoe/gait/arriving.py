@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.errors import InputError
+from smartshoe.errors import InputError, UnitError
 from smartshoe.recording import Recording
+from smartshoe.units import Unit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -43,13 +44,17 @@ def pieces(
     """The channels ``names`` of consecutive ``blocks`` in pieces of ``piece_s``, whatever the blocks' size.
 
     A row in which every channel is missing counts as no row. Raises `InputError` where a block lacks a channel or its
-    time does not go on.
+    time does not go on, `UnitError` where its units are others.
     """
     size = max(1, round(piece_s * rate_hz))
     number = 0
     run: _Run | None = None
+    units: list[Unit] = []
     for block in blocks:
         time_s, values, missing = _rows(block, names)
+        units = units or [block[name].unit for name in names]
+        if [block[name].unit for name in names] != units:
+            raise UnitError(f"{block.label}: a block's columns have other units than those before: give one trial")
         if time_s.size == 0:
             continue
         if run is not None and not time_s[0] > run.last_s:
@@ -75,7 +80,9 @@ def pieces(
 def _rows(block: Recording, names: tuple[str, ...]) -> tuple[Array, Array, Mask]:
     lacking = [name for name in names if name not in block.channels]
     if lacking:
-        raise InputError(f"{block.label}: a block lacks {', '.join(lacking)}: every block needs the first one's columns")
+        raise InputError(
+            f"{block.label}: a block lacks {', '.join(lacking)}: every block needs the first one's columns"
+        )
     channels = [block[name] for name in names]
     values = np.column_stack([channel.values for channel in channels])
     if all(channel.missing is None for channel in channels):

@@ -18,7 +18,7 @@ from smartshoe.logs.numbers import numbers_of
 from smartshoe.logs.picks import unit_in_file
 from smartshoe.logs.sheet import Column, Sheet
 from smartshoe.logs.text import even_rows
-from smartshoe.logs.times import time_of
+from smartshoe.logs.times import check_increasing, time_of
 from smartshoe.recording import Channel, Recording, split_column
 
 Array = NDArray[np.float64]
@@ -132,6 +132,7 @@ def _layout(sheet: Sheet, time: str | None) -> Recording:
 def _block(sheet: Sheet, layout: Recording, time: str | None) -> Recording:
     units = [unit_in_file(column) for column in sheet.columns]
     at_time, time_s = time_of(sheet, units, time)
+    check_increasing(sheet, time_s)
     others = [column for index, column in enumerate(sheet.columns) if index != at_time]
     channels = {
         name: Channel.from_values(name, column.values, model.unit, model.role)

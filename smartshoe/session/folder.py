@@ -124,9 +124,10 @@ class SessionFolder:
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
-        """A session to read only."""
-        folder = Path(path)
-        return cls(folder, _plan_of(folder), None)
+        """A session to read only; raises `InputError` where its journal cannot be read."""
+        found = cls(Path(path), _plan_of(Path(path)), None)
+        found.notes = read_journal(found.path / JOURNAL).notes
+        return found
 
     def close(self) -> None:
         """Close the journal."""

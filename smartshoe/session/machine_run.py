@@ -18,6 +18,7 @@ from smartshoe.devices import open_machine
 from smartshoe.devices.base import Shoe, TestMachine
 from smartshoe.devices.logged import INSTRON_5944
 from smartshoe.devices.registry import split_url
+from smartshoe.devices.serial_shoe import SerialShoe
 from smartshoe.errors import DeviceError, DeviceTimeoutError, InputError, SmartShoeError, UsageError
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
@@ -113,6 +114,7 @@ class LogByHand(MachineSide):
         self.fresh_only = False
         self.reason = ""
         self._used: set[Path] = set()
+        self._is_unread = False
         self._started_s = 0.0
         self._looked_s = -np.inf
         self._protocol: Protocol | None = None
@@ -149,6 +151,7 @@ class LogByHand(MachineSide):
         return sorted(path for path in self.target.glob(self.pattern) if path.is_file() and path not in self._used)
 
     def _is_whole(self, path: Path, protocol: Protocol) -> bool:
+        self._is_unread = False
         try:
             state = path.stat()
         except OSError:
@@ -163,7 +166,7 @@ class LogByHand(MachineSide):
             found = read(path, partly=True, **self.columns)
             peak = float(found.force_n.max())
         except InputError as error:
-            self.reason = str(error)
+            self.reason, self._is_unread = str(error), True
             return False
         if peak < REACHED * protocol.peak_load_n and self.fresh_only:
             self.reason = f"{path} has reached {peak:.0f} N of {protocol.peak_load_n:.0f} N so far"
@@ -173,6 +176,11 @@ class LogByHand(MachineSide):
     def late(self, wait_s: float) -> SmartShoeError:
         """Why the wait ends."""
         said = f"the machine's log did not come within {wait_s:.0f} s ({self.reason})"
+        if self._is_unread:
+            return InputError(
+                f"{said}: here columns are named in the address, log:{self.target}?force=NAME&time=NAME, or export the"
+                " test again"
+            )
         if self.target.exists():
             return InputError(f"{said}: export the whole test from the machine again")
         return DeviceTimeoutError(f"{said}: export the test to {self}, then go on with --resume")
@@ -183,6 +191,10 @@ def machine_at(url: str, shoe: Shoe, unit: str) -> MachineSide:
     scheme, target, options = split_url(url)
     if scheme != "log":
         machine = open_machine(url)
+        if machine.is_instant and isinstance(shoe, SerialShoe):
+            raise UsageError(
+                f"{url} is simulated and presses no {shoe}: give --machine log:FILE, the log of the machine that does"
+            )
         machine.under(shoe, unit)
         return RunMachine(machine.open())
     pattern = options.pop("pattern", "*.csv")

@@ -143,6 +143,8 @@ class LineDecoder:
 
     def _sample(self, fields: list[str]) -> Line | None:
         layout = self._layout
+        if len(fields) == layout.fields + 1 and not fields[-1]:
+            fields = fields[:-1]  # a sketch's loop prints a separator behind every number
         if len(fields) != layout.fields:
             return None
         time = number(without_label(fields[layout.time]))
@@ -159,6 +161,8 @@ class LineDecoder:
 
     def _take_header(self, fields: list[str]) -> bool:
         """Whether the fields are a header with this decoder's columns; if so it holds from here."""
+        if not fields[-1]:
+            fields = fields[:-1]
         named = [_name_and_unit(field) for field in fields]
         places = {name.casefold(): place for place, (name, _) in enumerate(named)}
         times = [place for name, place in places.items() if name in _TIME_NAMES]
@@ -234,7 +238,10 @@ def without_label(field: str) -> str:
 
 
 def split_fields(text: str) -> list[str]:
-    """A line's fields: between tabs or semicolons (a comma is a decimal one then), else commas, else blanks."""
+    """A line's fields: between tabs or semicolons (a comma is a decimal one then), else commas, else blanks.
+
+    A line that ends in a separator has an empty last field.
+    """
     for separator in ("\t", ";"):
         if separator in text:
             return [field.strip().replace(",", ".") for field in text.split(separator)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from itertools import pairwise
 from typing import Literal
 
 from smartshoe.wire.frames import FrameDecoder
@@ -64,8 +65,21 @@ def _looks_like_text(data: bytes, columns: int) -> str:
         return f"text lines without numbers, such as {whole[0][:40]!r}" if whole else "empty text lines"
     common = counts.most_common(1)[0][0]
     if common != columns:
-        return f"text lines of {common} number{'s' * (common != 1)}, not {columns}"
+        is_without_time = " (where is the time? print millis() first)" if common == columns - 1 else ""
+        return f"text lines of {common} number{'s' * (common != 1)}, not {columns}{is_without_time}"
+    if _repeats(whole):
+        return (
+            f"text lines of {columns} numbers, the first of which repeats from line to line: where it is the time,"
+            " print it finer, with micros() or more decimals"
+        )
     return f"text lines of {columns} numbers"
+
+
+def _repeats(lines: list[str]) -> bool:
+    """Whether a tenth and more of the lines begin as the line before does."""
+    firsts = [split_fields(line)[0] for line in lines]
+    same = sum(before == here for before, here in pairwise(firsts))
+    return 10 * same >= len(firsts) > 1
 
 
 def _lines(data: bytes) -> list[str]:
@@ -75,6 +89,7 @@ def _lines(data: bytes) -> list[str]:
 def _numbers(line: str) -> int:
     """How many numbers a line holds, 0 where it holds anything else."""
     fields = split_fields(line.rpartition("*")[0] or line)
+    fields = fields[: len(fields) - (not fields[-1])] if fields else fields
     values = [number(without_label(field)) for field in fields if field]
     return len(fields) if values and all(value is not None for value in values) else 0
 

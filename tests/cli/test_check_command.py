@@ -49,8 +49,8 @@ def test_a_dead_unit_is_told_and_refused_when_strict(walk: Path, capsys: pytest.
     ("words", "status", "says"),
     [
         (["missing.csv"], 3, "missing.csv"),
-        (["walk.csv", "--body-weight", "-3"], 2, "body weight is -3"),
-        (["walk.csv", "--coverage", "2", "--body-weight", "500"], 2, "coverage is 2"),
+        (["walk.csv", "--body-weight", "-3"], 2, "--body-weight"),
+        (["walk.csv", "--coverage", "2", "--body-weight", "500"], 2, "--coverage"),
         (["walk.csv", "--calibration", "walk.csv"], 3, "walk.csv"),
     ],
 )

@@ -174,3 +174,14 @@ def test_a_calibration_by_region_serves_columns_without_a_side() -> None:
     own = [replace(c, unit=c.unit.removeprefix("left_")) for c in calibrations()[:4]]
     found = examine(bare, own, body_weight_n=BODY_WEIGHT_N, coverage=0.8)
     assert len(found.of_kind("swing_zero")) == 4
+
+
+def test_counts_at_rest_without_a_scale_are_no_fault() -> None:
+    """A text line's counts have no range: a rest alone does not say how much a count is."""
+    time_s = np.arange(400) / 200.0
+    noise = np.random.default_rng(3).integers(-1, 2, (4, 400))
+    columns = {f"{name}_counts": 100.0 * k + noise[k] for k, name in enumerate(("toe", "meta1", "meta4", "heel"))}
+    found = examine(Recording.from_arrays(time_s=time_s, **columns))
+    zeros = [finding for finding in found.findings if finding.kind == "zero"]
+    assert [finding.verdict for finding in zeros] == ["unknown"]
+    assert "--calibration" in zeros[0].says

@@ -107,6 +107,9 @@ def test_a_wait_ends_with_what_was_missing(tmp_path: Path, log: Path) -> None:
     (tmp_path / "none.csv").write_text("nothing of use\n")
     with SessionFolder.resume(tmp_path / "late") as folder, pytest.raises(InputError, match="did not come"):
         conduct(folder)
+    os.utime(tmp_path / "none.csv", (1.0, 1.0))
+    with SessionFolder.resume(tmp_path / "late") as folder, pytest.raises(InputError, match=r"log:.*\?force="):
+        conduct(folder)
     (tmp_path / "none.csv").write_bytes(log.read_bytes())
     os.utime(tmp_path / "none.csv", (1.0, 1.0))
     with SessionFolder.resume(tmp_path / "late") as folder:

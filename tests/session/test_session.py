@@ -96,6 +96,19 @@ def test_an_interrupted_session_keeps_what_was_shown_and_goes_on(tmp_path: Path)
     assert list(result.recordings) == ["short", "static"]
 
 
+def test_a_damaged_journal_says_so_also_where_it_is_only_read(tmp_path: Path) -> None:
+    with SessionFolder.begin(tmp_path / "s", bench_plan()) as folder:
+        conduct(folder)
+    with SessionFolder.open(tmp_path / "s") as folder:
+        assert folder.notes == ()
+    journal = tmp_path / "s" / "journal.smj"
+    harmed = bytearray(journal.read_bytes())
+    harmed[len(harmed) // 2] ^= 8
+    journal.write_bytes(harmed)
+    with SessionFolder.open(tmp_path / "s") as folder:
+        assert "damaged and left out" in " ".join(folder.notes)
+
+
 def test_blocks_survive_the_journal_bit_for_bit(tmp_path: Path) -> None:
     from smartshoe.session import samples
 

@@ -1,0 +1,301 @@
+"""`analyse_stream`: a trial too long for memory, a day, block by block to what `analyse` says of a short one.
+
+The contacts are those of the same detector, fed as the blocks arrive. Once contacts and floors on both sides of a
+stretch of `STRETCH_S` are known, it goes through the steps of `analyse` with some seconds of its neighbours in sight;
+its events and strides are handed on, its numbers are added up, and it is forgotten.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.errors import InputError, RefusedError, UsageError
+from smartshoe.gait.arriving import Piece, joined_head, pieces
+from smartshoe.gait.contact import Contacts
+from smartshoe.gait.coverage import Coverage
+from smartshoe.gait.day_sums import DaySums
+from smartshoe.gait.foot_stream import FootStream
+from smartshoe.gait.result import Event, GaitResult
+from smartshoe.gait.stretch import look
+from smartshoe.gait.strides import Stride
+from smartshoe.gait.trial import Foot, feet_of
+from smartshoe.recording import Channel, Recording
+
+if TYPE_CHECKING:
+    from smartshoe.compensation import Calibration
+
+Array = NDArray[np.float64]
+
+STRETCH_S = 120.0
+HEAD_S = 60.0  # looked at before anything is told: which columns, at what rate, of which sign
+LISTED = 2000  # strides, and the events up to the last of them, that a result lists
+PEAKS = 1000  # stances whose peaks are what is usual
+Told = Callable[[Sequence[Event], Sequence[Stride]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class DayResult(GaitResult):
+    """A long trial: numbers and flags of the whole; ``events`` and ``strides`` are the first ones, up to
+    ``listed_s``, of ``event_count`` and ``stride_count``. It keeps no course against time."""
+
+    duration_s: float
+    recorded_s: float
+    event_count: int
+    stride_count: int
+    listed_s: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema smartshoe.gait/1 with an object ``stream`` beside it."""
+        return super().to_dict() | {
+            "stream": {
+                "duration_s": self.duration_s,
+                "recorded_s": self.recorded_s,
+                "events": self.event_count,
+                "strides": self.stride_count,
+                "listed_to_s": self.listed_s,
+            }
+        }
+
+    def columns(self) -> dict[str, Any]:
+        """Raises `UsageError`: forces against time are not kept."""
+        raise UsageError("a streamed trial keeps no forces against time: analyse a part of it with analyse()")
+
+
+def analyse_stream(
+    blocks: Iterable[Recording] | Sequence[Iterable[Recording]],
+    calibrations: Calibration | Sequence[Calibration] = (),
+    body_weight_n: float | None = None,
+    coverage: float | Coverage = 1.0,
+    told: Told | None = None,
+) -> DayResult:
+    """The trial whose recording comes in consecutive ``blocks`` of any size, in memory that does not grow with it.
+
+    ``blocks`` of both shoes, or a list of two iterables, one for each shoe. ``told`` is called with events and strides
+    in order as they are known, some minutes after they happened; the other arguments are those of `analyse`, with
+    whose result this one agrees whatever the blocks' size. Recording that stops for more than 10 s ends what is under
+    way, and the analysis goes on after it. Raises what `analyse` raises.
+    """
+    covered = coverage if isinstance(coverage, Coverage) else Coverage(coverage)
+    if body_weight_n is not None and not (math.isfinite(body_weight_n) and body_weight_n > 0.0):
+        raise UsageError(f"body_weight_n is {body_weight_n:g}: give newtons above 0")
+    given = list(calibrations) if isinstance(calibrations, Sequence) else [calibrations]
+    sources = _sources(_several(blocks))
+    feet, flags = feet_of([head for head, _ in sources], given)
+    day = _Day(feet, sources, given, covered, body_weight_n, told)
+    day.run()
+    return day.result(flags)
+
+
+def _several(blocks: Iterable[Recording] | Sequence[Iterable[Recording]]) -> list[Iterable[Recording]]:
+    """One iterable for each source; a sequence of recordings is one source."""
+    if isinstance(blocks, (list, tuple)) and not any(isinstance(item, Recording) for item in blocks):
+        return list(blocks)
+    return [cast("Iterable[Recording]", blocks)]
+
+
+def _sources(given: Sequence[Iterable[Recording]]) -> list[tuple[Recording, Iterator[Recording]]]:
+    found: list[tuple[Recording, Iterator[Recording]]] = []
+    for blocks in given:
+        rest = iter(blocks)
+        head, came = joined_head(rest, HEAD_S)
+        if head is None:
+            raise InputError("a stream holds no block: give one recording at least")
+        found.append((head, chain(came, rest)))
+    return found
+
+
+class _Day:
+    def __init__(
+        self,
+        feet: Mapping[str, Foot],
+        sources: Sequence[tuple[Recording, Iterator[Recording]]],
+        calibrations: Sequence[Calibration],
+        coverage: Coverage,
+        body_weight_n: float | None,
+        told: Told | None,
+    ) -> None:
+        self.feet, self.coverage, self.body_weight_n, self._told = feet, coverage, body_weight_n, told
+        self._calibrations = {calibration.unit: calibration for calibration in calibrations}
+        self.label = sources[0][0].label
+        self._channels: dict[str, tuple[Channel, ...]] = {}
+        self._of_source: list[list[tuple[str, slice]]] = []
+        self._pieces: list[Iterator[Piece]] = []
+        left = dict(feet)
+        for head, blocks in sources:
+            names: list[str] = []
+            own: list[tuple[str, slice]] = []
+            for foot in [f for f in left.values() if f.source == head.label]:
+                channels = _channels_of(foot, head)
+                if channels is None:
+                    continue
+                del left[foot.name]
+                self._channels[foot.name] = channels
+                own.append((foot.name, slice(len(names), len(names) + len(channels))))
+                names += [channel.name for channel in channels]
+            if not own:
+                raise UsageError(f"two recordings are called {head.label}: give each a name of its own")
+            self._of_source.append(own)
+            self._pieces.append(pieces(blocks, tuple(names), feet[own[0][0]].rate_hz))
+        self.sums = DaySums(feet, coverage)
+        self._peaks: dict[str, deque[Array]] = {name: deque(maxlen=PEAKS) for name in feet}
+        self._streams: dict[str, FootStream] = {}
+        self._settled_s = self._run_s = 0.0
+        self._events: list[Event] = []  # waiting for their stretch
+        self._listed_events: list[Event] = []
+        self._listed: list[Stride] = []
+        self.event_count = self.stride_count = 0
+
+    def run(self) -> None:
+        """Through all of it, one run of recording after the other; a shoe's that ends, ends the other's too."""
+        ahead = dict(enumerate(next(own, None) for own in self._pieces))
+        while running := {k: piece for k, piece in ahead.items() if piece is not None}:
+            begin_s = max(self._at(k, piece) for k, piece in running.items())
+            for k in running:
+                # Two shoes are looked at together: what one recorded while the other did not yet is passed over.
+                while (late := ahead[k]) and self._at(k, late) + len(late.values) / self._rate(k) <= begin_s:
+                    ahead[k] = next(self._pieces[k], None)
+            running = {k: piece for k, piece in ahead.items() if piece is not None}
+            self._begin(running)
+            while True:
+                k = min(running, key=lambda key: self._at(key, running[key]))
+                piece = running[k]
+                self._push(k, piece)
+                ahead[k] = following = next(self._pieces[k], None)
+                if piece.last or following is None:
+                    break
+                running[k] = following
+            ended_s = self._at(k, piece) + len(piece.values) / self._rate(k)
+            for other in running.keys() - {k}:
+                while (late := ahead[other]) and self._at(other, late) < ended_s:
+                    self._push(other, late)
+                    ahead[other] = next(self._pieces[other], None)
+            self._end()
+
+    def _rate(self, source: int) -> float:
+        return self.feet[self._of_source[source][0][0]].rate_hz
+
+    def _at(self, source: int, piece: Piece) -> float:
+        return piece.start_s + piece.first / self._rate(source)
+
+    def _begin(self, running: Mapping[int, Piece]) -> None:
+        self._settled_s = min(self._at(k, piece) for k, piece in running.items())
+        self._streams = {
+            name: FootStream(self.feet[name], self._channels[name], self._calibrations, self._at(k, piece))
+            for k, piece in running.items()
+            for name, _ in self._of_source[k]
+        }
+        self._run_s = self._settled_s
+
+    def _push(self, source: int, piece: Piece) -> None:
+        for name, columns in self._of_source[source]:
+            self._tell(name, self._streams[name].push(piece.values[:, columns], piece.missing[:, columns]))
+        self._settle(at_end=False)
+
+    def _tell(self, foot: str, told: Contacts) -> None:
+        self.sums.floors(foot, told)
+        self._events += _events(foot, told)
+
+    def _end(self) -> None:
+        for name, stream in self._streams.items():
+            self._tell(name, stream.finish())
+        end_s = max(stream.end_s - 1.0 / stream.rate_hz for stream in self._streams.values())
+        self.sums.run(self._run_s, end_s)
+        self._settle(at_end=True)
+
+    def _settle(self, *, at_end: bool) -> None:
+        while self._streams:
+            end_s = self._settled_s + STRETCH_S
+            last_s = max(stream.end_s for stream in self._streams.values())
+            if at_end and last_s <= end_s:
+                end_s = np.inf
+            elif not at_end and min(stream.settled_s() for stream in self._streams.values()) < end_s:
+                return
+            self._settle_to(end_s)
+            if end_s == np.inf:
+                self._streams = {}
+
+    def _settle_to(self, end_s: float) -> None:
+        windows = {name: stream.window(self._settled_s, end_s) for name, stream in self._streams.items()}
+        windows = {name: windows[name] for name in self.feet if name in windows and windows[name][0].time_s.size > 1}
+        strides: tuple[Stride, ...] = ()
+        if windows:
+            stretch = look(windows, self._settled_s, end_s, self._peaks, self.coverage, self.body_weight_n)
+            self.sums.add(stretch)
+            strides = stretch.strides
+        events = sorted((e for e in self._events if e.time_s < end_s), key=lambda e: (e.time_s, e.foot, e.event))
+        self._events = [event for event in self._events if event.time_s >= end_s]
+        self.event_count += len(events)
+        self.stride_count += len(strides)
+        if len(self._listed) < LISTED:
+            self._listed += strides
+            self._listed_events += events
+            if len(self._listed) > LISTED:
+                self._cut_lists()
+        if self._told is not None and (events or strides):
+            self._told(events, strides)
+        self._settled_s = end_s
+        if np.isfinite(end_s):
+            for stream in self._streams.values():
+                stream.forget(end_s)
+
+    def _cut_lists(self) -> None:
+        del self._listed[LISTED:]
+        until_s = self._listed[-1].end_s
+        self._listed_events = [event for event in self._listed_events if event.time_s <= until_s]
+
+    def result(self, flags: Sequence[Any]) -> DayResult:
+        """What it all comes to; raises `RefusedError` where neither a stance nor a standing load was found."""
+        sums = self.sums
+        if not self.event_count and not sums.was_loaded:
+            raise RefusedError(
+                f"{self.label}: no stance is found and no foot is loaded: check that the shoes were worn, and the"
+                " columns' units"
+            )
+        is_cut = self.stride_count > len(self._listed)
+        forces = sums.forces(self.body_weight_n)
+        return DayResult(
+            activity=sums.activity(),
+            events=tuple(self._listed_events),
+            strides=tuple(self._listed),
+            summary=sums.summary(),
+            indices=sums.indices(),
+            forces=forces,
+            flags=(*flags, *sums.flags(forces, self.body_weight_n)),
+            feet=sums.last_courses,
+            total_time_s=np.zeros(0),
+            total_n=None,
+            coverage=self.coverage.share,
+            covering=self.coverage,
+            standing_s=(),
+            duration_s=sums.duration_s,
+            recorded_s=sums.recorded_s,
+            event_count=self.event_count,
+            stride_count=self.stride_count,
+            listed_s=self._listed[-1].end_s if is_cut else None,
+        )
+
+
+def _channels_of(foot: Foot, head: Recording) -> tuple[Channel, ...] | None:
+    found = [head.channels.get(u.name) or head.channels.get(u.name.split("_", 1)[-1]) for u in foot.units]
+    return tuple(c for c in found if c is not None) if all(c is not None for c in found) else None
+
+
+def _events(foot: str, contacts: Contacts) -> list[Event]:
+    return [
+        Event(float(at), foot, name)
+        for name, times in (
+            ("heel_strike", contacts.strike_s),
+            ("foot_flat", contacts.foot_flat_s),
+            ("heel_off", contacts.heel_off_s),
+            ("toe_off", contacts.toe_off_s),
+        )
+        for at in times[np.isfinite(times)]
+    ]

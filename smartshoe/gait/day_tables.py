@@ -1,0 +1,45 @@
+"""A long trial's events and strides as tables, written as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+from smartshoe.atomic import replacing
+from smartshoe.gait.result import Event
+from smartshoe.gait.strides import Stride
+
+DIGITS = 9  # of a number, as in the tables of a short trial
+
+
+@contextmanager
+def tables(folder: Path) -> Iterator[Callable[[Sequence[Event], Sequence[Stride]], None]]:
+    """What `smartshoe.gait.day.analyse_stream` tells, as ``events.csv`` and ``strides.csv`` in ``folder``.
+
+    Yields the function to hand to ``told``. The files are there when the block ends without an error, whole.
+    """
+    with ExitStack() as stack:
+        files = []
+        for name, row in (("events", Event), ("strides", Stride)):
+            path = stack.enter_context(replacing(folder / f"{name}.csv"))
+            files.append(stack.enter_context(path.open("w", encoding="utf-8", newline="\n")))
+            files[-1].write(",".join(row.__dataclass_fields__) + "\n")
+
+        def told(events: Sequence[Event], strides: Sequence[Stride]) -> None:
+            for file, rows in zip(files, (events, strides), strict=True):
+                file.writelines(map(_line, rows))
+
+        yield told
+
+
+def _line(row: Any) -> str:
+    return ",".join(_cell(value) for value in astuple(row)) + "\n"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
