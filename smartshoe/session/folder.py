@@ -19,7 +19,7 @@ import numpy as np
 
 from smartshoe.atomic import json_text, make_folder, replacing, write_text
 from smartshoe.devices.base import Block, ChannelDescription, Shoe
-from smartshoe.devices.inbox import joined
+from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.errors import InputError, SmartShoeError, UsageError
 from smartshoe.journal import Journal, Record, read_journal
 from smartshoe.logs import read, write

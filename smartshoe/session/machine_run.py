@@ -18,7 +18,7 @@ from smartshoe.devices import open_machine
 from smartshoe.devices.base import Shoe, TestMachine
 from smartshoe.devices.logged import INSTRON_5944
 from smartshoe.devices.registry import split_url
-from smartshoe.devices.serial_shoe import SerialShoe
+from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.errors import DeviceError, DeviceTimeoutError, InputError, SmartShoeError, UsageError
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol

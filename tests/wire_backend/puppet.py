@@ -13,7 +13,7 @@ import numpy as np
 from simulators.firmware import Firmware
 from simulators.pty_line import PtyLine
 from smartshoe.devices.replay import ReplayedShoe
-from smartshoe.devices.serial_shoe import SerialShoe
+from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.recording import REGIONS, Recording
 
 T = TypeVar("T")

@@ -77,7 +77,7 @@ def test_everything_imports_where_there_are_no_pseudo_terminals() -> None:
         "import sys\n"
         "for name in ('pty', 'tty', 'termios', 'fcntl'):\n"
         "    sys.modules[name] = None\n"
-        "import smartshoe.devices.serial_shoe, smartshoe.devices.serial_reader, smartshoe.devices.serial_port\n"
+        "from smartshoe.devices.serial_link import port, reader, shoe\n"
         "import simulators.emulator, simulators.serving, simulators.pty_line, simulators.firmware\n"
         "from simulators.pty_line import PtyLine\n"
         "from smartshoe.errors import DeviceError\n"

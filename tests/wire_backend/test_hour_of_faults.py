@@ -13,10 +13,10 @@ from puppet import RATE_HZ, ramp_shoe
 
 from simulators.faults import FaultyAir, Outages, WireFaults
 from simulators.firmware import Firmware
-from smartshoe.devices.assembly import Assembler
 from smartshoe.devices.base import Block
 from smartshoe.devices.events import Gap
-from smartshoe.devices.inbox import joined
+from smartshoe.devices.serial_link.assembly import Assembler
+from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.wire.frames import Command, FrameDecoder, encode_command
 
 FAULTS = WireFaults(

@@ -17,10 +17,10 @@ from simulators.serving import Emulator
 from smartshoe.devices import open_shoe
 from smartshoe.devices.base import Block
 from smartshoe.devices.events import Disconnected, Dropped, Gap, Reconnected, Restarted, Silence
-from smartshoe.devices.inbox import joined
-from smartshoe.devices.serial_port import SerialPort
-from smartshoe.devices.serial_settings import SerialSettings
-from smartshoe.devices.serial_shoe import SerialShoe
+from smartshoe.devices.serial_link.inbox import joined
+from smartshoe.devices.serial_link.port import SerialPort
+from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.errors import DeviceError, DeviceTimeoutError
 from smartshoe.wire.frames import Command, encode_command
 

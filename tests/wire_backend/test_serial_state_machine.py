@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from puppet import RATE_HZ, STEP_S, Puppet, wait_until, within
 
-from smartshoe.devices.serial_settings import SerialSettings
-from smartshoe.devices.serial_shoe import SerialShoe
+from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.errors import DeviceError
 
 # A port that is closed because it was silent may take along what comes in that moment: not here, in a test of its own.

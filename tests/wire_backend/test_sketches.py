@@ -13,8 +13,8 @@ import pytest
 from puppet import STEP_S, within
 
 from smartshoe.devices.events import Silence, ToldLate
-from smartshoe.devices.serial_settings import SerialSettings
-from smartshoe.devices.serial_shoe import SerialShoe
+from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.errors import DeviceError, DeviceTimeoutError
 from smartshoe.units import COUNTS, MILLIBAR
 from smartshoe.wire.frames import encode_information, encode_samples

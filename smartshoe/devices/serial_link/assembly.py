@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from smartshoe.devices.base import Block
 from smartshoe.devices.events import Gap, Restarted, ShoeEvent
-from smartshoe.devices.inbox import joined
+from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.errors import DeviceError
 from smartshoe.units import Unit
 from smartshoe.wire.clock import DeviceClock

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from smartshoe.devices.serial_port import Port
-from smartshoe.devices.serial_settings import SerialSettings
+from smartshoe.devices.serial_link.port import Port
+from smartshoe.devices.serial_link.settings import SerialSettings
 from smartshoe.errors import DeviceTimeoutError
 from smartshoe.wire.frames import Command, FrameDecoder, encode_command
 from smartshoe.wire.information import Information

@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from smartshoe.devices.assembly import Assembler
 from smartshoe.devices.events import Disconnected, EventLog, Reconnected, Silence, ToldLate
-from smartshoe.devices.greeting import Decoder, Greeting, farewell, hello
-from smartshoe.devices.inbox import Inbox
-from smartshoe.devices.reconnect import Backoff
-from smartshoe.devices.serial_port import Port
-from smartshoe.devices.serial_settings import SerialSettings
+from smartshoe.devices.serial_link.assembly import Assembler
+from smartshoe.devices.serial_link.greeting import Decoder, Greeting, farewell, hello
+from smartshoe.devices.serial_link.inbox import Inbox
+from smartshoe.devices.serial_link.port import Port
+from smartshoe.devices.serial_link.reconnect import Backoff
+from smartshoe.devices.serial_link.settings import SerialSettings
 from smartshoe.errors import DeviceError, DeviceTimeoutError
 from smartshoe.wire.samples import Samples
 
