@@ -1,19 +1,24 @@
 """What speed does to gait: smooth laws through published means of adults, each with its source.
 
-They are means over people, good to some 5 %; a person's own numbers go into `simulators.gait.person.Move`.
+They are means over people, good to some 5 %; a person's own numbers go into `simulators.gait.person.Move`. "After"
+says that the trend is the source's and the numbers are rounded or joined here, not read from its tables.
 """
 
 from __future__ import annotations
 
 import math
 
-TRANSITION_M_PER_S = 2.05  # walk to run, 2.0-2.1 m/s: Hreljac 1993
-WALK_RATIO_M_MIN = 0.0064  # step length over cadence, constant over speed: Sekiya et al. 1996
+TRANSITION_M_PER_S = 2.05  # walk to run, 2.0-2.1 m/s: after Hreljac 1993
+WALK_RATIO_M_MIN = 0.0064  # step length over cadence, constant from about 1 m/s up: after Sekiya et al. 1996
 LONGEST_RUNNING_STANCE = 0.47
 
 
 def walking_cadence(speed_m_per_s: float, walk_ratio_m_min: float = WALK_RATIO_M_MIN) -> float:
-    """Steps per minute: speed is step length times cadence, their ratio a constant (Sekiya et al. 1996)."""
+    """Steps per minute: speed is step length times cadence, their ratio a constant (after Sekiya et al. 1996).
+
+    Below some 1.03 m/s (98 steps a minute) people take longer steps than that (Murakami and Otaka 2017): slow walking
+    is some steps a minute too quick here.
+    """
     return math.sqrt(60.0 * speed_m_per_s / walk_ratio_m_min)
 
 
@@ -34,7 +39,7 @@ def running_stance_share(speed_m_per_s: float) -> float:
 
 
 def stride_time_cv(speed_m_per_s: float) -> float:
-    """Stride time varies more as speed falls: 2.6 % at 0.8 m/s, 1.6 at 1.3, 1.0 at 2.0 (after Jordan et al. 2007)."""
+    """Stride time varies more as speed falls: 2.6 % at 0.8 m/s, 1.6 at 1.3, 1.0 at 2.0 (after Beauchet et al. 2009)."""
     return min(0.016 * (1.3 / speed_m_per_s), 0.06)
 
 

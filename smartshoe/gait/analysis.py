@@ -61,6 +61,11 @@ def analyse(
     covered = coverage if isinstance(coverage, Coverage) else Coverage(coverage)
     if body_weight_n is not None and not (math.isfinite(body_weight_n) and body_weight_n > 0.0):
         raise UsageError(f"body_weight_n is {body_weight_n:g}: give newtons above 0")
+    if estimator is not None:
+        from smartshoe.compensation.estimators import NAMES
+
+        if estimator not in NAMES:
+            raise UsageError(f"estimator {estimator!r} is not known: use one of {', '.join(NAMES)}")
     recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
     calibrations = list(calibrations) if isinstance(calibrations, Sequence) else [calibrations]
     feet, flags = feet_of(recordings, calibrations, estimator)
@@ -179,7 +184,7 @@ def _forces(
     for foot in feet.values():
         missing |= np.interp(time_s, foot.time_s, foot.missing.astype(float)) > 0.0
     own = [stride for stride in strides if stride.foot == first.name] or list(strides)
-    means, durations = stride_means(time_s, total_n, own)
+    means, durations = stride_means(time_s, total_n, missing, own)
     standing = standing_mean(time_s, total_n, missing, spans)
     rmse_n = rmse_of(feet, courses, coverage)
     both = len(feet) == 2

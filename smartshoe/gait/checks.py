@@ -11,6 +11,7 @@ from smartshoe.gait.flag import Flag, spans_of, where_text
 from smartshoe.gait.labels import clock_flags, label_flags
 from smartshoe.gait.result import FootCourse, Forces
 from smartshoe.gait.strides import LONGEST_GAP_S, Stride
+from smartshoe.gait.total import SETTLED_S, total_of
 from smartshoe.gait.trial import LEAST_RATE_HZ, Foot
 from smartshoe.recording import REGIONS
 
@@ -22,6 +23,8 @@ WEIGHT_OFF = 0.05
 SILENT = 0.02  # of the foot's peak
 FAST = 1.1  # times the calibrated loading rate
 FAST_QUANTILE = 0.995
+LEAST_DRIFT_S = 10.0
+STANDING_DRIFT = 0.02  # of the total, from the first fifth of a standing to its last
 
 
 def all_of(
@@ -55,6 +58,7 @@ def all_of(
     for name, foot in feet.items():
         flags += _units(foot, courses[name])
         flags += _gaps(foot, courses[name])
+    flags += _standing_drift(feet, courses, spans)
     flags += _rates(feet, courses)
     flags += _weight(forces, coverage, body_weight_n)
     if strides and len({stride.runs for stride in strides}) == 2:
@@ -94,7 +98,8 @@ def _shoe(foot: Foot, course: FootCourse, loaded: bool, moving: bool) -> list[Fl
         flags.append(
             Flag(
                 "missing_unit",
-                f"{foot.name} has no column for {', '.join(absent)}: what they bear is in no force",
+                f"the {foot.name} shoe has no column for {', '.join(absent)}: what they bear is in no force"
+                + _late(absent),
                 foot=foot.name,
                 unit=", ".join(absent),
             )
@@ -144,6 +149,11 @@ def _shoe(foot: Foot, course: FootCourse, loaded: bool, moving: bool) -> list[Fl
             )
         )
     return flags
+
+
+def _late(absent: Sequence[str]) -> str:
+    told = [says for region, says in (("heel", "heel strikes late"), ("toe", "toe offs early")) if region in absent]
+    return f", {' and '.join(told)}, and compared with a whole shoe it is no equal" if told else ""
 
 
 def _units(foot: Foot, course: FootCourse) -> list[Flag]:
@@ -211,6 +221,34 @@ def _gaps(foot: Foot, course: FootCourse) -> list[Flag]:
     return flags
 
 
+def _standing_drift(
+    feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], spans: Sequence[tuple[float, float]]
+) -> list[Flag]:
+    """Said where the total of standing runs away: a body that stands weighs the same at its end as at its begin."""
+    forces = {name: course.force_n for name, course in courses.items() if course.force_n is not None}
+    if len(forces) < 2:
+        return []
+    time_s, total_n = total_of(feet, forces)
+    for start_s, end_s in spans:
+        first, last = np.searchsorted(time_s, [start_s + SETTLED_S, end_s - SETTLED_S])
+        part = total_n[first:last]
+        fifth = part.size // 5
+        if end_s - start_s < LEAST_DRIFT_S or fifth == 0:
+            continue
+        begin_n, end_n = float(part[:fifth].mean()), float(part[-fifth:].mean())
+        if abs(end_n - begin_n) > STANDING_DRIFT * abs(float(part.mean())):
+            return [
+                Flag(
+                    "standing_drifts",
+                    f"the total goes from {begin_n:.0f} to {end_n:.0f} N while the person stands, as no weight does:"
+                    " zeros drift or units creep, and only a foot in the air tells a zero; lift each foot for a second"
+                    " now and then",
+                    where=where_text([(start_s, end_s)]),
+                )
+            ]
+    return []
+
+
 def _rates(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse]) -> list[Flag]:
     faster: list[tuple[float, float, str]] = []
     for name, foot in feet.items():
@@ -241,8 +279,8 @@ def _weight(forces: Forces, coverage: float, given_n: float | None) -> list[Flag
         flags.append(
             Flag(
                 "implausible_weight",
-                f"the mean total force is {found_n:.3g} N, which is no person's weight: check the columns' units (N,"
-                " not kN or kg) and the calibrations",
+                f"the mean total force is {found_n:.3g} N, which is no standing person's weight: the person sat, or"
+                " check the columns' units (N, not kN or kg) and the calibrations",
             )
         )
     if given_n is not None and mean_n is not None and abs(mean_n / given_n - 1.0) > WEIGHT_OFF:

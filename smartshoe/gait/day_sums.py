@@ -20,7 +20,7 @@ from smartshoe.gait.stretch import Stretch
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import MOSTLY, Activity
 from smartshoe.gait.sums import BlockMeans, Moments, StrideSums, weighted_mean
-from smartshoe.gait.total import ONE_SHOE_SHARE_SD, SETTLED_S, SWAY_S, WIDE_SD, BodyWeight, total_of
+from smartshoe.gait.total import ONE_SHOE_SHARE_SD, SETTLED_S, SWAY_S, WIDE_SD, BodyWeight, total_of, whole_strides
 from smartshoe.gait.trial import Foot
 
 Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ class DaySums:
                 missing |= np.interp(time_s, foot.time_s, foot.missing.astype(float)) > 0.0
         step = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
         gathered = np.concatenate([[0.0], np.cumsum(0.5 * (total_n[1:] + total_n[:-1])) * step])
-        whole = [s for s in stretch.strides if s.start_s >= time_s[0] and s.end_s <= time_s[-1] and not s.gap]
+        whole = whole_strides(time_s, missing, stretch.strides)
         for is_first in (True, False):
             own = [s for s in whole if (s.foot == self._first) == is_first]
             start, end = np.array([s.start_s for s in own]), np.array([s.end_s for s in own])

@@ -52,8 +52,11 @@ def deviations(strides: Sequence[Stride], time_s: Array, loads: Array, reference
 def sequence_errors(contacts: Contacts, strides: Sequence[Stride]) -> tuple[int, int]:
     """How many strides break the order heel strike, foot flat, heel off, toe off, and of how many.
 
-    An event that is missing breaks it, as does a unit of the forefoot that is loaded before the heel.
+    An event that is missing breaks it, as does a unit of the forefoot that is loaded before the heel. Of none where
+    the shoe has no heel or no metatarsal unit to tell foot flat and heel off by.
     """
+    if contacts.of_region("heel") is None or {"meta1", "meta4"}.isdisjoint(contacts.regions):
+        return 0, 0
     index = {float(strike): k for k, strike in enumerate(contacts.strike_s) if np.isfinite(strike)}
     flat_s, heel_off_s = contacts.foot_flat_s, contacts.heel_off_s
     wrong = 0

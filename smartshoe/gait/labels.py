@@ -49,8 +49,10 @@ def label_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], str
                     foot=name,
                 )
             )
+    # Without all units a foot's course has holes of its own, and nothing follows from its order.
+    whole = all(len(course.regions) == len(REGIONS) for course in courses.values())
     in_order = all(_is_in_order(course, strides) for course in courses.values())
-    region = None if in_order else _exchanged_sides(feet, courses)
+    region = _exchanged_sides(feet, courses) if whole and not in_order else None
     if region is not None:
         flags.append(
             Flag(
@@ -161,7 +163,7 @@ def clock_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], str
     A clock that is late by d makes one longer by d and the other shorter by d. So does a limp; only where walking
     would have a flight, or running a double support, can it be nothing but the clocks.
     """
-    if len(feet) < 2 or not strides:
+    if len(feet) < 2 or not strides or feet["left"].regions != feet["right"].regions:
         return []
     left, right = courses["left"].contacts, courses["right"].contacts
     first_s, at_s = _overlaps(left.strike_s, right.strike_s, right.toe_off_s)

@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LONGEST_S = 3.5  # from strike to strike: longer, the person stood in between
-LONGEST_GAP_S = 0.1
+LONGEST_GAP_S = 0.1  # in one piece: straight lines bridge single samples well
+MOST_MISSING = 0.3  # of a stride
 RUNS_BELOW = 50.0  # percent of a stride that the feet are down
 RATE_FROM, RATE_TO = 0.2, 0.8  # of the first peak: where the loading rate is taken
 
@@ -64,6 +65,7 @@ def strides_of(
     with np.errstate(invalid="ignore"):
         good = (end_s - start_s <= longest_s) & np.isfinite(toe_off_s)
     rate_hz = (time_s.size - 1) / (time_s[-1] - time_s[0])
+    gaps = _gaps(missing)
     gone = np.concatenate([[0], np.cumsum(missing)])
     found: list[Stride] = []
     for k in np.flatnonzero(good):
@@ -79,10 +81,24 @@ def strides_of(
             Stride(
                 foot, float(start_s[k]), float(end_s[k]), float(toe_off_s[k]), _maybe(flat_s[k]), _maybe(heel_off_s[k]),
                 float(100.0 * (toe_off_s[k] - start_s[k]) / (end_s[k] - start_s[k])), peak, impulse, slope, False,
-                bool((gone[last] - gone[first]) / rate_hz > LONGEST_GAP_S),
+                _loses(gaps, first, last, rate_hz) or bool(gone[last] - gone[first] > MOST_MISSING * (last - first)),
             )
         )  # fmt: skip
     return found
+
+
+def _gaps(missing: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Begin and end (k,) in samples of the runs of ``missing`` (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+    return edges[0::2], edges[1::2]
+
+
+def _loses(gaps: tuple[NDArray[np.intp], NDArray[np.intp]], first: int, last: int, rate_hz: float) -> bool:
+    """Whether the samples [``first``, ``last``) lose more than `LONGEST_GAP_S` in one piece."""
+    start, stop = gaps
+    k = slice(int(np.searchsorted(stop, first, side="right")), int(np.searchsorted(start, last)))
+    longest = np.minimum(stop[k], last) - np.maximum(start[k], first)
+    return bool(longest.size and longest.max() / rate_hz > LONGEST_GAP_S)
 
 
 def with_runs(strides: Sequence[Stride]) -> list[Stride]:

@@ -17,6 +17,7 @@ Activity = Literal["walking", "running", "standing", "mixed"]
 
 MOSTLY = 0.85  # of the time in which anything is told, that makes an activity the trial's
 LONGEST_STEP_S = 2.0
+ROUNDING = 1e-9  # of a stride
 
 
 def activity_of(strides: Sequence[Stride], standing_s: float) -> Activity:
@@ -93,7 +94,9 @@ def both_down(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> tu
         flight.append(1.0 - (toe_off - start + down - over) / (end - start))
     if not double or not np.concatenate(double).size:
         return None
-    return float(100.0 * np.concatenate(double).mean()), float(100.0 * max(0.0, float(np.concatenate(flight).mean())))
+    shares = (float(np.concatenate(double).mean()), float(np.concatenate(flight).mean()))
+    both, neither = (100.0 * share if share > ROUNDING else 0.0 for share in shares)
+    return both, neither
 
 
 def order_of_contact(

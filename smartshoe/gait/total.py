@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.gait.contact import Contacts
-from smartshoe.gait.strides import Stride
+from smartshoe.gait.strides import MOST_MISSING, Stride
 from smartshoe.gait.trial import Foot
 
 if TYPE_CHECKING:
@@ -98,11 +98,34 @@ def _shared(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, 
     return sorted(both)
 
 
-def stride_means(time_s: Array, total_n: Array, strides: Sequence[Stride]) -> tuple[Array, Array]:
-    """Mean (m,) of the total over each stride, and its duration (m,); strides beyond the shared times are left out."""
+def whole_strides(time_s: Array, missing: Mask, strides: Sequence[Stride]) -> list[Stride]:
+    """Those within ``time_s`` (n,) during which neither foot misses more than `MOST_MISSING` of its samples.
+
+    ``missing`` (n,) is either foot's: while one lacks a unit the total is too small, whichever foot steps.
+    """
+    gone = np.concatenate([[0.0], np.cumsum(missing)])
+    places = np.arange(gone.size)
+
+    def lost(stride: Stride) -> float:
+        first, last = np.interp(np.searchsorted(time_s, [stride.start_s, stride.end_s]), places, gone)
+        return float(last - first)
+
+    step = (time_s[-1] - time_s[0]) / max(time_s.size - 1, 1)
+    return [
+        s
+        for s in strides
+        if s.start_s >= time_s[0]
+        and s.end_s <= time_s[-1]
+        and not s.gap
+        and lost(s) * step <= MOST_MISSING * (s.end_s - s.start_s)
+    ]
+
+
+def stride_means(time_s: Array, total_n: Array, missing: Mask, strides: Sequence[Stride]) -> tuple[Array, Array]:
+    """Mean (m,) of the total over each of the `whole_strides`, and its duration (m,)."""
     step = (time_s[-1] - time_s[0]) / max(time_s.size - 1, 1)
     gathered = np.concatenate([[0.0], np.cumsum(0.5 * (total_n[1:] + total_n[:-1])) * step])
-    whole = [s for s in strides if s.start_s >= time_s[0] and s.end_s <= time_s[-1] and not s.gap]
+    whole = whole_strides(time_s, missing, strides)
     start, end = np.array([s.start_s for s in whole]), np.array([s.end_s for s in whole])
     if not whole:
         return np.zeros(0), np.zeros(0)

@@ -24,6 +24,8 @@ Mask = NDArray[np.bool_]
 FEET = ("left", "right")
 GAP_STEPS = 2.5
 NEGATIVE = 10.0  # times further below nought than above it, loads count tension
+FEWEST_STEPS_PER_S = 0.2
+CALM_S, CALM_SHARE = 0.1, 0.2  # a fifth of the time at least a foot is in the air
 LEAST_RATE_HZ = 40.0
 FEWEST_SAMPLES = 8
 _QUANTITIES = frozenset({"force", "pressure", "voltage", "counts", "resistance", "length", "unknown", "dimensionless"})
@@ -185,11 +187,28 @@ def _foot(
             f"{recording.label}: {', '.join(bare)} has no calibration and is not in N, the other units' loads are in N:"
             " give its --calibration, or leave out its column"
         )
-    low, high = np.quantile(np.sum([unit.load for unit in units], axis=0), [0.01, 0.99])
-    turned = kinds == {True} and -low > NEGATIVE * max(high, 0.0) and -low > 0.0
+    turned = kinds == {True} and _is_upside_down(np.sum([unit.load for unit in units], axis=0), rate_hz)
     if turned:
         units = tuple(replace(unit, load=-unit.load) for unit in units)
     return Foot(foot, time_s, rate_hz, units, recording.label, bool(turned))
+
+
+def _is_upside_down(load: Array, rate_hz: float) -> bool:
+    """Whether compression is negative in ``load`` (n,): mostly below zero, and at rest at its top where it steps.
+
+    A zero that is far off makes a load negative too; but a foot in the air is calm, and that is its lowest load.
+    """
+    low, high = (float(level) for level in np.quantile(load, [0.01, 0.99]))
+    if -low <= NEGATIVE * max(high, 0.0):
+        return False
+    above = load > 0.5 * (low + high)
+    steps = np.count_nonzero(above[1:] & ~above[:-1])
+    if steps < max(2.0, FEWEST_STEPS_PER_S * load.size / rate_hz):
+        return True
+    half = max(1, round(0.5 * CALM_S * rate_hz))
+    moves = np.abs(load[2 * half :] - load[: -2 * half])
+    calm = load[half:-half][moves <= np.quantile(moves, CALM_SHARE)]
+    return float(np.median(calm)) > 0.5 * (low + high)
 
 
 def _even(recording: Recording):  # type: ignore[no-untyped-def]  # the third is a function of a channel

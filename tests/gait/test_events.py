@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from event_scoring import score, scores
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from trials import analysed, loads_of, ran, recorded, stood, times_of, walked
 
@@ -78,6 +78,8 @@ def test_sway_and_tiptoe_are_no_steps() -> None:
     scale=st.floats(0.4, 3.0),
     offsets_n=st.lists(st.floats(-150.0, 300.0), min_size=8, max_size=8),
 )
+@example(scale=0.5, offsets_n=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -61.0, -150.0])  # mostly negative, and no tension
+@example(scale=0.4, offsets_n=[-150.0] * 8)
 def test_events_do_not_move_with_body_weight_or_offset(scale: float, offsets_n: list[float]) -> None:
     moved = {
         name: scale * values + offset
