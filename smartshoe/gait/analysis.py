@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.gait import checks
 from smartshoe.gait.contact import LEAST_LOAD_N, ContactDetector, Contacts
+from smartshoe.gait.course import course_of
 from smartshoe.gait.coverage import Coverage
 from smartshoe.gait.indices import indices_of, pattern
-from smartshoe.gait.insole import LEAST_SHARE, centre_of_pressure
-from smartshoe.gait.membership import memberships
-from smartshoe.gait.phases import crisp
 from smartshoe.gait.result import Event, FootCourse, Forces, GaitResult
 from smartshoe.gait.strides import Stride, strides_of, with_runs
 from smartshoe.gait.summary import activity_of, of_main_activity, summarise
@@ -80,7 +78,10 @@ def analyse(
             f"{recordings[0].label}: no stance is found and no foot is loaded: check that the shoes were worn, and the"
             " columns' units"
         )
-    courses = {name: _course(foot, contacts[name], loads[name], covered) for name, foot in feet.items()}
+    courses = {
+        name: course_of(foot, contacts[name], loads[name], covered, _usual_peaks(foot, contacts[name], loads[name]))
+        for name, foot in feet.items()
+    }
     strides = with_runs(
         [
             stride
@@ -127,32 +128,6 @@ def _is_loaded(foot: Foot, load: Array, body_weight_n: float | None) -> bool:
         return False
     least = LEAST_LOAD_N if body_weight_n is None else max(LEAST_LOAD_N, 0.05 * body_weight_n)
     return float(np.mean(load.sum(axis=1))) > least
-
-
-def _course(foot: Foot, contacts: Contacts, load: Array, coverage: Coverage) -> FootCourse:
-    usual = _usual_peaks(foot, contacts, load)
-    whole = load.sum(axis=1)
-    membership, abnormality = memberships(load, foot.regions, usual)
-    state = crisp(contacts, foot.time_s)
-    peak = float(usual.sum())
-    return FootCourse(
-        name=foot.name,
-        time_s=foot.time_s,
-        rate_hz=foot.rate_hz,
-        regions=foot.regions,
-        symbol=foot.units[0].symbol,
-        is_force=foot.is_force,
-        load=load,
-        sd_n=None if foot.sd_n is None else foot.sd_n / coverage.share,
-        force_n=coverage.whole(whole, foot.time_s, contacts) if foot.is_force else None,
-        centre=centre_of_pressure(load, foot.regions, LEAST_SHARE * peak),
-        state=state,
-        membership=membership,
-        abnormality=abnormality,
-        missing=foot.missing,
-        contacts=contacts,
-        usual_peak=usual,
-    )
 
 
 def _usual_peaks(foot: Foot, contacts: Contacts, load: Array) -> Array:

@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from smartshoe.gait import checks
 from smartshoe.gait.contact import LEAST_LOAD_N, Contacts
+from smartshoe.gait.course import course_of
 from smartshoe.gait.coverage import Coverage
 from smartshoe.gait.flag import Flag
-from smartshoe.gait.insole import LEAST_SHARE, centre_of_pressure
-from smartshoe.gait.membership import memberships
-from smartshoe.gait.phases import crisp
 from smartshoe.gait.result import FootCourse, Forces
 from smartshoe.gait.strides import Stride, strides_of, with_runs
 from smartshoe.gait.total import above_floor, standing_spans
@@ -64,7 +62,9 @@ def look(
         peaks[name].extend(peaks_of(foot.time_s, loads[name], contacts[name], start_s, end_s))
     least = max(LEAST_LOAD_N, 0.05 * (body_weight_n or 0.0))
     loaded = {n: foot.is_force and float(np.mean(loads[n].sum(axis=1))) > least for n, foot in feet.items()}
-    courses = {n: _course(foot, contacts[n], loads[n], coverage, peaks[n]) for n, foot in feet.items()}
+    courses = {
+        n: course_of(foot, contacts[n], loads[n], coverage, usual_peak(peaks[n], loads[n])) for n, foot in feet.items()
+    }
     near = [
         stride
         for name, course in courses.items()
@@ -90,26 +90,3 @@ def usual_peak(peaks: Sequence[Array], load: Array) -> Array:
     """Each unit's median peak (r,), its largest load (n, r) where no stance is known."""
     found = np.median(np.array(peaks), axis=0) if len(peaks) else load.max(axis=0)
     return np.asarray(np.maximum(found, 0.0))
-
-
-def _course(foot: Foot, contacts: Contacts, load: Array, coverage: Coverage, peaks: Sequence[Array]) -> FootCourse:
-    usual = usual_peak(peaks, load)
-    membership, abnormality = memberships(load, foot.regions, usual)
-    return FootCourse(
-        name=foot.name,
-        time_s=foot.time_s,
-        rate_hz=foot.rate_hz,
-        regions=foot.regions,
-        symbol=foot.units[0].symbol,
-        is_force=foot.is_force,
-        load=load,
-        sd_n=None,
-        force_n=coverage.whole(load.sum(axis=1), foot.time_s, contacts) if foot.is_force else None,
-        centre=centre_of_pressure(load, foot.regions, LEAST_SHARE * float(usual.sum())),
-        state=crisp(contacts, foot.time_s),
-        membership=membership,
-        abnormality=abnormality,
-        missing=foot.missing,
-        contacts=contacts,
-        usual_peak=usual,
-    )
