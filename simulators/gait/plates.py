@@ -21,6 +21,7 @@ from simulators.gait.plan import FEET
 from simulators.gait.shape import COLUMNS, COVERAGE, PHASES, Outside, table
 from simulators.gait.standing import FLAT
 from smartshoe.errors import InputError
+from smartshoe.masks import runs_of
 from smartshoe.recording import REGIONS
 
 Array = NDArray[np.float64]
@@ -135,9 +136,8 @@ def _read(path: Path) -> tuple[Array, Array, bool]:
 
 
 def _stances(force_n: Array, time_s: Array) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], force_n > LEVEL_N, [False]]).astype(np.int8)))
     found = []
-    for first, last in zip(edges[0::2], edges[1::2], strict=True):
+    for first, last in zip(*runs_of(force_n > LEVEL_N), strict=True):
         # Down to zero on either side, so that the load does not begin with a step.
         while first > 0 and 0.0 < force_n[first - 1] <= force_n[first]:
             first -= 1

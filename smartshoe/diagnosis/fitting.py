@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.screen import TARE, Rests
 from smartshoe.diagnosis.session import Session
-from smartshoe.identification.experiment import bridged
+from smartshoe.masks import bridged
 from smartshoe.models.effects import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.denoise import noise_sd, without_noise
-from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.diagnosis.jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.experiment import bridged
 from smartshoe.loading import turning_points
+from smartshoe.masks import bridged, runs_of
 from smartshoe.models.effects import Conditions
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.loading import turning_points
+from smartshoe.masks import runs_of
 
 Array = NDArray[np.float64]
 

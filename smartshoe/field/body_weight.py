@@ -16,6 +16,7 @@ from smartshoe.errors import UsageError
 from smartshoe.field.finding import Array, Finding, Verdict
 from smartshoe.field.swing_zero import WINDOW_S
 from smartshoe.field.swings import swings
+from smartshoe.masks import runs_of
 
 TOLERANCE = 0.05
 FEWEST_STRIDES = 3
@@ -125,10 +126,8 @@ def _standing(total: Array, rate_hz: float, body_weight_n: float) -> tuple[Array
     level = uniform_filter1d(total, second)
     spread = np.sqrt(np.maximum(uniform_filter1d((total - level) ** 2, second), 0.0))
     still = (spread < LEAST_RISE / 4 * body_weight_n) & (level > LEAST_RISE * body_weight_n)
-    edges = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
-    ends = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
     # A second at either end still feels the step on and off.
-    runs = [(int(a) + second, int(b) - second) for a, b in ends]
+    runs = [(int(a) + second, int(b) - second) for a, b in zip(*runs_of(still), strict=True)]
     first, stop = max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
     count = int((stop - first) / rate_hz / STANDING_BLOCK_S)
     if count < FEWEST_BLOCKS:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from smartshoe.errors import UsageError
 from smartshoe.field.finding import Array, Finding, Mask, white_noise
+from smartshoe.masks import runs_of
 
 UP, DOWN = 0.6, 0.4  # of a unit's own rise: a press goes above the one after it was below the other
 MOVES = 10.0  # noises: a unit with a smaller rise is not pressed
@@ -78,8 +79,8 @@ def _presses(values: Array, rise: float) -> np.ndarray[tuple[int], np.dtype[np.i
 
 def _runs(at: Mask) -> list[tuple[int, int]]:
     """First and last sample of each run of True."""
-    edges = np.diff(np.concatenate([[0], at.astype(np.int8), [0]]))
-    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+    first, after = runs_of(at)
+    return list(zip(first.tolist(), (after - 1).tolist(), strict=True))
 
 
 def _gaps(time: Array, there: Mask, name: str) -> list[Finding]:

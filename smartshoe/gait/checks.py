@@ -13,6 +13,7 @@ from smartshoe.gait.result import FootCourse, Forces
 from smartshoe.gait.strides import LONGEST_GAP_S, Stride
 from smartshoe.gait.total import SETTLED_S, total_of
 from smartshoe.gait.trial import LEAST_RATE_HZ, Foot
+from smartshoe.masks import runs_of
 from smartshoe.recording import REGIONS
 
 Array = NDArray[np.float64]
@@ -197,8 +198,7 @@ def _gaps(foot: Foot, course: FootCourse) -> list[Flag]:
     missing = course.missing
     if not missing.any():
         return []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-    start, stop = edges[0::2], edges[1::2]
+    start, stop = runs_of(missing)
     long = (stop - start) / foot.rate_hz > 0.5 * LONGEST_GAP_S
     inside = np.array([bool((course.state[a:b] != 0).any()) for a, b in zip(start, stop, strict=True)], dtype=bool)
     flags: list[Flag] = []

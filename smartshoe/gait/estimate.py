@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import UnitError
+from smartshoe.masks import bridged, runs_of
 from smartshoe.recording import Channel
 
 if TYPE_CHECKING:
@@ -58,14 +59,15 @@ def estimate(
     A channel in a unit of force is the load already. ``estimator`` is a name of `smartshoe.compensation.estimators`,
     None the calibration's own compensator. Raises `UnitError` where the calibration is for another quantity.
     """
-    missing = ~channel.present
+    present = channel.present
+    missing, at = ~present, np.arange(present.size, dtype=float)
     saturated = on_the_rail(channel)
     nothing = np.zeros(channel.values.size, dtype=bool)
     if channel.unit.quantity == "force":
-        return UnitLoad(name, _bridged(channel.si, missing), True, "N", missing, saturated, nothing)
+        return UnitLoad(name, bridged(at, channel.si, present), True, "N", missing, saturated, nothing)
     if calibration is None:
         return UnitLoad(
-            name, _bridged(channel.values, missing), False, channel.unit.symbol, missing, saturated, nothing
+            name, bridged(at, channel.values, present), False, channel.unit.symbol, missing, saturated, nothing
         )
     if channel.unit != calibration.reading_unit and channel.unit.quantity != calibration.reading_unit.quantity:
         raise UnitError(
@@ -74,7 +76,7 @@ def estimate(
         )
     from smartshoe.compensation.estimators.estimate import gain_sd
 
-    readings = _bridged(channel.in_unit(calibration.reading_unit), missing)
+    readings = bridged(at, channel.in_unit(calibration.reading_unit), present)
     sd_n = None
     if estimator is None:
         load_n = calibration.compensator(rate_hz).apply(readings)
@@ -103,8 +105,7 @@ def on_the_rail(channel: Channel) -> Mask:
     tied = (values >= top) & present
     if np.count_nonzero(tied) > MOST_TIED * values.size:
         return np.zeros(values.size, dtype=bool)  # a channel that stands still says nothing of its rail
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], tied, [False]]).astype(np.int8)))
-    start, stop = edges[0::2], edges[1::2]
+    start, stop = runs_of(tied)
     long = (stop - start) >= RAIL_RUN
     start, stop = start[long], stop[long]
     if start.size == 0:
@@ -119,14 +120,6 @@ def on_the_rail(channel: Channel) -> Mask:
     for first, last in zip(start, stop, strict=True):
         found[first:last] = True
     return found
-
-
-def _bridged(values: Array, missing: Mask) -> Array:
-    """``values`` (n,) with straight lines where samples are missing."""
-    if not missing.any() or missing.all():
-        return values
-    at = np.arange(values.size)
-    return np.asarray(np.interp(at, at[~missing], values[~missing]))
 
 
 def calibration_of(calibrations: Mapping[str, Calibration], name: str) -> Calibration | None:

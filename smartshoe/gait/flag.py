@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.masks import runs_of
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -32,9 +34,9 @@ class Flag:
 
 def spans_of(time_s: Array, mask: Mask, join_s: float = 0.5) -> list[tuple[float, float]]:
     """Begin and end in s of the runs of True, those less than ``join_s`` apart as one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    first, after = runs_of(mask)
     spans: list[tuple[float, float]] = []
-    for start, stop in zip(time_s[edges[0::2]], time_s[edges[1::2] - 1], strict=True):
+    for start, stop in zip(time_s[first], time_s[after - 1], strict=True):
         if spans and start - spans[-1][1] < join_s:
             spans[-1] = (spans[-1][0], float(stop))
         else:

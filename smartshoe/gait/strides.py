@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.gait.contact import Contacts
+from smartshoe.masks import runs_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -65,7 +66,7 @@ def strides_of(
     with np.errstate(invalid="ignore"):
         good = (end_s - start_s <= longest_s) & np.isfinite(toe_off_s)
     rate_hz = (time_s.size - 1) / (time_s[-1] - time_s[0])
-    gaps = _gaps(missing)
+    gaps = runs_of(missing)
     gone = np.concatenate([[0], np.cumsum(missing)])
     found: list[Stride] = []
     for k in np.flatnonzero(good):
@@ -85,12 +86,6 @@ def strides_of(
             )
         )  # fmt: skip
     return found
-
-
-def _gaps(missing: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Begin and end (k,) in samples of the runs of ``missing`` (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-    return edges[0::2], edges[1::2]
 
 
 def _loses(gaps: tuple[NDArray[np.intp], NDArray[np.intp]], first: int, last: int, rate_hz: float) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import NotIdentifiableError, UsageError
+from smartshoe.masks import bridged
 from smartshoe.models.first_order import Steps, steps
 from smartshoe.recording import Recording
 from smartshoe.units import Unit
@@ -168,16 +169,6 @@ def _on_one_step(experiment: Experiment) -> Experiment:
         command_n=None if command_n is None else np.interp(np.arange(size), places, command_n),
         rows=at,
     )
-
-
-def bridged(time_s: Array, values: Array, present: Mask) -> Array:
-    """A copy of ``values``, missing samples on the line between their neighbours: what the model takes for granted.
-
-    A copy, since a compiled pass is compiled anew for arrays that may not be written.
-    """
-    if present.all() or not present.any():
-        return np.array(values, dtype=float)
-    return np.interp(time_s, time_s[present], values[present])
 
 
 def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequence[Recording]) -> None:

@@ -14,6 +14,7 @@ from smartshoe import loading
 from smartshoe.devices.following import zeros_at
 from smartshoe.devices.joining import Alignment, align_reading, coarse
 from smartshoe.errors import InputError
+from smartshoe.masks import runs_of
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Channel, Recording
 
@@ -214,10 +215,9 @@ class ZeroDrift:
         inside = (at >= load.time_s[0]) & (at <= load.time_s[-1])
         at, reading = at[inside], evidence.reading.values[inside]
         idle = np.interp(at, load.time_s, load.force_n) < 0.01 * float(load.force_n.max())
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], idle, [False]]).astype(int)))
         rests = [
             0.5 * (at[start] + at[stop - 1])
-            for start, stop in edges.reshape(-1, 2)
+            for start, stop in zip(*runs_of(idle), strict=True)
             if stop - start >= LEAST_REST_S * evidence.stream.sample_rate_hz
         ]
         if len(rests) < 2:

@@ -10,10 +10,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask
 from smartshoe.diagnosis.integrity.held import held
 from smartshoe.diagnosis.integrity.spikes import isolated_beside
 from smartshoe.diagnosis.integrity.view import View
+from smartshoe.masks import runs_of
 
 GONE = 0.25  # of the expected reading at most is left
 LEAST_EXPECTED = 0.03  # of the span: below, a dropout cannot be told from rest

@@ -71,9 +71,3 @@ class Integrity:
     clock_offset_s: tuple[float, ...]
     clock_rate: tuple[float, ...]
     refusals: tuple[str, ...]
-
-
-def runs_of(mask: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First samples and one-past-last samples of the runs of True in ``mask`` (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return edges[0::2], edges[1::2]

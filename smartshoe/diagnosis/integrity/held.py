@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask
 from smartshoe.diagnosis.integrity.scales import SECOND_DIFFERENCE
 from smartshoe.diagnosis.integrity.view import DITHERED, Index, View
+from smartshoe.masks import runs_of
 
 CERTAIN = 1e-9  # chance that an honest run would repeat so
 LEVELS = tuple(10.0 ** (-0.25 * k) for k in range(24, 5, -1))  # chances at which honest runs are counted

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Finding, Mask
 from smartshoe.diagnosis.integrity.view import View
+from smartshoe.masks import runs_of
 
 # A lattice of step q adds an error of q/sqrt(12). It is a fault where that is at least 0.03 % of the reading's span
 # (beside a diagnosis's materiality of 0.02 %) and at least a quarter of the noise that is there without it: below, the

@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask
 from smartshoe.diagnosis.integrity.view import View
+from smartshoe.masks import runs_of
 
 BLOCK_S = 0.25
 LEAST_STRETCH_S = 1.0

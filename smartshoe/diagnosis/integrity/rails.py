@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Finding, Mask
 from smartshoe.diagnosis.integrity.view import View
+from smartshoe.masks import runs_of
 
 LEAST_TIES = 5
 MOST_TIES = 10  # times as many: levels of a lattice at a peak differ by a few times

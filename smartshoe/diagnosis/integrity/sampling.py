@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Finding, runs_of
+from smartshoe.diagnosis.integrity.fault import Finding
+from smartshoe.masks import runs_of
 from smartshoe.recording import Recording
 
 LEAST_SAMPLES = 100

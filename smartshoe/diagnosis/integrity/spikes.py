@@ -11,9 +11,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask, runs_of
+from smartshoe.diagnosis.integrity.fault import Array, Finding, Mask
 from smartshoe.diagnosis.integrity.scales import local_scale, own_corner
 from smartshoe.diagnosis.integrity.view import Index, Signal, View
+from smartshoe.masks import runs_of
 
 NOISES = 6.5  # the largest of 1e6 normal deviates reaches 5.1 of this scale
 STEPS = 2.0  # of a lattice

@@ -9,8 +9,8 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.diagnosis.result import Diagnosis, Trace
+from smartshoe.masks import runs_of
 from smartshoe.protocol import Protocol
 from smartshoe.report.diagnosis.sentences import file_name, share_text, shares, words
 from smartshoe.report.diagnosis.views import Map

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.integrity.fault import runs_of
 from smartshoe.diagnosis.result import Trace
+from smartshoe.masks import runs_of
 from smartshoe.report.diagnosis.views import (
     BINS,
     MOST_CYCLES,
