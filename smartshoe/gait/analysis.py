@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from smartshoe.gait.coverage import Coverage
 from smartshoe.gait.indices import indices_of, pattern
 from smartshoe.gait.result import Event, FootCourse, Forces, GaitResult
 from smartshoe.gait.strides import Stride, strides_of, with_runs
-from smartshoe.gait.summary import activity_of, of_main_activity, summarise
+from smartshoe.gait.summary import activity_of, of_main_activity
+from smartshoe.gait.sums import StrideSums
 from smartshoe.gait.total import (
     above_floor,
     body_weight_of,
@@ -97,7 +98,7 @@ def analyse(
         activity=activity,
         events=tuple(_events(contacts)),
         strides=tuple(strides),
-        summary=summarise(contacts, strides),
+        summary=_summary(contacts, strides),
         indices=indices_of(
             contacts,
             of_main_activity(strides),
@@ -128,6 +129,13 @@ def _is_loaded(foot: Foot, load: Array, body_weight_n: float | None) -> bool:
         return False
     least = LEAST_LOAD_N if body_weight_n is None else max(LEAST_LOAD_N, 0.05 * body_weight_n)
     return float(np.mean(load.sum(axis=1))) > least
+
+
+def _summary(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> dict[str, Any]:
+    """Over the strides without gaps of the main activity."""
+    sums = StrideSums(tuple(contacts))
+    sums.add(contacts, of_main_activity(strides))
+    return sums.summary()
 
 
 def _usual_peaks(foot: Foot, contacts: Contacts, load: Array) -> Array:

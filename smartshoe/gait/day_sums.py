@@ -18,7 +18,7 @@ from smartshoe.gait.indices import POINTS, deviations, overlaid, sequence_errors
 from smartshoe.gait.result import FootCourse, Forces
 from smartshoe.gait.stretch import Stretch
 from smartshoe.gait.strides import Stride
-from smartshoe.gait.summary import MOSTLY, Activity
+from smartshoe.gait.summary import Activity, activity_by_time
 from smartshoe.gait.sums import BlockMeans, Moments, StrideSums, weighted_mean
 from smartshoe.gait.total import ONE_SHOE_SHARE_SD, SETTLED_S, SWAY_S, WIDE_SD, BodyWeight, total_of, whole_strides
 from smartshoe.gait.trial import Foot
@@ -207,14 +207,9 @@ class DaySums:
     def activity(self) -> Activity:
         """What most of the trial is, by time, as `smartshoe.gait.summary.activity_of` has it."""
         feet = max(len(self._stepping), 1)
-        spent: dict[Activity, float] = {
-            "walking": self._time_s[False] / feet, "running": self._time_s[True] / feet, "standing": self._standing_s,
-        }  # fmt: skip
-        whole = sum(spent.values())
-        for activity, time_s in spent.items():
-            if whole > 0.0 and time_s >= MOSTLY * whole:
-                return activity
-        return "mixed"
+        return activity_by_time(
+            {"walking": self._time_s[False] / feet, "running": self._time_s[True] / feet, "standing": self._standing_s}
+        )
 
     def summary(self) -> dict[str, Any]:
         """Of the strides without gaps of the main activity."""

@@ -1,4 +1,4 @@
-"""What a long trial comes to, by running sums: the numbers of `smartshoe.gait.summary` without its lists."""
+"""What a trial comes to, by running sums: of a trial at once, or of a day stretch by stretch."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class StrideSums:
                 self.earlier += int(np.count_nonzero(both[:, meta4] < both[:, meta1]))
 
     def summary(self) -> dict[str, Any]:
-        """The object of `smartshoe.gait.summary.summarise`."""
+        """The contract's summary, with more beside it."""
 
         def sided(left: float | None, right: float | None) -> float | None:
             return None if left is None or right is None else asymmetry(left, right)
