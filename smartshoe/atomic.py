@@ -2,45 +2,153 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
+import shutil
+import stat
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from smartshoe.errors import UsageError
+from smartshoe.errors import SmartShoeError, UsageError
+
+_LONGEST_STEM = 40  # of the temporary file's name, in letters: a name has 255 bytes
+_MOST_LINKS = 40  # as Linux
+# By any of these names the process's own open files: what stands behind them is another's to replace.
+_STREAMS = {"/dev/stdout": 1, "/dev/stderr": 2}
+_DESCRIPTOR = re.compile(r"/dev/std(out|err)|(/dev|/proc/(self|thread-self))/fd/(?P<number>\d{1,6})")
 
 
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """Yield a temporary path beside ``path``; move it over ``path`` when the block ends without an error.
+    """Yield a temporary path; when the block ends without an error its file takes the place of ``path``.
 
-    An error, or a kill, leaves ``path`` as it was. Raises `UsageError` where nothing can be written.
+    The content is on disk before the name is: an error, a kill or a pulled plug leaves ``path`` as it was, or whole.
+    A symbolic link to a file stays, and the file that it leads to is replaced. A device or a pipe (``/dev/null``,
+    ``/dev/stdout``) is never replaced: the content is written to it when it is whole. Raises `UsageError` where
+    nothing can be written, a full disk within the block included.
     """
-    target = Path(path)
-    if target.is_dir():
-        raise UsageError(f"{target} is a directory: give the name of a file to write")
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=f".partial{target.suffix}")
-    except OSError as error:
-        raise UsageError(
-            f"{target} cannot be written ({error.strerror}): choose a folder that exists and is writable"
-        ) from error
+        target, streamed = _place(Path(path))
+        named = target if isinstance(target, Path) else Path(path)
+        folder = Path(tempfile.gettempdir()) if streamed else named.parent
+        # The ending stays: some writers tell the format by it.
+        handle, name = tempfile.mkstemp(
+            dir=folder, prefix=f".{named.stem[:_LONGEST_STEM]}.", suffix=f".partial{named.suffix[:_LONGEST_STEM]}"
+        )
+    except (OSError, RuntimeError, ValueError) as error:
+        raise _unwritable(path, error) from error
     os.close(handle)
     temporary = Path(name)
     try:
-        # mkstemp makes files private; a result file follows the user's umask like any other.
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
+        if not streamed:
+            # mkstemp makes files private; a result file follows the user's umask like any other.
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o666 & ~umask)
         yield temporary
-        try:
-            temporary.replace(target)
-        except OSError as error:
-            raise UsageError(f"{target} cannot be written ({error.strerror})") from error
+        if streamed:
+            _write_through(temporary, target)
+        else:
+            _to_disk(temporary)
+            temporary.replace(named)
+            sync_folder(named.parent)
+    except SmartShoeError:
+        raise
+    except BrokenPipeError:
+        raise  # the reader of our output went away: no fault
+    except OSError as error:
+        raise _unwritable(path, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _unwritable(path: Path | str, error: Exception) -> UsageError:
+    if isinstance(error, SmartShoeError):
+        return error if isinstance(error, UsageError) else UsageError(str(error))
+    number = error.errno if isinstance(error, OSError) else None
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    mend = {
+        errno.ENOSPC: "free some space",
+        errno.EDQUOT: "free some space",
+        errno.EFBIG: "choose another disk",
+        errno.ENAMETOOLONG: "choose a shorter name",
+        errno.ENXIO: "start the program that reads the pipe first",
+    }.get(number or 0, "choose a folder that exists and is writable")
+    return UsageError(f"{path} cannot be written ({reason}): {mend}; nothing half-written is left")
+
+
+def _place(path: Path) -> tuple[Path | int, bool]:
+    """Where content for ``path`` goes: a path, links followed, or an open descriptor; and whether it is streamed."""
+    for _ in range(_MOST_LINKS):
+        descriptor = _DESCRIPTOR.fullmatch(os.path.normpath(Path.cwd() / path))
+        if descriptor:
+            return _STREAMS.get(descriptor[0]) or int(descriptor["number"]), True
+        if not path.is_symlink():
+            break
+        _refuse_strangers_link(path)
+        path = path.parent / path.readlink()
+    else:
+        raise UsageError(f"{path} is a link that leads to itself: remove it")
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return path, False
+    if stat.S_ISDIR(mode):
+        raise UsageError(f"{path} is a directory: give the name of a file to write")
+    if stat.S_ISCHR(mode) or stat.S_ISFIFO(mode):
+        return path, True
+    if not stat.S_ISREG(mode):
+        raise UsageError(f"{path} is a disk or a socket: give the name of a file to write")
+    return path, False
+
+
+def _refuse_strangers_link(path: Path) -> None:
+    """In a folder that everybody may write to, a link that somebody else laid is not followed."""
+    if not hasattr(os, "geteuid"):
+        return
+    owner, folder = path.lstat().st_uid, path.parent.stat()
+    if folder.st_mode & stat.S_IWOTH and owner not in (os.geteuid(), folder.st_uid):
+        raise UsageError(f"{path} is a link that somebody else laid: remove it, or give another name")
+
+
+def _write_through(content: Path, target: Path | int) -> None:
+    """The whole ``content`` into a device, pipe or descriptor; `OSError` (ENXIO) where nobody reads the pipe."""
+    if isinstance(target, int):
+        sys.stdout.flush()
+        handle = os.dup(target)
+    else:
+        handle = os.open(target, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+        os.set_blocking(handle, True)
+    with content.open("rb") as source, os.fdopen(handle, "wb") as sink:
+        shutil.copyfileobj(source, sink)
+
+
+def _to_disk(path: Path) -> None:
+    handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def sync_folder(folder: Path) -> None:
+    """A new file's name is on disk only once its folder is."""
+    if os.name == "nt":  # a folder cannot be opened there
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some network file systems have no such call
+            raise
+    finally:
+        os.close(handle)
 
 
 def write_text(path: Path | str, text: str) -> None:
@@ -61,8 +169,9 @@ def make_folder(path: Path | str) -> Path:
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"{folder} cannot be made a folder ({error.strerror}): choose another --out") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise UsageError(f"{folder} cannot be made a folder ({reason}): choose another --out") from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"{folder} is not writable: choose another --out")
     return folder

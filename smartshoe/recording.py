@@ -6,6 +6,7 @@ nothing; a computation asks for SI by name (``recording.force_n``, ``channel.si`
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -24,6 +25,7 @@ Role = Literal["load", "sensor", "command", "auxiliary"]
 REGIONS = ("toe", "meta1", "meta4", "heel")
 UNITS_OF_A_SHOE = REGIONS + tuple(f"{side}_{region}" for side in ("left", "right") for region in REGIONS)
 LOAD_NAME, COMMAND_NAME, SENSOR_NAME = "force", "command", "pressure"
+TIME_NAME = "time"  # the time base's: no channel has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +151,14 @@ class Recording:
                 raise InputError(
                     f"{self.label}: channel {channel.name} has {channel.values.size} samples, time has {time_s.size}"
                 )
+        named = [column_name(channel) for channel in self.channels.values()]
+        twice = (
+            TIME_NAME
+            if TIME_NAME in self.channels
+            else next((name for name, count in Counter([f"{TIME_NAME}_s", *named]).items() if count > 1), None)
+        )
+        if twice is not None:
+            raise InputError(f"{self.label} has two columns {twice}: rename one, the time base's own is time_s")
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
 

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from smartshoe.errors import SmartShoeError
+from smartshoe.gate.limits import raise_limits
 
 _COMMANDS = {
     "run": "run a scenario: devices, identification, compensation, validation",
@@ -58,7 +59,8 @@ def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 @click.group(
     cls=_LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Each command has --help with an example. --debug shows a traceback where one helps.",
+    epilog="Each command has --help with an example. --debug shows a traceback where one helps,"
+    " --limit NAME=NUMBER lets larger files in.",
 )
 @click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_show_version,
               help="Show the version and exit.")  # fmt: skip
@@ -66,41 +68,77 @@ def group() -> None:
     """Calibrate, identify and compensate shoe-embedded air pressure sensors, on real and simulated devices."""
 
 
+_LONGEST_LINE = 290
+_LONGEST_END = 110  # where a message says how to mend it
+
+
 def _one_line(text: str) -> str:
-    return " ".join(text.split())
+    """``text`` as one printable line of bounded length: names and cells of files stand in messages."""
+    line = " ".join(text.split())
+    line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
+    if len(line) > _LONGEST_LINE:
+        line = f"{line[: _LONGEST_LINE - _LONGEST_END]} ... {line[-_LONGEST_END:]}"
+    return line
+
+
+def _of_every_command(arguments: Sequence[str]) -> tuple[list[str], bool, list[str]]:
+    """The command line without what any command takes at any place: ``--debug``, ``--limit NAME=NUMBER``."""
+    words, limits, debug = [], [], False
+    waiting = iter(arguments)
+    for word in waiting:
+        if word == "--":
+            words += [word, *waiting]
+        elif word == "--debug":
+            debug = True
+        elif word == "--limit":
+            limits.append(next(waiting, ""))
+        elif word.startswith("--limit="):
+            limits.append(word.removeprefix("--limit="))
+        else:
+            words.append(word)
+    return words, debug, limits
 
 
 def run_command(arguments: Sequence[str]) -> int:
     """Run a command line and return its exit status; errors are printed to stderr as one sentence."""
-    words = list(arguments)
-    cut = words.index("--") if "--" in words else len(words)
-    debug = "--debug" in words[:cut]
-    words = [word for at, word in enumerate(words) if word != "--debug" or at >= cut]
+    words, debug, limits = _of_every_command(arguments)
     try:
+        raise_limits(limits)
         result: Any = group.main(args=words, prog_name="smartshoe", standalone_mode=False)
         return result if isinstance(result, int) else 0
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.ctx.get_help() if error.ctx else "", err=True)
-        return 2
-    except click.ClickException as error:
-        if debug:
-            raise
-        command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "smartshoe"
-        message = _one_line(error.format_message()).rstrip(".")
-        click.echo(f"error: {message}; see {command} --help", err=True)
-        return 2
-    except click.Abort:
-        click.echo("error: stopped by the user; nothing half-written is left", err=True)
-        return 130
-    except SmartShoeError as error:
-        if debug:
-            raise
-        click.echo(f"error: {_one_line(str(error))}", err=True)
-        return error.exit_status
     except BrokenPipeError:
         # The reader of our output went away (head, less): no fault of the command.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except Exception as error:
+        if debug:
+            raise
+        return _told(error)
+
+
+def _told(error: Exception) -> int:
+    """Print what ended a command as one sentence; the exit status."""
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        click.echo(error.ctx.get_help() if error.ctx else "", err=True)
+        return 2
+    status = 2
+    if isinstance(error, click.ClickException):
+        command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "smartshoe"
+        message = f"{_one_line(error.format_message().rstrip('.'))}; see {command} --help"
+    elif isinstance(error, click.Abort):
+        message, status = "stopped by the user; nothing half-written is left", 130
+    elif isinstance(error, SmartShoeError):
+        message, status = str(error), error.exit_status
+    elif isinstance(error, OSError):
+        what = error.filename or "the output"
+        message = f"{what} cannot be read or written ({error.strerror or error}): check its disk and permissions"
+    elif isinstance(error, MemoryError):
+        message, status = "there is too little memory for this data: split the files", 3
+    else:
+        message = f"smartshoe itself is at fault ({type(error).__name__}: {error}): report it with --debug's traceback"
+        status = 1
+    click.echo(f"error: {_one_line(message)}", err=True)
+    return status
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from smartshoe.atomic import sync_folder
 from smartshoe.errors import InputError, UsageError
 
 
@@ -32,7 +33,7 @@ class AppendedFile:
             ) from error
         self.size = os.fstat(self._handle).st_size
         if new:
-            _sync_folder(self.path.parent)
+            sync_folder(self.path.parent)
 
     def append(self, piece: bytes, *, synced: bool = True) -> None:
         """Put ``piece`` at the end; raises `InputError` where the disk does not take it, with nothing half-written."""
@@ -97,14 +98,3 @@ class AppendedFile:
 def _data_to_disk(handle: int) -> None:
     # Not every platform has fdatasync; fsync also writes the times, which costs more.
     getattr(os, "fdatasync", os.fsync)(handle)
-
-
-def _sync_folder(folder: Path) -> None:
-    """A new file's name is on disk only once its folder is."""
-    if os.name == "nt":  # a folder cannot be opened there
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

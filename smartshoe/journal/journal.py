@@ -73,6 +73,12 @@ class Journal:
             self._file.close()
             raise
 
+    def clear(self) -> None:
+        """Forget every record that was recovered: a journal that begins anew."""
+        self._file.cut(0)
+        self._file.append(OPENING)
+        self.recovered = Contents((), 0)
+
     def append(self, kind: int, payload: bytes, *, synced: bool = True) -> None:
         """Append a record; when this returns it is on disk (``synced`` False: a kill spares it, a pulled plug may not).
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError, InputError, UsageError
+from smartshoe.gate import require_regular_file
 from smartshoe.logs.sheet import Format
 from smartshoe.recording import Recording
 
@@ -23,13 +24,10 @@ def _formats() -> Iterator[Format]:
 
 
 def _head(path: Path) -> bytes:
-    if path.is_dir():
-        raise InputError(f"{path} is a folder: name a file in it")
+    require_regular_file(path)
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist: check its name and folder") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}): check its permissions") from error
     if not head.strip():
@@ -102,11 +100,8 @@ def write(recording: Recording, path: Path | str) -> None:
             continue
         suffixes += format_.suffixes
         if path.suffix.casefold() in format_.suffixes:
-            try:
-                with replacing(path) as temporary:
-                    format_.write(recording, temporary)
-            except OSError as error:
-                raise UsageError(f"{path} cannot be written ({error.strerror or error})") from error
+            with replacing(path) as temporary:
+                format_.write(recording, temporary)
             return
     raise UsageError(
         f"{path} has no suffix of a writable format: end it in one of {', '.join(dict.fromkeys(suffixes))}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,6 +18,7 @@ from smartshoe.recording import (
     COMMAND_NAME,
     LOAD_NAME,
     SENSOR_NAME,
+    TIME_NAME,
     UNITS_OF_A_SHOE,
     Channel,
     Recording,
@@ -81,12 +83,14 @@ def _rename(
 
 
 def _unique(names: list[str]) -> list[str]:
-    taken: set[str] = set()
+    # "time" is the time base's own: an old time column that was not chosen is a channel of another name.
+    taken: set[str] = {TIME_NAME}
+    counts: Counter[str] = Counter()
     for index, name in enumerate(names):
-        candidate, count = name or f"column_{index + 1}", 1
+        candidate = "time_other" if name == TIME_NAME else name or f"column_{index + 1}"
         while candidate in taken:
-            count += 1
-            candidate = f"{name or 'column'}_{count}"
+            counts[name] += 1
+            candidate = f"{name or 'column'}_{counts[name] + 1}"
         taken.add(candidate)
         names[index] = candidate
     return names

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 
-from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError
+from smartshoe.logs.hdf5_objects import opened, vectors
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording
 
@@ -22,18 +23,13 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 def read(path: Path) -> Sheet:
     """Every one-dimensional numeric variable along the longest dimension as a column."""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            attributes = {key: value for key, value in file.attrs.items() if not key.startswith("_")}
-            found = [
-                (name, dataset[...], dict(dataset.attrs))
-                for name, dataset in file.items()
-                if isinstance(dataset, h5py.Dataset) and dataset.ndim == 1 and dataset.dtype.kind in "biuf"
-            ]
-    except (OSError, RuntimeError, KeyError) as error:
-        raise FormatError(f"{path} is truncated or no HDF5 file ({error}): write it again") from error
+    with opened(path) as file:
+        attributes = {key: file.attrs[key] for key in file.attrs if not key.startswith("_")}
+        found = [
+            (name, dataset[...], dict(dataset.attrs))
+            for name, dataset in vectors(path, file, deep=False)
+            if dataset.ndim == 1
+        ]
     if not found:
         raise FormatError(f"{path} holds no vectors of numbers: write one variable a channel")
     length = max(values.size for _, values, _ in found)
@@ -63,7 +59,9 @@ def write(recording: Recording, path: Path) -> None:
     """Dimension and coordinate ``time`` in s, one variable a channel with ``units`` and ``role``, NaN where missing."""
     import h5netcdf
 
-    with replacing(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    # Made in memory: HDF5 on a full disk ends in a segmentation fault.
+    content = io.BytesIO()
+    with h5netcdf.File(content, "w") as file:
         file.attrs["schema"] = _OWN
         file.attrs["name"] = recording.name
         if recording.unit is not None:
@@ -79,6 +77,7 @@ def write(recording: Recording, path: Path) -> None:
             variable.attrs["units"] = channel.unit.symbol
             variable.attrs["quantity"] = channel.unit.quantity
             variable.attrs["role"] = channel.role
+    path.write_bytes(content.getbuffer())
 
 
 FORMAT = Format("hdf5", (".h5", ".hdf5", ".nc"), _sniff, read, write)

@@ -7,7 +7,6 @@ from typing import cast, get_args
 
 import numpy as np
 
-from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, Role
@@ -238,8 +237,7 @@ def write(recording: Recording, path: Path) -> None:
     lines += [
         "\t".join("" if value != value else repr(value) for value in values) for values in zip(*signals, strict=True)
     ]
-    with replacing(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
 FORMAT = Format("labview", (".lvm",), _sniff, read, write)

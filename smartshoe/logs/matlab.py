@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
-import zlib
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError
+from smartshoe.gate import foreign_code
+from smartshoe.logs.hdf5_objects import opened, vectors
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, column_name, split_column
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -42,32 +44,29 @@ def _flatten(name: str, value: Any) -> list[tuple[str, np.ndarray]]:
     return []
 
 
-def _load(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat, matlab
+def _is_hdf5(path: Path) -> bool:
+    """Whether it is level 7.3: HDF5, in MATLAB's own files below a header of 512 bytes."""
+    with path.open("rb") as file:
+        head = file.read(512 + len(_HDF5))
+    return head.startswith(_HDF5) or head.endswith(_HDF5)
 
-    try:
-        return {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
-    except NotImplementedError:  # level 7.3 is HDF5
+
+def _load(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    if _is_hdf5(path):
         return _load_hdf5(path)
-    except (ValueError, OSError, TypeError, LookupError, EOFError, zlib.error, matlab.MatReadError) as error:
-        raise FormatError(f"{path} is truncated or no MAT-file ({error}): save it again") from error
+    with foreign_code(path, "MAT-file", "save it again"):
+        return {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
 
 
 def _load_hdf5(path: Path) -> dict[str, Any]:
-    import h5py
-
-    found: dict[str, Any] = {}
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf" and not name.startswith("#"):
-            found[name.replace("/", ".")] = item[...]
-
-    try:
-        with h5py.File(path, "r") as file:
-            file.visititems(visit)
-    except (OSError, RuntimeError) as error:
-        raise FormatError(f"{path} is truncated or no MAT-file ({error}): save it again") from error
-    return found
+    with opened(path) as file:
+        return {
+            name.replace("/", "."): dataset[...]
+            for name, dataset in vectors(path, file, deep=True)
+            if not name.startswith("#")
+        }
 
 
 def read(path: Path) -> Sheet:
@@ -135,7 +134,7 @@ def write(recording: Recording, path: Path) -> None:
         "columns": columns,
     }
     variables["smartshoe"] = json.dumps(about)
-    with replacing(path) as temporary, temporary.open("wb") as file:
+    with path.open("wb") as file:
         savemat(file, variables, do_compression=True)  # type: ignore[arg-type]  # any binary file will do
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording
@@ -115,7 +114,7 @@ def write(recording: Recording, path: Path) -> None:
         )
         for channel in recording.channels.values()
     ]
-    with replacing(path) as temporary, TdmsWriter(temporary) as writer:
+    with TdmsWriter(path) as writer:
         writer.write_segment([RootObject(properties=properties), *channels])
 
 

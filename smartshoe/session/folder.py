@@ -107,12 +107,20 @@ class SessionFolder:
     def begin(cls, path: Path | str, plan: Plan) -> Self:
         """A new session; raises `UsageError` where the folder holds one already in which anything was recorded."""
         folder = make_folder(path)
-        if (folder / PLAN).exists() and _holds_samples(folder / JOURNAL):
-            raise UsageError(f"{folder} holds a session already: go on with --resume {folder}, or choose another --out")
         make_folder(folder / RAW)
-        (folder / JOURNAL).unlink(missing_ok=True)
-        write_text(folder / PLAN, json_text(plan.to_dict()))
-        return cls(folder, plan, Journal(folder / JOURNAL))
+        # The journal's lock first: whoever holds it may be recording at this moment, into this very file.
+        journal = Journal(folder / JOURNAL)
+        try:
+            if any(record.kind == SAMPLES for record in journal.recovered.records):
+                raise UsageError(
+                    f"{folder} holds a session already: go on with --resume {folder}, or choose another --out"
+                )
+            journal.clear()
+            write_text(folder / PLAN, json_text(plan.to_dict()))
+        except BaseException:
+            journal.close()
+            raise
+        return cls(folder, plan, journal)
 
     @classmethod
     def resume(cls, path: Path | str) -> Self:
@@ -232,10 +240,6 @@ class SessionFolder:
     def accepted(self) -> dict[str, Attempt]:
         """The pressing that counts of each experiment that is done."""
         return {attempt.experiment: attempt for attempt in self.attempts() if attempt.state == "accepted"}
-
-
-def _holds_samples(journal: Path) -> bool:
-    return journal.exists() and any(record.kind == SAMPLES for record in read_journal(journal).records)
 
 
 def _plan_of(folder: Path) -> Plan:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.logs import read, write
 from smartshoe.logs.columns import recording_from
 from smartshoe.logs.sheet import Column, Sheet
+from smartshoe.recording import Recording
 
 RAMP = np.array([0.0, 1.0, 2.0])
 
@@ -158,3 +160,24 @@ def test_a_choice_that_the_other_log_of_a_pair_holds_is_passed_over() -> None:
     assert not machine.sensors
     assert len(logger.sensors) == 1
     assert not logger.of_role("load")
+
+
+@pytest.mark.parametrize("ending", ["csv", "mat", "h5", "tdms", "lvm"])
+def test_a_file_whose_time_is_not_taken_is_written_with_the_time_that_was(ending: str, tmp_path: Path) -> None:
+    count = 50
+    table = ["time_s,force_n,pressure_mbar"] + [f"{0.5 * k!r},{float(k)!r},{2.0 * k!r}" for k in range(count)]
+    (tmp_path / "dyn.csv").write_text("\n".join(table) + "\n")
+    taken = read(tmp_path / "dyn.csv", time="rows[49Hz]")
+    write(taken, tmp_path / f"o.{ending}")
+    again = read(tmp_path / f"o.{ending}")
+    np.testing.assert_array_equal(again.time_s, np.arange(count) / 49.0)
+    np.testing.assert_array_equal(again.force_n, taken.force_n)
+    np.testing.assert_array_equal(again["time_other"].values, 0.5 * np.arange(count))
+
+
+def test_two_columns_of_one_name_are_refused_before_one_is_lost() -> None:
+    channel = Recording.from_arrays(time_s=RAMP, force_n=RAMP)["force"]
+    with pytest.raises(InputError, match="time_s"):
+        Recording(RAMP, {"time": channel})
+    with pytest.raises(InputError, match="two columns force_n"):
+        Recording(RAMP, {"force": channel, "same": channel})

@@ -13,7 +13,7 @@ from simulators.presets import TABLE_1
 from smartshoe.cli import run_command
 from smartshoe.devices.base import Block
 from smartshoe.errors import InputError, LimitError, UsageError
-from smartshoe.journal import read_journal
+from smartshoe.journal import Journal, read_journal
 from smartshoe.protocol import static_protocol
 from smartshoe.session import Plan, SessionFolder, Unattended, analyse, conduct, protocols_named
 from smartshoe.session.folder import SAMPLES
@@ -181,3 +181,31 @@ def test_a_command_that_recorded_nothing_can_be_given_again(tmp_path: Path, shor
     assert run_command([*words, "--unit", "nose"]) == 2
     assert run_command(words) == 0
     assert run_command(words) == 2
+
+
+def test_a_second_session_in_the_same_folder_is_refused_and_loses_the_first_one_nothing(tmp_path: Path) -> None:
+    with SessionFolder.begin(tmp_path, bench_plan()) as first:
+        first.note("begin", experiment="short", attempt=1)
+        with pytest.raises(UsageError, match="another session"):
+            SessionFolder.begin(tmp_path, bench_plan(unit="left_heel"))
+        first.note("accepted", findings=[])
+    records = read_journal(tmp_path / "journal.smj").records
+    assert [json.loads(record.payload)["event"] for record in records] == ["begin", "accepted"]
+    assert SessionFolder.open(tmp_path).plan.unit == "left_toe"
+
+
+def test_samples_without_a_plan_are_not_thrown_away(tmp_path: Path) -> None:
+    with Journal(tmp_path / "journal.smj") as journal:
+        journal.append(SAMPLES, b"anything")
+    with pytest.raises(UsageError, match="holds a session already"):
+        SessionFolder.begin(tmp_path, bench_plan())
+    assert len(read_journal(tmp_path / "journal.smj").records) == 1
+
+
+def test_a_session_in_which_nothing_was_recorded_is_begun_anew(tmp_path: Path) -> None:
+    with SessionFolder.begin(tmp_path, bench_plan()) as first:
+        first.note("begin", experiment="short", attempt=1)
+    with SessionFolder.begin(tmp_path, bench_plan(unit="left_heel")) as second:
+        second.note("begin", experiment="short", attempt=1)
+    assert len(read_journal(tmp_path / "journal.smj").records) == 1
+    assert SessionFolder.open(tmp_path).plan.unit == "left_heel"

@@ -1,0 +1,65 @@
+"""How much a file or a protocol may ask for before it is refused; raised by ``--limit`` or ``$SMARTSHOE_LIMITS``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
+from functools import cache
+
+from smartshoe.errors import UsageError
+
+VARIABLE = "SMARTSHOE_LIMITS"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The largest that is let in.
+
+    ``values`` are samples times channels of one file; ``expansion`` is how many times larger than its file the
+    content of a compressed one may be (what unpacks to less than `FREELY_UNPACKED` bytes is not asked).
+    ``json_bytes`` and ``json_depth`` hold for calibrations, plans, events and indices. ``duration_s``, ``samples``
+    and ``segments`` are those of a protocol or a simulated trial.
+    """
+
+    file_bytes: int = 4 << 30
+    values: int = 200_000_000
+    columns: int = 4096
+    expansion: int = 100
+    json_bytes: int = 64 << 20
+    json_depth: int = 100
+    duration_s: int = 7 * 24 * 3600
+    samples: int = 50_000_000
+    segments: int = 100_000
+
+
+FREELY_UNPACKED = 64 << 20
+_raised: list[str] = []
+
+
+def raise_limits(settings: Iterable[str]) -> None:
+    """Let ``NAME=NUMBER`` of ``settings`` hold in this process; raises `UsageError` for what is no limit."""
+    _raised[:] = settings
+    limits.cache_clear()
+    limits()
+
+
+@cache
+def limits() -> Limits:
+    """The limits that hold: the built-in ones, changed by ``$SMARTSHOE_LIMITS`` and `raise_limits`."""
+    known = {field.name for field in fields(Limits)}
+    changed: dict[str, int] = {}
+    for setting in (*os.environ.get(VARIABLE, "").split(","), *_raised):
+        if not setting.strip():
+            continue
+        name, _, value = (part.strip() for part in setting.partition("="))
+        if name not in known:
+            raise UsageError(f"limit {name!r} is not known: use one of {', '.join(sorted(known))}")
+        try:
+            number = float(value)
+            changed[name] = int(number)
+        except (ValueError, OverflowError):
+            raise UsageError(f"limit {name} is {value!r}: give a number, for example {name}=1e9") from None
+        if changed[name] < 1:
+            raise UsageError(f"limit {name} is {value!r}: give a number of 1 or more")
+    return replace(Limits(), **changed)
