@@ -34,6 +34,22 @@ def backlash(load, half_width, state, out):  # type: ignore[no-untyped-def]
     state[0] = place
 
 
+@njit(cache=True)
+def plays(signal, before, own, half_widths, weights, after, state, out):  # type: ignore[no-untyped-def]
+    """Prandtl-Ishlinskii: out (n,) = own x + sum of weights play(x) + after, with x = ``signal`` (n,) + before.
+
+    ``half_widths``, ``weights``, ``state`` (m,); ``state`` holds the plays' places and moves on.
+    """
+    for k in range(signal.size):
+        x = signal[k] + before
+        total = own * x
+        for i in range(half_widths.size):
+            place = min(max(state[i], x - half_widths[i]), x + half_widths[i])
+            state[i] = place
+            total += weights[i] * place
+        out[k] = total + after
+
+
 @njit(cache=True, fastmath=_LAX)
 def _loop_at(load, half_widths, closed, open_, levelling, state):  # type: ignore[no-untyped-def]
     """The loop at ``load``, to which ``state`` moves; see `relays`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.models.effects import Conditions, Effect, catalogue, effect
+from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
 
 BASELINE = ExtendedModel(0.9, 0.15, 0.3, 800.0, 180.0, "mbar")
@@ -16,10 +16,10 @@ NEARLY = frozenset({"sensor_lag", "rate_gain", "load_unload_asymmetry", "cycle_c
 
 
 def invertible() -> list[str]:
-    """Physical effects that have an inverse at their typical size."""
+    """Physical effects and flexible blocks that have an inverse at their typical size."""
     return [
-        name
-        for name, one in catalogue().items()
+        one.name
+        for one in (*catalogue().values(), *(one for family in blocks().values() for one in family))
         if one.is_physical and (one.place == "core" or one.inverse(typical(one, 0), STEP_S) is not None)
     ]
 

@@ -18,10 +18,12 @@ NAMES = (
     "second_relaxation", "power_law_creep", "linear_leak", "orifice_leak", "gas_heat", "gas_compression",
     "wall_hardening", "contact_area", "dead_band", "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry",
     "rate_gain", "mullins_softening", "cycle_conditioning", "permanent_set",
+    "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop",
 )  # fmt: skip
 EXACT = {  # at common samples, for straight lines between samples: every turning point is one
     "second_relaxation", "power_law_creep", "linear_leak", "gas_heat", "gas_compression", "wall_hardening",
     "contact_area", "dead_band", "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry", "mullins_softening",
+    "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop",
 }  # fmt: skip
 SECOND_ORDER = {"orifice_leak", "permanent_set"}
 STEP_S = 0.02
@@ -75,7 +77,7 @@ def test_declarations_are_sound(name: str) -> None:
     assert made.name == name
     assert any(parameter.null is not None for parameter in made.parameters)
     assert made.exposed_by
-    assert made.separated_by
+    assert made.separated_by or made.is_flexible
     for shape in made.shapes:
         for parameter, value in zip(made.parameters, made.start(shape), strict=True):
             assert parameter.lower <= value <= parameter.upper

@@ -19,6 +19,7 @@ from smartshoe.models.effects.effect import Array, Conditions, CoreEffect, Effec
 EXACT = (
     "gas_compression", "wall_hardening", "contact_area", "orifice_leak", "permanent_set", "mullins_softening",
     "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry", "cycle_conditioning",
+    "flexible_curve", "flexible_characteristic", "flexible_loop",
 )  # fmt: skip
 INVERTED = (*EXACT, "dead_band", "rate_gain")
 STEP_S = 0.02

@@ -12,11 +12,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from smartshoe.errors import UsageError
 from smartshoe.models.core import Core
-from smartshoe.models.effects import Conditions, catalogue, effect
+from smartshoe.models.effects import Conditions, blocks, catalogue, effect
 from smartshoe.models.effects.effect import PLACES, Arm
 from smartshoe.models.extended import ExtendedModel
 
-NAMES = [name for name, one in catalogue().items() if one.parameters and one.is_physical]
+NAMES = [
+    *(name for name, one in catalogue().items() if one.parameters and one.is_physical),
+    *(one.name for family in blocks().values() for one in family),
+]
 
 
 def conditions(seed: int = 0, n: int = 600, step_s: float = 0.05) -> Conditions:

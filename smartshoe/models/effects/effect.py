@@ -34,6 +34,8 @@ class EffectParameter:
     ``null``: the value at which the effect is the identity; None for a parameter of shape (a time constant, an
     exponent), which means nothing while the strength is null. ``lower`` and ``upper`` are bounds, a physical sign
     among them. ``size``: a typical value, or change from null; the step of derivatives is a small part of it.
+    ``prior_sd``: standard deviation of a Gaussian prior about the null value, which a fit takes as one more row of its
+    likelihood; None for a parameter that the data alone decide.
     """
 
     name: str
@@ -43,6 +45,7 @@ class EffectParameter:
     lower: float
     upper: float
     size: float
+    prior_sd: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +116,7 @@ class Effect(ABC):
     "steps", "minor_loops", "low_loads".
     ``separated_by``: neighbour's name to the experiment or channel that tells it from this one.
     ``is_physical``: False for noise and faults of the data, which are never a cause by their waveform.
+    ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause.
     """
 
     name: ClassVar[str]
@@ -126,6 +130,7 @@ class Effect(ABC):
     exposed_by: ClassVar[frozenset[str]] = frozenset()
     separated_by: ClassVar[Mapping[str, str]] = {}
     is_physical: ClassVar[bool] = True
+    is_flexible: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

@@ -1,0 +1,24 @@
+"""Any monotone curve of the pressure: a sensor's characteristic without a law."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._monotone_curve import bent, slope_weights, straightened
+from smartshoe.models.effects.effect import Array, Conditions, Effect, Inverse
+
+
+class FlexibleCharacteristic(Effect):
+    """s(p), as `flexible_curve`, of the pressure: the relaxation comes before it."""
+
+    name, family, stage, place = "flexible_characteristic", "static_curve", "sensor", "sensor"
+    says = "the reading bends away from the straight line between zero and full scale, at every rate alike"
+    parameters = slope_weights("pressure")
+    exposed_by = frozenset({"peaks", "low_loads"})
+    is_flexible = True
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The reading."""
+        return bent(signal, values)
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """Exact."""
+        return straightened(values)

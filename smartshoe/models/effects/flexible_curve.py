@@ -1,0 +1,28 @@
+"""Any monotone curve of the load: the family of static curves without a law."""
+
+from __future__ import annotations
+
+from smartshoe.models.effects._monotone_curve import bent, slope_weights, straightened
+from smartshoe.models.effects.effect import Array, Conditions, Effect, Inverse
+
+
+class FlexibleCurve(Effect):
+    """s(f), rising everywhere, zero at rest and one at full scale; what it gives passes through the relaxation.
+
+    s' is a line between six knots, in proportion to 1 + weight at each (`smartshoe.models.effects._monotone_curve`).
+    All weights raised alike are the identity: a fit needs the prior for that direction.
+    """
+
+    name, family, stage, place = "flexible_curve", "static_curve", "wall", "wall"
+    says = "the reading against load is bent, in a way that relaxes with the wall"
+    parameters = slope_weights("load")
+    exposed_by = frozenset({"peaks", "low_loads"})
+    is_flexible = True
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        """The load that reaches the tube."""
+        return bent(signal, values)
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        """Exact."""
+        return straightened(values)

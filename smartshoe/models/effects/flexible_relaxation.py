@@ -1,0 +1,39 @@
+"""Any spectrum of relaxation, of either sign: the family of relaxations without a law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element, Heat
+
+RATES_PER_S = np.geomspace(0.01, 30.0, 6)
+GAS_SHARE = 1.6 / 0.6  # heat's share for one of the reading: N/(N - 1) at the usual wall ratio N of the core
+
+
+class FlexibleRelaxation(CoreEffect):
+    """At each of six fixed rates a Maxwell arm where the weight is positive, heat of compression where it is negative.
+
+    To first order the reading is p (1 - sum of w s/(s + rate)), of either sign. An arm of negative stiffness would say
+    the same, but such a network oscillates or runs away beside the baseline's own arm; arms and heats are springs and
+    dampers, so that poles and zeros stay real and negative for any weights. At a wall ratio other than the usual one
+    the two signs differ in size.
+    """
+
+    name, family, stage = "flexible_relaxation", "relaxation", "wall"
+    says = "the reading creeps on in holds and rests, over several times at once"
+    parameters = tuple(
+        EffectParameter(
+            f"share_{k}", "1", f"what relaxes at {rate:.3g} 1/s, of the load; < 0: falls in holds",
+            0.0, -0.2, 3.0, 0.02, prior_sd=0.1,
+        )
+        for k, rate in enumerate(RATES_PER_S)
+    )  # fmt: skip
+    exposed_by = frozenset({"holds", "rates", "rests"})
+    is_flexible = True
+
+    def elements(self, values: Array) -> tuple[Element, ...]:
+        """Six arms or heats."""
+        return tuple(
+            Arm(float(share), float(rate)) if share >= 0.0 else Heat(-GAS_SHARE * float(share), float(rate))
+            for share, rate in zip(values, RATES_PER_S, strict=True)
+        )

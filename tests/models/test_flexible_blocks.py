@@ -1,0 +1,163 @@
+"""Flexible blocks: found apart from the effects, free in shape, never so free that they cannot be undone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.compensation.extended import ExtendedCompensator
+from smartshoe.models.core import Core, plain
+from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
+from smartshoe.models.effects._monotone_curve import KNOTS
+from smartshoe.models.effects.effect import Arm, Array, CoreEffect
+from smartshoe.models.effects.flexible_loop import HALF_WIDTHS
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.twin import TwinBladder
+
+BLOCKS = tuple(one for family in blocks().values() for one in family)
+NAMES = tuple(one.name for one in BLOCKS)
+CURVES = ("flexible_curve", "flexible_characteristic")
+BASELINE = ExtendedModel(0.9, 0.15, 0.3, 800.0, 180.0, "mbar")
+STEP_S = 0.02
+seeds = st.integers(0, 10_000)
+
+
+def within_bounds(one: Effect, seed: int) -> Array:
+    """Any weights that a fit may try, bounds included."""
+    rng = np.random.default_rng(seed)
+    drawn = [rng.choice([p.lower, p.upper, rng.uniform(p.lower, p.upper), p.null]) for p in one.parameters]
+    return np.array(drawn, dtype=float)
+
+
+def loading(seed: int, count: int = 40) -> Conditions:
+    """Straight lines between random loads, a little beyond full scale, from rest."""
+    rng = np.random.default_rng(seed)
+    loads = rng.uniform(0.0, 1.1, count) * (rng.random(count) < 0.8)
+    loads[0] = 0.0
+    time_s = np.arange(0.0, 0.5 * (count - 1), STEP_S)
+    return Conditions(time_s, np.interp(time_s, 0.5 * np.arange(count), loads), STEP_S)
+
+
+def test_blocks_stand_apart_from_the_effects_that_may_be_named() -> None:
+    assert set(NAMES) == {"flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop"}
+    assert not set(NAMES) & set(catalogue())
+    assert not any(one.is_flexible for one in catalogue().values())
+    families = {one.family for one in catalogue().values()}
+    for family, members in blocks().items():
+        assert family in families
+        assert all(one.family == family and effect(one.name) is one for one in members)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_weight_has_a_null_inside_its_bounds_and_a_prior(name: str) -> None:
+    for parameter in effect(name).parameters:
+        assert parameter.null == 0.0
+        assert parameter.lower < 0.0 < parameter.upper
+        assert parameter.prior_sd is not None
+        assert 0.0 < parameter.prior_sd <= 1.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(seed=seeds)
+@settings(max_examples=15)
+def test_any_weights_within_the_bounds_are_undone(name: str, seed: int) -> None:
+    at, model = loading(seed), BASELINE.with_part(effect(name), within_bounds(effect(name), seed))
+    force_n = ExtendedCompensator(model, 1.0 / STEP_S).apply(model.reading(at))
+    assert np.max(np.abs(force_n / 800.0 - at.load)) < 1e-9
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_twin_presses_what_the_model_reads(name: str) -> None:
+    one = effect(name)
+    model = BASELINE.with_part(one, np.array([p.size for p in one.parameters]))
+    at = loading(4)
+    pressure_pa = TwinBladder(model).press(800.0 * at.load, 1.0 / STEP_S)
+    assert pressure_pa == pytest.approx(100.0 * model.reading(at), abs=1e-6)  # mbar
+
+
+@pytest.mark.parametrize("name", CURVES)
+@given(seed=seeds)
+@settings(max_examples=25)
+def test_a_curve_rises_between_fixed_ends_with_the_slope_that_its_weights_say(name: str, seed: int) -> None:
+    weights = within_bounds(effect(name), seed)
+    load = np.linspace(-0.2, 1.2, 1401)
+    out = effect(name).apply(load, Conditions(load + 0.2, load, 1e-3), weights)
+    assert np.all(np.diff(out) > 0.0)
+    assert np.interp([0.0, 1.0], load, out) == pytest.approx([0.0, 1.0], abs=1e-12)
+    # The slow way: the slope, straight between the knots, summed up by the trapezoidal rule on a fine grid.
+    fine = np.unique(np.concatenate([np.linspace(0.0, 1.0, 20_001), KNOTS]))
+    slope = np.interp(fine, KNOTS, 1.0 + weights)
+    summed = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(fine))])
+    inside = (load >= 0.0) & (load <= 1.0)
+    assert out[inside] == pytest.approx(np.interp(load[inside], fine, summed / summed[-1]), abs=1e-6)
+    assert np.diff(out[:199]) == pytest.approx(1e-3 * slope[0] / summed[-1])
+    assert np.diff(out[-199:]) == pytest.approx(1e-3 * slope[-1] / summed[-1])
+
+
+@given(seed=seeds)
+@settings(max_examples=25)
+def test_a_loop_loses_the_shares_of_slope_that_its_weights_say_after_each_reversal(seed: int) -> None:
+    weights = within_bounds(effect("flexible_loop"), seed)
+    load = np.concatenate([np.linspace(0.0, 1.0, 1001), np.linspace(1.0, 0.1, 901)[1:]])
+    at = Conditions(STEP_S * np.arange(load.size), load, STEP_S)
+    slope = np.diff(effect("flexible_loop").apply(load, at, weights)) / np.diff(load)
+    past = np.concatenate([np.arange(1000), np.arange(900)]) * 1e-3 + 5e-4  # the reversal, at the middle of each step
+    ranges = np.searchsorted(2.0 * HALF_WIDTHS, past)
+    clear = np.min(np.abs(past[:, None] - 2.0 * HALF_WIDTHS), axis=1) > 1e-3
+    assert slope[clear] == pytest.approx(1.0 - np.append(weights, 0.0)[ranges[clear]], abs=1e-9)
+
+
+@given(seed=seeds)
+@settings(max_examples=10)
+def test_a_loop_is_the_sum_of_its_plays(seed: int) -> None:
+    at, weights = loading(seed), within_bounds(effect("flexible_loop"), seed)
+    friction = []
+    for width in HALF_WIDTHS:
+        place, along = width, []
+        for load in at.load:
+            place = min(max(place, load - width), load + width)
+            along.append(load - place + width)
+        friction.append(along)
+    expected = at.load - weights @ np.diff(np.array(friction), axis=0, prepend=0.0)
+    assert effect("flexible_loop").apply(at.load, at, weights) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_loop_closes_without_load_and_holds_still_against_noise() -> None:
+    one, weights = effect("flexible_loop"), np.full(6, 0.3)
+    load = np.interp(np.arange(400), [0, 100, 200, 300, 399], [0.0, 1.0, 0.0, 0.5, 0.0])
+    out = one.apply(load, Conditions(STEP_S * np.arange(400), load, STEP_S), weights)
+    assert out[[0, 200, 399]] == pytest.approx(0.0, abs=1e-12)
+    noisy = 0.5 + 0.004 * np.random.default_rng(1).standard_normal(5000)
+    hold = Conditions(STEP_S * np.arange(5000), noisy, STEP_S, load_noise=0.004)
+    drift = one.apply(noisy, hold, weights) - noisy * (1.0 - 0.3)  # within a reversal of every play
+    assert np.ptp(drift[1000:]) < 1e-9
+
+
+@given(seed=seeds, share=st.floats(1e-3, 5.0), rate_per_s=st.floats(0.01, 50.0))
+@settings(max_examples=25)
+def test_a_relaxation_of_any_signs_is_a_passive_network(seed: int, share: float, rate_per_s: float) -> None:
+    one = effect("flexible_relaxation")
+    assert isinstance(one, CoreEffect)
+    core = Core([Arm(share, rate_per_s), *one.elements(within_bounds(one, seed))])
+    poles = np.linalg.eigvals(core.matrix)
+    zeros = np.linalg.eigvals(core.matrix - np.outer(core.drive, core.read) / core.direct)
+    for roots in (poles, zeros):
+        assert np.max(np.abs(roots.imag)) < 1e-6 * np.max(np.abs(roots))
+        assert np.max(roots.real) < 0.0
+    at = loading(seed)
+    assert core.simulate(at.load, STEP_S) == pytest.approx(plain(core, at.load, STEP_S), abs=1e-7)
+
+
+def test_a_relaxation_creeps_up_where_its_weights_are_positive_and_down_alike_where_negative() -> None:
+    one = effect("flexible_relaxation")
+    load = np.append(0.0, np.ones(2000))
+    at = Conditions(STEP_S * np.arange(load.size), load, STEP_S)
+    for k in range(6):
+        weights = np.zeros(6)
+        weights[k] = 1e-4
+        up, down = (one.apply(load, at, sign * weights) - load for sign in (1.0, -1.0))
+        assert up[1] < 0.0
+        assert np.all(np.diff(up[1:]) >= -1e-12)
+        assert down == pytest.approx(-up, abs=1e-7)  # second order of the weight
