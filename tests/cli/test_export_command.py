@@ -45,6 +45,9 @@ def test_each_target_writes_its_files_and_lists_them(
         (["--to", "c", "--sample-rate", "fast"], "fast"),
         (["--to", "c", "--precision", "half"], "half"),
         (["--to", "json", "--precision", "float"], "json"),
+        (["--to", "json", "--fixed", "q15"], "q15"),
+        (["--to", "c", "--fixed", "q7"], "q7"),
+        (["--to", "c", "--name", "left toe"], "left toe"),
     ],
 )
 def test_a_wrong_option_is_one_sentence_and_status_2(
@@ -66,3 +69,25 @@ def test_a_damaged_calibration_is_status_3(
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert "left_toe.json" in line
     assert not out.exists()
+
+
+def test_a_shoe_goes_into_one_folder_and_nothing_is_overwritten(
+    calibration: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "left_heel.json"
+    Calibration(0.316, 1.892, 0.5599, MILLIBAR, unit="left_heel").save(other)
+    out = tmp_path / "out"
+    words = ["export", calibration, str(other), "--to", "c", "--fixed", "q15", "--out", str(out)]
+    assert run_command(words) == 0
+    assert {path.name for path in out.glob("*.*")} == {
+        "left_toe.h", "left_toe.c", "left_heel.h", "left_heel.c"
+    }  # fmt: skip
+    (out / "left_toe.h").write_text("mine")
+    capsys.readouterr()
+    assert run_command(words) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert "left_toe.h" in line
+    assert "--force" in line
+    assert (out / "left_toe.h").read_text() == "mine"
+    assert run_command([*words, "--force"]) == 0
+    assert "LEFT_TOE_INPUT_LSB" in (out / "left_toe.h").read_text()

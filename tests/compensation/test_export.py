@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import ctypes
 import json
 import re
 import shutil
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_code import compiled, needs_compiler, run_filters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
@@ -27,10 +27,6 @@ LEFT_TOE = Calibration(
     K2, 1.0 + (K1 + K2) * X, K2 * (1.0 + K1 * X), MILLIBAR, offset=1.5, unit="left_toe", load_range_n=(0.0, 800.0),
     sources=({"name": "left_toe_dynamic.csv", "sha256": "0123abcd"},),
 )  # fmt: skip
-FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wshadow"]
-COMPILER = shutil.which("gcc") or shutil.which("cc")
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or cc) on the path")
-
 calibrations = st.builds(
     lambda a1, high, ratio, offset, rate: Calibration(
         a1, high, a1 * high * ratio, MILLIBAR, offset=offset, sample_rate_hz=rate, load_range_n=(0.0, 800.0)
@@ -43,38 +39,15 @@ calibrations = st.builds(
 )
 
 
-def _compile(sources: list[Path], out: Path, *flags: str) -> Path:
-    assert COMPILER is not None
-    done = subprocess.run(
-        [COMPILER, *FLAGS, *flags, *map(str, sources), "-o", str(out), "-lm"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return out
-
-
 def _self_test(folder: Path) -> subprocess.CompletedProcess[str]:
     sources = [folder / "smartshoe_filter.c", folder / "smartshoe_filter_test.c"]
-    return subprocess.run([_compile(sources, folder / "check")], capture_output=True, text=True, check=False)
+    return subprocess.run([compiled(sources, folder / "check")], capture_output=True, text=True, check=False)
 
 
 def _run_c(calibration: Calibration, readings: np.ndarray, folder: Path, precision: str = "double") -> np.ndarray:
     """Forces of the compiled filter, one push a sample."""
     write_files(export_files(calibration, "c", precision=precision), folder)
-    signature = f"const {precision} *readings, {precision} *forces, long n"
-    (folder / "run.c").write_text(
-        f'#include "smartshoe_filter.h"\nvoid run({signature});\nvoid run({signature})\n{{\n'
-        "    smartshoe_filter filter;\n    long k;\n    smartshoe_filter_init(&filter);\n"
-        "    for (k = 0; k < n; k++) {\n        forces[k] = smartshoe_filter_push(&filter, readings[k]);\n    }\n}\n"
-    )
-    library = _compile([folder / "smartshoe_filter.c", folder / "run.c"], folder / "filter.so", "-shared", "-fPIC")
-    given_ = np.ascontiguousarray(readings, dtype=np.float64 if precision == "double" else np.float32)
-    forces_n = np.empty_like(given_)
-    pointer = ctypes.c_void_p
-    ctypes.CDLL(str(library)).run(
-        pointer(given_.ctypes.data), pointer(forces_n.ctypes.data), ctypes.c_long(len(given_))
-    )
-    return forces_n.astype(float)
+    return run_filters(folder, {"smartshoe_filter": readings})["smartshoe_filter"]
 
 
 def _walk(n: int, seed: int = 3) -> np.ndarray:

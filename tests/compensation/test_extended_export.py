@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_code import needs_compiler
 from chains import EXACT, INVERTIBLE, chain_of, some_conditions
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_export import _run_c, _self_test, needs_compiler
+from test_export import _run_c, _self_test
 
 from smartshoe.compensation import Calibration, extended_calibration
 from smartshoe.compensation.export import export_files, write_files

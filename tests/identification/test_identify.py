@@ -215,3 +215,8 @@ def test_an_unsettled_fit_is_refused_unless_asked_for() -> None:
 def test_wrong_choices_are_named(wrong: dict[str, object]) -> None:
     with pytest.raises(UsageError, match=next(iter(wrong))):
         identify(press(), **wrong)
+
+
+def test_the_calibrated_rates_are_the_triangles_however_short_the_fast_ones() -> None:
+    found = identify(press(load_noise=0.05, rates=SIX_RATES))
+    assert found.rate_range_n_per_s == pytest.approx((min(SIX_RATES), max(SIX_RATES)), rel=0.05)

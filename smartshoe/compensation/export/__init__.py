@@ -6,8 +6,9 @@ further kind of model is a further `FilterModel` and its templates, and no chang
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -17,12 +18,24 @@ from smartshoe.compensation.export.c99 import c_files
 from smartshoe.compensation.export.json_file import json_files
 from smartshoe.compensation.export.matlab import matlab_files
 from smartshoe.compensation.export.model import FilterModel
+from smartshoe.compensation.export.names import DEFAULT_NAME, names_of
 from smartshoe.errors import UsageError
 
 Precision = Literal["double", "float"]
+Fixed = Literal["q15", "q31"]
 
-_TARGETS: Mapping[str, Callable[[FilterModel, str], dict[str, str]]] = {
-    "c": c_files,
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """What the C code computes in; ``apart`` puts its self-tests into a folder of their own."""
+
+    precision: str = "double"
+    fixed: str | None = None
+    apart: bool = False
+
+
+_TARGETS: Mapping[str, Callable[[FilterModel, Arithmetic], dict[str, str]]] = {
+    "c": lambda model, a: c_files(model, a.precision, a.fixed, apart=a.apart),
     "matlab": lambda model, _: matlab_files(model),
     "json": lambda model, _: json_files(model),
 }
@@ -30,12 +43,39 @@ TARGETS = tuple(_TARGETS)
 
 
 def export_files(
-    calibration: Calibration, to: str, *, sample_rate_hz: float | None = None, precision: str = "double"
+    calibration: Calibration,
+    to: str,
+    *,
+    sample_rate_hz: float | None = None,
+    precision: str = "double",
+    fixed: str | None = None,
+    name: str = DEFAULT_NAME,
 ) -> dict[str, str]:
     """File name to text of ``calibration``'s filter for target ``to``, at its own rate where none is given.
 
-    ``precision`` is that of the C code. Raises `UsageError` for an unknown target or precision, and for a rate that
-    is not positive or too high for the filter to be written in double precision.
+    ``precision`` is that of the C code, ``fixed`` ("q15", "q31") its integer arithmetic in place of it; ``name`` is
+    that of its files and symbols. Raises `UsageError` for an unknown target or arithmetic, for a name that is no C
+    identifier, and for a rate that is not positive or too high for the filter to be written in double precision.
+    """
+    return export_shoe(
+        [calibration], to, sample_rate_hz=sample_rate_hz, precision=precision, fixed=fixed, names=[name]
+    )  # fmt: skip
+
+
+def export_shoe(
+    calibrations: Sequence[Calibration],
+    to: str,
+    *,
+    sample_rate_hz: float | None = None,
+    precision: str = "double",
+    fixed: str | None = None,
+    names: Sequence[str] = (),
+) -> dict[str, str]:
+    """As `export_files`, for several units whose C links into one program: file name to text.
+
+    ``names``: a name each, or one that goes before the units' names, or none: then the units' names (of a single
+    calibration: ``smartshoe_filter``). Several units' self-tests are in the folder ``self_test``. Raises `UsageError`
+    for two names alike too.
     """
     if to not in _TARGETS:
         raise UsageError(f"target {to!r} is not known: use {', '.join(TARGETS[:-1])} or {TARGETS[-1]}")
@@ -43,17 +83,34 @@ def export_files(
         raise UsageError(f"precision {precision!r} is not known: use {' or '.join(get_args(Precision))}")
     if precision == "float" and to != "c":
         raise UsageError(f"precision float is for target c, {to} is always double: leave it away")
-    return _TARGETS[to](FilterModel.of(calibration, sample_rate_hz), precision)
+    if fixed is not None and fixed not in get_args(Fixed):
+        raise UsageError(f"fixed point {fixed!r} is not known: use {' or '.join(get_args(Fixed))}")
+    if fixed is not None and (to != "c" or precision == "float"):
+        against = "--precision float" if to == "c" else f"target {to}"
+        raise UsageError(f"fixed point {fixed} is for target c without --precision, not for {against}: leave it away")
+    arithmetic = Arithmetic(precision, fixed, apart=len(calibrations) > 1)
+    found: dict[str, str] = {}
+    for calibration, name in zip(calibrations, names_of(calibrations, names), strict=True):
+        found |= _TARGETS[to](FilterModel.of(calibration, sample_rate_hz, name), arithmetic)
+    return found
 
 
-def write_files(files: Mapping[str, str], folder: Path | str) -> list[Path]:
-    """Write ``files`` (name to text) into ``folder``, made where it is missing: all of them or none."""
-    place = make_folder(folder)
-    paths = [place / name for name in files]
+def write_files(files: Mapping[str, str], folder: Path | str, *, force: bool = False) -> list[Path]:
+    """Write ``files`` (name to text) into ``folder``, made where it is missing: all of them or none.
+
+    Raises `UsageError` naming a file that is there already, unless ``force`` allows it to be replaced.
+    """
+    paths = [Path(folder) / name for name in files]
+    there = [path for path in paths if path.is_file()]
+    if there and not force:
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        raise UsageError(f"{there[0]}{more} would be overwritten: choose another --out or --name, or give --force")
+    for place in dict.fromkeys(path.parent for path in paths):
+        make_folder(place)
     with ExitStack() as stack:
         for path, text in zip(paths, files.values(), strict=True):
             stack.enter_context(replacing(path)).write_text(text, encoding="utf-8", newline="\n")
     return paths
 
 
-__all__ = ["TARGETS", "FilterModel", "Precision", "export_files", "write_files"]
+__all__ = ["TARGETS", "FilterModel", "Fixed", "Precision", "export_files", "export_shoe", "write_files"]

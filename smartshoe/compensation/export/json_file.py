@@ -12,7 +12,7 @@ SCHEMA = "smartshoe.export/1"
 
 
 def json_files(model: FilterModel) -> dict[str, str]:
-    """smartshoe_filter.json, file name to text; full precision, a missing reading of the test vector is null."""
+    """NAME.json, file name to text; full precision, a missing reading of the test vector is null."""
     calibration = model.calibration
     found: dict[str, Any] = {
         "schema": SCHEMA,
@@ -49,7 +49,7 @@ def json_files(model: FilterModel) -> dict[str, str]:
     }
     if isinstance(model, ExtendedFilterModel):
         found["extended"] = _extended(model)
-    return {"smartshoe_filter.json": json_text(found)}
+    return {f"{model.name}.json": json_text(found)}
 
 
 def _extended(model: ExtendedFilterModel) -> dict[str, Any]:

@@ -12,7 +12,7 @@ SHIFTS = ("zero_offset", "load_cell_tare")
 
 
 def matlab_files(model: FilterModel) -> dict[str, str]:
-    """smartshoe_filter.m, smartshoe_filter_test.m and the test vector, file name to text; double precision.
+    """NAME.m, NAME_test.m and the test vector, file name to text; double precision.
 
     Of an extended model, the linear network (relaxation, heat, linear leak) and constant shifts of load and reading
     are written; raises `UsageError` naming the other effects.
@@ -25,9 +25,9 @@ def matlab_files(model: FilterModel) -> dict[str, str]:
     if isinstance(model, ExtendedFilterModel):
         shared |= _extended(model)
     return {
-        "smartshoe_filter.m": render(f"{model.kind}.m.j2", model, **shared),
-        "smartshoe_filter_test.m": render("filter_test.m.j2", model, **shared),
-        "smartshoe_filter_test.csv": vector_csv(model),
+        f"{model.name}.m": render(f"{model.kind}.m.j2", model, **shared),
+        f"{model.name}_test.m": render("filter_test.m.j2", model, **shared),
+        f"{model.name}_test.csv": vector_csv(model),
     }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.compensation.calibration import Calibration
+from smartshoe.compensation.export.names import DEFAULT_NAME
 from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models import discretise
@@ -21,7 +22,7 @@ FLOAT_ROUNDING = 2.0**-24
 
 @dataclass(frozen=True)
 class FilterModel:
-    """A first-order filter ready to be written; ``kind`` names its templates.
+    """A first-order filter ready to be written; ``kind`` names its templates, ``name`` its files and symbols.
 
     ``numerator`` and ``denominator`` (2,) each in falling powers of z, the very numbers that `Compensator` runs;
     ``provenance`` is what a header comment says, key to text.
@@ -31,10 +32,11 @@ class FilterModel:
     sample_rate_hz: float
     numerator: tuple[float, float]
     denominator: tuple[float, float]
+    name: str = DEFAULT_NAME
     kind: str = "first_order"
 
     @classmethod
-    def of(cls, calibration: Calibration, sample_rate_hz: float | None = None) -> FilterModel:
+    def of(cls, calibration: Calibration, sample_rate_hz: float | None = None, name: str = DEFAULT_NAME) -> FilterModel:
         """The model of ``calibration`` at ``sample_rate_hz``; raises `UsageError` where the rate cannot be used."""
         rate_hz = calibration.sample_rate_hz if sample_rate_hz is None else sample_rate_hz
         with np.errstate(over="ignore", invalid="ignore"):
@@ -47,7 +49,7 @@ class FilterModel:
             )
         n0, n1 = (float(value) for value in numerator)
         model = cls if calibration.extended is None else ExtendedFilterModel
-        return model(calibration, float(rate_hz), (n0, n1), (1.0, float(denominator[1])))
+        return model(calibration, float(rate_hz), (n0, n1), (1.0, float(denominator[1])), name)
 
     @property
     def static_gain(self) -> float:
@@ -137,7 +139,7 @@ class FilterModel:
             said[f"source {number}"] = (
                 f"{source.get('name') or '(unnamed)'}, sha256 {source.get('sha256') or 'not known'}"
             )
-        return {key: _one_safe_line(text) for key, text in said.items()}
+        return {key: one_safe_line(text) for key, text in said.items()}
 
 
 @dataclass(frozen=True)
@@ -167,8 +169,8 @@ class ExtendedFilterModel(FilterModel):
         """As the plain filter's, with the effects."""
         filter_ = self.filter
         found = super().provenance
-        found["reading"] = _one_safe_line(self.calibration.reading_unit.symbol)
-        found["model"] = _one_safe_line(
+        found["reading"] = one_safe_line(self.calibration.reading_unit.symbol)
+        found["model"] = one_safe_line(
             "the standard linear solid with effects, undone last block first; relaxation"
             f" {filter_.model.relaxing_share:.6g} of the load at {filter_.model.relaxation_rate_per_s:.6g} 1/s"
         )
@@ -177,15 +179,15 @@ class ExtendedFilterModel(FilterModel):
                 f"{p.name} = {float(value)!r} {p.unit}"
                 for p, value in zip(part.effect.parameters, part.values, strict=True)
             )
-            found[f"effect {part.name}"] = _one_safe_line(values or "no parameter")
+            found[f"effect {part.name}"] = one_safe_line(values or "no parameter")
         for name, says in filter_.not_inverted.items():
-            found[f"not compensated, {name}"] = _one_safe_line(says)
+            found[f"not compensated, {name}"] = one_safe_line(says)
         for name, says in filter_.cautions.items():
-            found[f"caution, {name}"] = _one_safe_line(says)
+            found[f"caution, {name}"] = one_safe_line(says)
         return found
 
 
-def _one_safe_line(text: str) -> str:
+def one_safe_line(text: str) -> str:
     """``text`` as one line that cannot end or nest a C comment, nor continue a line."""
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
     # A slash or star after the other, and ??/ (a trigraph for the backslash), mean something in a C comment.

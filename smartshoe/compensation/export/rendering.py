@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smartshoe.compensation.export.model import FilterModel
 
@@ -21,15 +23,22 @@ def render(template: str, model: FilterModel, **values: Any) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template(template).render(model=model, provenance=model.provenance, **values)
+    return environment.get_template(template).render(
+        model=model, name=model.name, provenance=model.provenance, **values
+    )
 
 
 def vector_csv(model: FilterModel) -> str:
     """CSV of the test vector: provenance as comments, then ``reading_<unit>,force_n`` in full precision."""
+    reading = f"reading_{model.calibration.reading_unit.suffix}"
+    return columns_csv(model, {reading: model.test_readings, "force_n": model.test_forces_n})
+
+
+def columns_csv(model: FilterModel, columns: Mapping[str, NDArray[Any]]) -> str:
+    """CSV of ``columns`` (n,) each, with the provenance as comments, numbers in full precision."""
     lines = [f"# {key}: {text}" for key, text in model.provenance.items()]
-    lines.append(f"reading_{model.calibration.reading_unit.suffix},force_n")
-    rows = zip(model.test_readings, model.test_forces_n, strict=True)
-    lines += [f"{float(reading)!r},{float(force_n)!r}" for reading, force_n in rows]
+    lines.append(",".join(columns))
+    lines += [",".join(map(repr, row)) for row in zip(*(values.tolist() for values in columns.values()), strict=True)]
     return "\n".join(lines) + "\n"
 
 

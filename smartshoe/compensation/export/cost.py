@@ -1,0 +1,87 @@
+"""Memory and operations of exported C, counted in the very text that is written."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+_SIZES = {"double": 8, "float": 4, "int": 4, "int64_t": 8, "int32_t": 4, "int16_t": 2}
+_TYPES = "|".join(_SIZES)
+_TABLE = re.compile(rf"static const ({_TYPES}) \w+\[(\d+)\] = \{{[^}}]*\}};")
+_CONSTANT = re.compile(rf"static const ({_TYPES}) \w+ = [^;]*;")
+_LOOP = re.compile(r"for \(\w+ = 0; \w+ (<=?) (\d+); \w+\+\+\) \{")
+_TOKEN = re.compile(rf"{_LOOP.pattern}|->|\+\+|--|[<>=!]=|<<|>>|&&|\|\||\w+ ?\(|[-+*/{{}}<>]|[\d.]+(?:[eE][-+]?\d+)?")
+_KINDS = {
+    "+": "additions",
+    "-": "additions",
+    "*": "multiplications",
+    "/": "divisions",
+    "<": "comparisons",
+    ">": "comparisons",
+    "<=": "comparisons",
+    ">=": "comparisons",
+    ">>": "shifts",
+    "<<": "shifts",
+}
+_CALLS = re.compile(r"(?:exp|log|pow|sqrt|tanh|log1p|expm1|fabs)f? ?\(")
+
+
+def state_bytes(header: str) -> int:
+    """Size in bytes of the struct in ``header``, with the padding that natural alignment brings."""
+    (body,) = re.findall(r"typedef struct \w+ \{(.*?)\} \w+;", header, re.DOTALL)
+    sizes = [_SIZES[kind] for kind in re.findall(rf"^ *({_TYPES}) \w+;", body, re.MULTILINE)]
+    at = 0
+    for size in sizes:
+        at += -at % size + size
+    return at + -at % max(sizes)
+
+
+def table_bytes(source: str) -> int:
+    """Size in bytes of the constant tables in ``source``."""
+    return sum(_SIZES[kind] * int(count) for kind, count in _TABLE.findall(source))
+
+
+def operations(source: str) -> Counter[str]:
+    """What one push costs at most: every branch taken, every loop to its end; kind to count.
+
+    All functions of ``source`` but its init run once a push, as the templates have it; a function that is called by
+    another is counted at each call.
+    """
+    text = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("#"))
+    text = _CONSTANT.sub("", _TABLE.sub("", text))
+    bodies = dict(re.findall(r"(\w+)\([^()]*\)\n\{\n(.*?)\n\}", text, re.DOTALL))
+    push = next(name for name in bodies if name.endswith("_push"))
+    return _of(push, bodies)
+
+
+def _of(name: str, bodies: dict[str, str]) -> Counter[str]:
+    found: Counter[str] = Counter()
+    times = [1]
+    for match in _TOKEN.finditer(bodies[name]):
+        token = match[0]
+        if match[1]:
+            times.append(times[-1] * (int(match[2]) + (match[1] == "<=")))
+        elif token == "{":
+            times.append(times[-1])
+        elif token == "}":
+            times.pop()
+        elif token in _KINDS:
+            found[_KINDS[token]] += times[-1]
+        elif _CALLS.fullmatch(token):
+            found["library calls"] += times[-1]
+        elif token.endswith("(") and token[:-1].strip() in bodies:
+            for kind, count in _of(token[:-1].strip(), bodies).items():
+                found[kind] += times[-1] * count
+    return found
+
+
+def cost_lines(header: str, source: str) -> dict[str, str]:
+    """What the header says of memory and operations, key to one line."""
+    counted = operations(source)
+    said = ", ".join(f"{counted[kind]} {kind}" for kind in dict.fromkeys((*_KINDS.values(), "library calls"))
+                     if counted[kind])  # fmt: skip
+    return {
+        "memory": f"{state_bytes(header)} bytes of state a filter, {table_bytes(source)} bytes of constant tables",
+        "operations": f"a sample at most {said}",
+    }
