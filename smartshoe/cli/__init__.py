@@ -22,6 +22,7 @@ _COMMANDS = {
     "diagnose": "what a simulation gets wrong, why, and what mending it gains",
     "calibrate": "a session: a shoe under a machine, recorded, identified, judged and stored",
     "stream": "live readings and forces from a shoe",
+    "live": "a page that shows a shoe while it is worn: forces, events, checks; record, mark, zero",
     "gait": "events, phases, strides and forces of a trial",
     "export": "a calibration's compensator for firmware (C) or other tools",
     "convert": "convert any readable format to any writable one",

@@ -198,7 +198,7 @@ def _at_the_machine(asks: bool) -> Iterator[_AtTheMachine]:
     if not sys.stderr.isatty():
         yield _AtTheMachine(asks)
         return
-    from smartshoe.cli.live import LiveReadings
+    from smartshoe.cli.readings import LiveReadings
 
     with LiveReadings() as table:
         yield _AtTheMachine(asks, table)

@@ -1,66 +1,81 @@
-"""Readings of a shoe as they come, on a terminal: one line a unit, drawn anew a few times a second."""
+"""``smartshoe live``."""
 
 from __future__ import annotations
 
-import time
-from types import TracebackType
-from typing import Self
+from contextlib import ExitStack
+from pathlib import Path
 
-import numpy as np
-from rich.console import Console, Group
-from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
-from rich.text import Text
+import click
 
-from smartshoe.devices.base import Block
+from smartshoe.errors import UsageError
 
-DRAWN_EVERY_S = 0.1
+LONG_S = 4 * 3600.0  # of a simulated walk, where its address does not say
 
 
-class LiveReadings:
-    """A table on stderr: reading now, lowest and highest so far, and a bar of it."""
+@click.command("live", epilog="Example: smartshoe live --shoe sim:walk?side=both --record walk.csv")
+@click.option("--shoe", "urls", required=True, multiple=True, metavar="URL",
+              help="serial:///dev/rfcomm0, replay:FILE, sim:walk (twice: two shoes on one page).")  # fmt: skip
+@click.option("--calibration", "calibrations", multiple=True, metavar="C.json",
+              help="A unit's calibration, or a folder of them: forces are shown and written (repeatable).")  # fmt: skip
+@click.option("--port", type=click.IntRange(1, 65535), metavar="N", help="The page's port (default: a free one).")
+@click.option("--host", metavar="HOST", help="Serve beyond this computer, at this address; needs --token.")
+@click.option("--token", metavar="TOKEN", help="The word that every request must bring; needs --host.")
+@click.option("--record", metavar="FILE", help="Record from the start to a new plain table.")
+@click.option("--speed", type=click.FloatRange(0.01, 1000.0), default=1.0, show_default=True,
+              help="How fast a replayed or simulated shoe goes.")  # fmt: skip
+def command(
+    urls: tuple[str, ...],
+    calibrations: tuple[str, ...],
+    port: int | None,
+    host: str | None,
+    token: str | None,
+    record: str | None,
+    speed: float,
+) -> None:
+    """A page that shows a shoe (or two) while it is worn: forces, events, checks; record, mark, zero; Ctrl-C ends."""
+    if (host is None) != (token is None):
+        missing = "--token" if token is None else "--host"
+        raise UsageError(f"{missing} is missing: give --host and --token both, or neither for this computer only")
+    if token == "" or host == "":
+        raise UsageError("--host or --token is empty: give both a word")
+    try:
+        from smartshoe.live.server import LiveServer
+    except ImportError as error:
+        raise UsageError(
+            f"smartshoe live needs {error.name}, which is not installed: pip install 'smartshoe[live]'"
+        ) from error
+    from smartshoe.cli.inputs import load_calibrations
+    from smartshoe.devices import open_shoe
+    from smartshoe.live.session import LiveSession
 
-    def __init__(self) -> None:
-        self._console = Console(stderr=True, highlight=False)
-        self._live = Live(console=self._console, transient=True, auto_refresh=False)
-        self._drawn = 0.0
-        self._low: dict[str, float] = {}
-        self._high: dict[str, float] = {}
+    loaded = load_calibrations(calibrations)
+    with ExitStack() as stack:
+        shoes = {url: open_shoe(_lasting(url)) for url in urls}
+        if len(shoes) < len(urls):
+            raise UsageError("--shoe is given twice with one address: give each shoe its own")
+        for shoe in shoes.values():
+            stack.enter_context(shoe)
+        session = LiveSession(shoes, loaded, record=None if record is None else Path(record), speed=speed)
+        stack.callback(session.close)
+        server = LiveServer(session, host or "127.0.0.1", port or 0, token)
+        session.start()
+        server.desk.start()
+        stack.callback(server.desk.close)
 
-    def __enter__(self) -> Self:
-        self._live.__enter__()
-        return self
+        def ready() -> None:
+            click.echo(f"live: {server.url}")
+            if token is not None:
+                click.echo(f"open it with the token behind the address: {server.url}?token=...", err=True)
+            for note in session.notes:
+                click.echo(f"note: {note['says']}", err=True)
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._live.__exit__(kind, error, at)
+        server.run(ready)
+    if session.recorded is not None:
+        click.echo(session.recorded)
 
-    def print(self, sentence: str) -> None:
-        """A sentence that stays, above the table."""
-        self._console.print(sentence, soft_wrap=True)
 
-    def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
-        """Take a block in; the table is drawn ten times a second at most."""
-        for column, name in enumerate(block.names):
-            values = block.readings[~block.missing[:, column], column]
-            if values.size:
-                self._low[name] = min(self._low.get(name, np.inf), float(values.min()))
-                self._high[name] = max(self._high.get(name, -np.inf), float(values.max()))
-        now = time.monotonic()
-        if now - self._drawn < DRAWN_EVERY_S:
-            return
-        self._drawn = now
-        self._live.update(Group(Text(f"{experiment or 'idle'}  {elapsed_s:.1f} s"), self._table(block)), refresh=True)
-
-    def _table(self, block: Block) -> Table:
-        table = Table(box=None, header_style="bold")
-        for title in ("unit", f"now ({block.unit.symbol})", "lowest", "highest", ""):
-            table.add_column(title, justify="left" if title == "unit" else "right")
-        # One scale for all units, so that the one that is pressed stands out.
-        widest = max((self._high[name] - self._low[name] for name in self._high), default=0.0)
-        for column, name in enumerate(block.names):
-            low, high = self._low.get(name, 0.0), self._high.get(name, 0.0)
-            now = float(block.readings[-1, column])
-            bar = ProgressBar(total=max(widest, 1e-12), completed=max(now - low, 0.0), width=30)
-            table.add_row(name, f"{now:.2f}", f"{low:.2f}", f"{high:.2f}", bar)
-        return table
+def _lasting(url: str) -> str:
+    """A simulated shoe goes on for hours unless its address says how long."""
+    if not url.startswith("sim:") or "duration_s=" in url:
+        return url
+    return f"{url}{'&' if '?' in url else '?'}duration_s={LONG_S:g}"

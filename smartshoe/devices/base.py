@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from smartshoe.errors import DeviceError, LimitError
 from smartshoe.protocol import MachineLimits, Protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit
+
+if TYPE_CHECKING:
+    from smartshoe.wire.clock import DeviceClock
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -166,6 +169,11 @@ class Shoe(Device):
     def events(self) -> tuple[ShoeEvent, ...]:
         """What befell the stream since it was opened (gaps, reconnections, drops), oldest first."""
         return ()
+
+    @property
+    def device_clock(self) -> DeviceClock | None:
+        """The device's clock against the host's as fitted so far; None where the stream has no clock of its own."""
+        return None
 
     @property
     @abstractmethod

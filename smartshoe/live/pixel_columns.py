@@ -1,0 +1,57 @@
+"""Samples reduced to what a picture can show: the least and the greatest value in each column of pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """``place`` (n,) of each column (its time is ``place`` times the columns' width), ``low`` and ``high`` (n, width)
+    of the samples in it, NaN where all are missing. Columns without a sample are not there."""
+
+    place: Places
+    low: Array
+    high: Array
+
+    def __len__(self) -> int:
+        return int(self.place.size)
+
+    def since(self, place: int) -> Columns:
+        """From column ``place`` on."""
+        first = int(np.searchsorted(self.place, place))
+        return Columns(self.place[first:], self.low[first:], self.high[first:])
+
+
+def reduced(time_s: Array, rows: Array, width_s: float) -> Columns:
+    """Rows (n, width) at rising times (n,), in columns of ``width_s``."""
+    if not time_s.size:
+        return Columns(np.zeros(0, dtype=np.int64), np.zeros((0, rows.shape[1])), np.zeros((0, rows.shape[1])))
+    places = np.floor(time_s / width_s).astype(np.int64)
+    first = np.flatnonzero(np.diff(places, prepend=places[0] - 1))
+    return Columns(
+        places[first], np.fmin.reduceat(rows, first, axis=0), np.fmax.reduceat(rows, first, axis=0)
+    )  # fmt: skip
+
+
+def joined(before: Columns, after: Columns, most: int) -> Columns:
+    """Consecutive columns as one, the last ``most`` places of them; a column that both have part of is made whole."""
+    if not len(after):
+        return before
+    cut = len(before) - int(len(before) > 0 and before.place[-1] == after.place[0])
+    low, high = after.low, after.high
+    if cut < len(before):
+        low, high = low.copy(), high.copy()
+        low[0], high[0] = np.fmin(before.low[-1], low[0]), np.fmax(before.high[-1], high[0])
+    whole = Columns(
+        np.concatenate([before.place[:cut], after.place]),
+        np.concatenate([before.low[:cut], low]),
+        np.concatenate([before.high[:cut], high]),
+    )
+    return whole.since(int(whole.place[-1]) - most + 1)

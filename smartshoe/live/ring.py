@@ -1,0 +1,52 @@
+"""The last samples of a stream, in memory that does not grow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Ring:
+    """The last ``capacity`` rows of ``width`` numbers, each with its time; a row's place counts from the first ever.
+
+    Written by one thread; whoever else reads holds the same lock as the writer.
+    """
+
+    def __init__(self, capacity: int, width: int) -> None:
+        # Twice the room: what is in the ring lies in one piece, and is moved once every `capacity` rows.
+        self._time = np.empty(2 * capacity)
+        self._rows = np.empty((2 * capacity, width))
+        self._capacity = capacity
+        self._start = self._stop = 0
+        self.end = 0  # the place after the last row
+
+    @property
+    def begin(self) -> int:
+        """The place of the oldest row that is still here."""
+        return self.end - (self._stop - self._start)
+
+    def append(self, time_s: Array, rows: Array) -> None:
+        """Add ``time_s`` (n,) and ``rows`` (n, width)."""
+        time_s, rows = time_s[-self._capacity :], rows[-self._capacity :]
+        if self._stop + time_s.size > self._time.size:
+            keep = slice(max(self._stop - self._capacity, self._start), self._stop)
+            size = keep.stop - keep.start
+            self._time[:size], self._rows[:size] = self._time[keep].copy(), self._rows[keep].copy()
+            self._start, self._stop = 0, size
+        after = self._stop + time_s.size
+        self._time[self._stop : after], self._rows[self._stop : after] = time_s, rows
+        self._stop = after
+        self._start = max(self._start, after - self._capacity)
+        self.end += time_s.size
+
+    def since(self, place: int) -> tuple[Array, Array]:
+        """Copies of times (n,) and rows (n, width) from ``place`` on, or from the oldest that is still here."""
+        first = self._stop - min(max(self.end - place, 0), self._stop - self._start)
+        return self._time[first : self._stop].copy(), self._rows[first : self._stop].copy()
+
+    def after(self, time_s: float) -> tuple[Array, Array]:
+        """Copies of times and rows later than ``time_s``."""
+        times = self._time[self._start : self._stop]
+        return self.since(self.begin + int(np.searchsorted(times, time_s, side="right")))

@@ -1,0 +1,188 @@
+"""The pages' server: one page, its health, and a websocket on which each page gets its pictures."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import signal
+import socket
+from collections.abc import Callable, Iterator
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from smartshoe.errors import UsageError
+from smartshoe.live.client import Client
+from smartshoe.live.desk import Desk
+from smartshoe.live.document import document
+from smartshoe.live.guard import Guard
+from smartshoe.live.session import LiveSession
+
+LONGEST_MESSAGE = 4096
+MOST_CLIENTS = 64
+FRAME_S, IDLE_FRAME_S = 1.0 / 60.0, 1.0 / 30.0
+END_WITHIN_S = 2
+
+
+class LiveServer:
+    """Serves ``session`` at ``host`` and ``port`` (0: a free one), with a ``token`` where it is not None."""
+
+    def __init__(self, session: LiveSession, host: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
+        self.session = session
+        self.desk = Desk(session)
+        self._socket = _listening(host, port)
+        self.host, self.port = host, int(self._socket.getsockname()[1])
+        self._data = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_told = False
+        page, policy = document()
+        headers = {
+            "content-security-policy": policy,
+            "x-content-type-options": "nosniff",
+            "referrer-policy": "no-referrer",
+            "cache-control": "no-store",
+        }
+
+        async def show(_: Request) -> Response:
+            return Response(page, media_type="text/html", headers=headers)
+
+        async def health(_: Request) -> Response:
+            return JSONResponse(session.health(len(self.desk.clients)), headers={"cache-control": "no-store"})
+
+        routes = [Route("/", show), Route("/health", health), WebSocketRoute("/ws", self._page)]
+        app = Guard(Starlette(routes=routes), self.port, token)
+        self._server = _Server(
+            uvicorn.Config(
+                app,
+                http="h11",
+                ws="websockets-sansio",
+                loop="asyncio",
+                lifespan="off",
+                log_level="critical",
+                access_log=False,
+                server_header=False,
+                ws_max_size=LONGEST_MESSAGE,
+                ws_per_message_deflate=False,
+                timeout_graceful_shutdown=END_WITHIN_S,
+            )
+        )
+
+    @property
+    def url(self) -> str:
+        """The page's address."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/"
+
+    def run(self, ready: Callable[[], None] = lambda: None) -> None:
+        """Serve until `stop`, or SIGINT or SIGTERM in the main thread; ``ready`` is called once, at first."""
+        asyncio.run(self._serve(ready))
+
+    def stop(self) -> None:
+        """End `run`, from any thread."""
+        self._server.should_exit = True
+
+    async def _serve(self, ready: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # Elsewhere than in the main thread, and on Windows, there is no such handler: Ctrl-C raises there.
+            with contextlib.suppress(RuntimeError, ValueError, NotImplementedError):
+                self._loop.add_signal_handler(number, self.stop)
+        self.session.changed = self._changed
+        ready()
+        ticking = asyncio.create_task(self._tick())
+        try:
+            await self._server.serve(sockets=[self._socket])
+        finally:
+            self.session.changed = lambda: None
+            ticking.cancel()
+            self._socket.close()
+
+    def _changed(self) -> None:
+        if not self._is_told and self._loop is not None:
+            self._is_told = True
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._data.set)
+
+    async def _tick(self) -> None:
+        """Wake the pages when there are new samples, 60 times a second at most and 30 times at least."""
+        while True:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._data.wait(), IDLE_FRAME_S)
+            self._data.clear()
+            self._is_told = False
+            for client in self.desk.clients:
+                client.wake.set()
+            await asyncio.sleep(FRAME_S)
+
+    async def _page(self, websocket: WebSocket) -> None:
+        if len(self.desk.clients) >= MOST_CLIENTS:
+            await websocket.close(1013)
+            return
+        await websocket.accept()
+        client = Client(self.desk)
+        self.desk.clients.add(client)
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(_sent(client, websocket))
+                tasks.create_task(_received(client, websocket))
+        except* (_OverError, WebSocketDisconnect, OSError):
+            pass
+        finally:
+            self.desk.clients.discard(client)
+
+
+class _OverError(Exception):
+    """The page is gone: end its other half."""
+
+
+async def _sent(client: Client, websocket: WebSocket) -> None:
+    await websocket.send_text(json.dumps(client.hello(), allow_nan=False))
+    while True:
+        await client.wake.wait()
+        client.wake.clear()
+        # Each send waits until a slow page has taken what it was sent: what it misses meanwhile is in the next frame.
+        for text in client.news():
+            await websocket.send_text(text)
+        frame = client.frame()
+        if frame is not None:
+            await websocket.send_bytes(frame)
+
+
+async def _received(client: Client, websocket: WebSocket) -> None:
+    while True:
+        message = await websocket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise _OverError
+        answer = client.take(message.get("text"))
+        if answer is not None:
+            client.answers.append(answer)
+            client.wake.set()
+
+
+class _Server(uvicorn.Server):
+    """uvicorn's, without its signal handlers: they would raise the signal again after a clean end."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        made = socket.socket(family, socket.SOCK_STREAM)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind((host, port))
+        made.listen(128)
+    except OSError as error:
+        made.close()
+        raise UsageError(
+            f"{host}:{port} cannot be listened on ({error.strerror}): choose another --port, or none for a free one"
+        ) from error
+    made.setblocking(False)
+    return made

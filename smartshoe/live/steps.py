@@ -1,0 +1,112 @@
+"""A foot's contacts as they happen, for the eye: known at the sample, a little less exact than `smartshoe.gait`.
+
+`smartshoe.gait` looks at seconds on both sides of an edge before it tells; a page cannot wait. So thresholds are shares
+of the foot's own rise over its own floor, as there, but both are followed sample by sample. Numbers for a paper come
+from ``smartshoe gait`` on the recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.gait.phases import FLAT, HEEL, PUSH, SWING
+
+Array = NDArray[np.float64]
+
+ON, OFF = 0.08, 0.05  # of the rise: the foot bears above, has left below
+UNIT_ON, UNIT_OFF = 0.12, 0.06  # of the unit's own rise
+LEAST_UNIT = 0.03  # of the foot's rise: what a unit that bears next to nothing may wander by
+FOLLOW_S = 0.5  # how fast the floor follows what the unloaded foot reads
+FORGET_S = 60.0  # how fast the highest load is forgotten
+APART_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """``event`` (heel_strike, foot_flat, heel_off, toe_off) of a foot at ``time_s``."""
+
+    time_s: float
+    event: str
+
+
+class StepFollower:
+    """One foot's phase and events from its units' loads, sample by sample.
+
+    ``regions`` (r) are the units' places; ``least`` is what the foot's load must at least vary by, in the loads' unit.
+    """
+
+    def __init__(self, regions: Sequence[str], least: float) -> None:
+        self.least = least
+        self._heel = [k for k, region in enumerate(regions) if region == "heel"]
+        self._fore = [k for k, region in enumerate(regions) if region != "heel"]
+        self._floor: list[float] | None = None  # of each unit, and of all together
+        self._top: list[float] = []
+        self._bears = [False] * len(regions)
+        self._is_down = False
+        self._changed_s = self._last_s = -np.inf
+        self._was_flat = self._is_off = False
+
+    @property
+    def phase(self) -> int | None:
+        """An index into `smartshoe.gait.phases.PHASES`; None before the foot has borne a load."""
+        if self._floor is None or self._top[-1] - self._floor[-1] < self.least:
+            return None
+        if not self._is_down:
+            return SWING
+        heel, fore = any(self._bears[k] for k in self._heel), any(self._bears[k] for k in self._fore)
+        if heel and not fore:
+            return HEEL
+        return PUSH if fore and self._heel and not heel else FLAT
+
+    def push(self, time_s: Array, loads: Array) -> list[Step]:
+        """The events in the next ``loads`` (n, r), finite, at ``time_s`` (n,)."""
+        found: list[Step] = []
+        table = np.column_stack([loads, loads.sum(axis=1)]).tolist()
+        for at, values in zip(time_s.tolist(), table, strict=True):
+            self._follow(at, values)
+            found += self._judged(at, values)
+        return found
+
+    def _follow(self, at: float, values: list[float]) -> None:
+        if self._floor is None:
+            self._floor, self._top = list(values), list(values)
+        passed_s = min(max(at - self._last_s, 0.0), FOLLOW_S)
+        self._last_s = at
+        for k, value in enumerate(values):
+            floor = self._floor[k]
+            if value < floor:
+                self._floor[k] = value
+            elif not self._is_down:
+                self._floor[k] = floor + (value - floor) * passed_s / FOLLOW_S
+            top = self._top[k]
+            self._top[k] = value if value > top else top - (top - self._floor[k]) * passed_s / FORGET_S
+
+    def _judged(self, at: float, values: list[float]) -> list[Step]:
+        assert self._floor is not None
+        rise = self._top[-1] - self._floor[-1]
+        share = (values[-1] - self._floor[-1]) / rise if rise >= max(self.least, 1e-9) else 0.0
+        for k in range(len(self._bears)):
+            own = max(self._top[k] - self._floor[k], LEAST_UNIT * rise, 1e-9)
+            level = UNIT_OFF if self._bears[k] else UNIT_ON
+            self._bears[k] = (values[k] - self._floor[k]) / own > level
+        if at - self._changed_s >= APART_S and (share < OFF if self._is_down else share > ON):
+            self._is_down, self._changed_s = not self._is_down, at
+            self._was_flat = self._is_off = False
+            return [Step(at, "heel_strike" if self._is_down else "toe_off")]
+        return self._within(at) if self._is_down else []
+
+    def _within(self, at: float) -> list[Step]:
+        if not self._heel:
+            return []
+        phase = self.phase
+        if phase == FLAT and not self._was_flat:
+            self._was_flat = True
+            return [Step(at, "foot_flat")]
+        if phase == PUSH and self._was_flat and not self._is_off:
+            self._is_off = True
+            return [Step(at, "heel_off")]
+        return []
