@@ -141,19 +141,16 @@ class LiveShoe:
         if block.host_time_s is None:
             return
         device_s, host_s = float(block.time_s[-1]), float(block.host_time_s[-1])
-        fit = None if self.shoe.device_clock is None else self.shoe.device_clock.fit
-        self._sd_s = 0.0 if fit is None else float(fit.sd_s(device_s - shift_s))
-        self._skew_ppm = 0.0 if fit is None else fit.skew_ppm
+        clock = self.shoe.device_clock
+        if clock is None or clock.fit is None:  # the host's time was made from the stream's own
+            self._reference_s = 0.0
+            return
+        self._sd_s, self._skew_ppm = float(clock.fit.sd_s(device_s - shift_s)), clock.fit.skew_ppm
         if self._first_s is None:
             self._first_s = float(block.time_s[0])
         if self._reference_s is None or device_s - self._first_s < REFERENCE_S:
             # The first line is rough: where it began is told better by a later one.
-            first_s = self._first_s - shift_s
-            self._reference_s = (
-                float(block.host_time_s[0] - block.time_s[0])
-                if fit is None
-                else float(fit.host_time(first_s)) - first_s - shift_s
-            )
+            self._reference_s = float(clock.host_time(self._first_s - shift_s)) - self._first_s
         self._offset_s = host_s - device_s - self._reference_s
 
     def clock_dict(self) -> dict[str, float | None]:
