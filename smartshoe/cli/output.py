@@ -5,18 +5,25 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from smartshoe.atomic import json_text, write_text
-from smartshoe.recording import Recording
+if TYPE_CHECKING:
+    from smartshoe.recording import Recording
+
+
+figures_option = click.option(
+    "--figures", type=click.Choice(["svg", "pdf", "png"]), help="Write figures for papers as well, below DIR/figures."
+)
 
 
 def emit_json(result: dict[str, Any], path: str | None) -> bool:
     """Write ``result`` to ``path`` (``-``: stdout) where one is given; True where stdout is taken by it."""
     if path is None:
         return False
+    from smartshoe.atomic import json_text, write_text
+
     if path == "-":
         click.echo(json_text(result), nl=False)
         return True

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import click
 
+from smartshoe.cli.output import figures_option
+
 
 @click.command("run", epilog="Example: smartshoe run scenarios/calibration.toml --out out/calibration")
 @click.argument("scenario")
 @click.option("--seed", type=click.IntRange(min=0), help="In the place of the scenario's own seed.")
 @click.option("--out", "out_folder", metavar="DIR", help="Write report.html, result.json and the calibrations.")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
-def command(scenario: str, seed: int | None, out_folder: str | None, json_path: str | None) -> None:
+@figures_option
+def command(
+    scenario: str, seed: int | None, out_folder: str | None, json_path: str | None, figures: str | None
+) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
     from smartshoe.kernels import warm_up
 
@@ -21,6 +26,8 @@ def command(scenario: str, seed: int | None, out_folder: str | None, json_path: 
     from smartshoe.scenario import load, run
     from smartshoe.scenario.publish import publish
 
+    if figures is not None and out_folder is None:
+        raise click.UsageError("--figures writes into --out DIR: give --out as well")
     loaded, source = load(scenario)
     if seed is not None:
         loaded = loaded.model_copy(update={"seed": seed})
@@ -31,7 +38,7 @@ def command(scenario: str, seed: int | None, out_folder: str | None, json_path: 
         report = None
         if folder is not None:
             step("writing the report")
-            report = publish(result, folder, json_text(whole))
+            report = publish(result, folder, json_text(whole), figures)
     if not emit_json(whole, json_path):
         print_summary(whole["units"])
         for unit in result.units:

@@ -15,8 +15,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
 from smartshoe.atomic import json_text, make_folder, write_text
-from smartshoe.report.drawing import STYLE, figure_of, svg
 from smartshoe.report.numbers import plain, with_sd
+from smartshoe.report.paper.drawing import STYLE, figure_of, svg
 from smartshoe.report.tables import new_console, table_of
 from smartshoe.store.dates import iso
 from smartshoe.store.drift import Drift, Trend

@@ -12,9 +12,9 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from smartshoe.gait.result import GaitResult
-from smartshoe.report.drawing import STYLE, figure_of, svg, thin
 from smartshoe.report.gait import figures
 from smartshoe.report.numbers import plain
+from smartshoe.report.paper.drawing import STYLE, figure_of, svg, thin
 from smartshoe.report.tables import new_console, table_of
 
 Array = NDArray[np.float64]

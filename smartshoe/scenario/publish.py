@@ -6,7 +6,7 @@ from pathlib import Path
 
 import smartshoe
 from smartshoe.atomic import make_folder, write_text
-from smartshoe.report.page import DiagnosisLink, UnitReport, write_page
+from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.report.trial import TrialSection
 from smartshoe.scenario.run import ScenarioResult, UnitResult
 
@@ -25,7 +25,8 @@ def _publish_diagnosis(unit: UnitResult, folder: Path, result: ScenarioResult) -
         rate_hz = next(iter(unit.recordings.values())).sample_rate_hz
         saved = found.calibration(unit=unit.name, sample_rate_hz=rate_hz)
         saved.save(folder / "calibrations" / f"{unit.name}_extended.json")
-    return DiagnosisLink(found.says, page.relative_to(folder).as_posix())
+    left_n = found.to_dict()["extended"].get("force_rmse_n")
+    return DiagnosisLink(found.says, page.relative_to(folder).as_posix(), left_n)
 
 
 def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
@@ -49,8 +50,11 @@ def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
     )
 
 
-def publish(result: ScenarioResult, folder: Path, result_json: str) -> Path:
-    """Write ``report.html``, ``result.json`` and ``calibrations/UNIT.json`` below ``folder``; returns the report."""
+def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str | None = None) -> Path:
+    """Write ``report.html``, ``result.json`` and ``calibrations/UNIT.json`` below ``folder``; returns the report.
+
+    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none.
+    """
     calibrations = make_folder(folder / "calibrations")
     for unit in result.units:
         unit.calibration.save(calibrations / f"{unit.name}.json")
@@ -61,17 +65,40 @@ def publish(result: ScenarioResult, folder: Path, result_json: str) -> Path:
         "seed": str(result.scenario.seed),
         "smartshoe": smartshoe.__version__,
     }
-    units = [
-        UnitReport(
-            unit.name,
-            unit.identification.to_dict(),
-            unit.validation,
-            list(unit.recordings.values()),
-            unit.fitted,
-            unit.judged,
-            diagnosed.get(unit.name),
-        )
-        for unit in result.units
-    ]
+    units = [_unit_report(result, unit, diagnosed.get(unit.name)) for unit in result.units]
     title, about, trial = result.scenario.title, result.scenario.about, _publish_trial(result, folder)
-    return write_page(folder / "report.html", title, about, facts, units, trial)
+    commands = [f"smartshoe run {result.source} --seed {result.scenario.seed} --out {folder}"]
+    if any(not unit.recordings for unit in result.scenario.unit):
+        commands.append(f"smartshoe simulate {result.source} --out recordings")
+    if figures is not None:
+        from smartshoe.report.paper.calibration import write_figures
+
+        write_figures(make_folder(folder / "figures"), units, figures)
+    return write_page(folder / "report.html", title, about, facts, units, trial, commands)
+
+
+def _unit_report(result: ScenarioResult, unit: UnitResult, diagnosed: DiagnosisLink | None) -> UnitReport:
+    """What the page says of ``unit``, with the command that diagnoses it where that was not done."""
+    sources = {name: recording.source for name, recording in unit.recordings.items()}
+    simulated = not any(Path(source).is_file() for source in sources.values())
+    files = [("calibration", f"calibrations/{unit.name}.json"), ("result as JSON", "result.json")]
+    if simulated:
+        sources = {name: f"recordings/{unit.name}_{name}.csv" for name in sources}
+    else:
+        files += [(f"recording {name}", Path(source).resolve().as_uri()) for name, source in sources.items()]
+    fitted = [sources[name] for name in unit.fitted]
+    unseen = [f"--hold-out {sources[name]}" for name in unit.judged if name not in unit.fitted]
+    command = " ".join(["smartshoe diagnose", *fitted, *unseen, f"--out diagnosis/{unit.name}"])
+    if simulated:
+        command = f"smartshoe simulate {result.source} --out recordings && {command}"
+    return UnitReport(
+        unit.name,
+        unit.identification.to_dict(),
+        unit.validation,
+        list(unit.recordings.values()),
+        unit.fitted,
+        unit.judged,
+        diagnosed,
+        files,
+        "" if diagnosed else command,
+    )

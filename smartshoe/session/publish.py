@@ -8,7 +8,7 @@ import smartshoe
 from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.logs import write
 from smartshoe.recording import Recording
-from smartshoe.report.page import DiagnosisLink, UnitReport, write_page
+from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.session.analysis import SessionResult
 from smartshoe.session.folder import kept_on_disk
 
@@ -45,6 +45,12 @@ def _write(result: SessionResult, folder: Path) -> dict[str, Path]:
         list(result.recordings),
         list(result.recordings),
         link,
+        [
+            (f"calibration of {plan.unit}", calibration.name),
+            ("result as JSON", "result.json"),
+            *((f"recording {name}", f"recordings/{name}.csv") for name in result.recordings),
+        ],
+        "" if link else f"smartshoe diagnose {' '.join(f'recordings/{name}.csv' for name in result.recordings)}",
     )
     about = (
         f"Pressed by {', '.join(result.recordings)}. Load and reading were put on one time base by the load itself"
@@ -77,4 +83,5 @@ def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | N
         first = next(iter(result.recordings.values()))
         extended = found.calibration(unit=plan.unit, sample_rate_hz=first.sample_rate_hz, created=plan.created)
         extended.save(folder / f"{plan.unit}_extended.json")
-    return DiagnosisLink(found.says, page.relative_to(folder).as_posix())
+    left_n = found.to_dict()["extended"].get("force_rmse_n")
+    return DiagnosisLink(found.says, page.relative_to(folder).as_posix(), left_n)

@@ -38,7 +38,7 @@ def main() -> None:
     """Fork a child for every line of stdin; 0 seconds let it end."""
     # What is imported late is imported here, so that a child's time is the session's.
     import smartshoe.identification
-    import smartshoe.report.page  # noqa: F401
+    import smartshoe.report.calibration  # noqa: F401
 
     print("ready", flush=True)
     for line in sys.stdin:

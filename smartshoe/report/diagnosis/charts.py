@@ -14,7 +14,7 @@ from smartshoe.masks import runs_of
 from smartshoe.protocol import Protocol
 from smartshoe.report.diagnosis.sentences import file_name, share_text, shares, words
 from smartshoe.report.diagnosis.views import Map
-from smartshoe.report.drawing import STYLE, figure_of, svg
+from smartshoe.report.paper.drawing import STYLE, figure_of, svg
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from smartshoe.report.diagnosis.views import (
     spectrum,
     worst_cycle,
 )
-from smartshoe.report.drawing import STYLE, figure_of, svg, thin
+from smartshoe.report.paper.drawing import STYLE, figure_of, svg, thin
 
 Array = NDArray[np.float64]
 

@@ -14,6 +14,7 @@ from smartshoe.diagnosis.result import Cause, Diagnosis
 from smartshoe.report.diagnosis import charts, figures, sentences
 from smartshoe.report.diagnosis.views import Map, by_load_and_rate, by_place_and_cycle, evidence
 from smartshoe.report.numbers import plain
+from smartshoe.report.wording import sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +51,7 @@ def write_diagnosis_page(
     environment = Environment(
         loader=PackageLoader("smartshoe.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters.update(
-        plain=plain, words=sentences.words, sentence=sentences.sentence, fault=sentences.fault_text
-    )
+    environment.filters.update(plain=plain, words=sentences.words, sentence=sentence, fault=sentences.fault_text)
     page = environment.get_template("diagnosis.html").render(
         title=title,
         facts=facts,
@@ -115,7 +114,7 @@ def _card(number: int, cause: Cause) -> Card:
             (sentences.words(name), sentences.parameter_text(parameter), says.get(name, ""))
             for name, parameter in cause.parameters.items()
         ],
-        sentences.sentence(sentences.why_this_one(cause)),
+        sentence(sentences.why_this_one(cause)),
         sentences.neighbours(cause, cause.equivalents),
         sentences.other_rivals(cause),
     )

@@ -13,6 +13,7 @@ from smartshoe.diagnosis.result import Cause, Diagnosis, Standing
 from smartshoe.models.effects import catalogue
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
+from smartshoe.report.wording import sentence
 
 HEADINGS = {
     "adequate": "The simulation is good enough",
@@ -28,15 +29,6 @@ NO_STRUCTURE = "none beyond noise"
 def words(identifier: str) -> str:
     """An identifier as words: ``linear_leak`` as "linear leak"."""
     return identifier.replace("_", " ")
-
-
-def sentence(text: str) -> str:
-    """``text`` with a full stop, and with a capital unless it begins with a name of a file or a recording."""
-    text = text.strip()
-    if not text:
-        return ""
-    begun = text[:1].upper() + text[1:] if text.split(maxsplit=1)[0].rstrip(",:").isalpha() else text
-    return begun if begun.endswith((".", "!", "?")) else f"{begun}."
 
 
 def listed(names: Sequence[str], last: str = "or") -> str:

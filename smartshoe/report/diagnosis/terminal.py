@@ -17,13 +17,13 @@ from smartshoe.report.diagnosis.sentences import (
     how_much,
     listed,
     parameter_text,
-    sentence,
     shares_text,
     sure,
     why_this_one,
     words,
 )
 from smartshoe.report.tables import new_console, table_of
+from smartshoe.report.wording import sentence
 
 MOST_FAULTS = 12
 

@@ -17,7 +17,7 @@ from smartshoe.gait.phases import PHASES
 from smartshoe.gait.result import FootCourse, GaitResult
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
-from smartshoe.report.drawing import STYLE, figure_of, svg, thin
+from smartshoe.report.paper.drawing import STYLE, figure_of, svg, thin
 
 Array = NDArray[np.float64]
 

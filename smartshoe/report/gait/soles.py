@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from smartshoe.gait.insole import OUTLINE, PLACES
 from smartshoe.gait.result import FootCourse, GaitResult
-from smartshoe.report.drawing import STYLE, svg
 from smartshoe.report.gait.figures import FOOT_COLOURS, REGION_COLOURS, TOTAL, main_strides
+from smartshoe.report.paper.drawing import STYLE, svg
 
 Array = NDArray[np.float64]
 

@@ -1,16 +1,19 @@
-"""A unit's figures as SVG texts: signals, loops, the filter's Bode plot, residuals."""
+"""A unit's figures: signals, loops, the filter's Bode plot, residuals."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from smartshoe.loading import by_rate, cycles
 from smartshoe.recording import Recording
-from smartshoe.report.drawing import STYLE, figure_of, svg, thin
+from smartshoe.report.calibration.unit_report import UnitReport
+from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
 from smartshoe.validation import Trace
 
 Array = NDArray[np.float64]
@@ -19,7 +22,7 @@ LOAD, READING, RAW, COMPENSATED = "#1f2937", "#2563eb", "#d97706", "#059669"
 FEWEST = 300
 
 
-def signals(recordings: Sequence[Recording]) -> str:
+def signals(recordings: Sequence[Recording]) -> Figure:
     """Load and reading against time, one column a recording."""
     with mpl.rc_context(STYLE):
         columns = len(recordings)
@@ -35,10 +38,10 @@ def signals(recordings: Sequence[Recording]) -> str:
                     axis.set_ylabel(label)
             axes[column].set_title(recording.name)
             axes[columns + column].set_xlabel("time (s)")
-        return svg(figure)
+        return figure
 
 
-def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> str | None:
+def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> Figure | None:
     """Raw (best static line) and compensated estimate against load at a low and a high rate, as the paper's Fig. 8.
 
     The nearest rates there are; None where the record has no cycle.
@@ -70,12 +73,12 @@ def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.
         axes[0].set_ylabel("estimate (N)")
         axes[len(chosen)].set_ylabel("estimate − load (N)")
         axes[0].legend(loc="upper left")
-        return svg(figure)
+        return figure
 
 
 def bode(
     a1: float, b0: float, b1: float, rate_hz: float, numerator: Sequence[float], denominator: Sequence[float]
-) -> str:
+) -> Figure:
     """Gain and phase of (b0 s + b1)/(s + a1) and of its bilinear filter at ``rate_hz``; gait's band is shaded."""
     frequency = np.geomspace(max(a1 / (2 * np.pi) / 30, 1e-4), 0.499 * rate_hz, 200)
     s = 2j * np.pi * frequency
@@ -99,10 +102,10 @@ def bode(
             axis.set_xlabel("frequency (Hz)")
             axis.set_ylabel(label)
         gain.legend(loc="upper left", fontsize=8)
-        return svg(figure)
+        return figure
 
 
-def residuals(traces: Sequence[Trace]) -> str:
+def residuals(traces: Sequence[Trace]) -> Figure:
     """Compensated force less load, against time and against load."""
     with mpl.rc_context(STYLE):
         figure, (by_time, by_load) = figure_of(9.6, 2.8, 2)
@@ -117,4 +120,23 @@ def residuals(traces: Sequence[Trace]) -> str:
         by_time.set_xlabel("time, recordings one after the other (s)")
         by_time.set_ylabel("compensated − load (N)")
         by_load.set_xlabel("load (N)")
-        return svg(figure)
+        return figure
+
+
+def figures_of(unit: UnitReport) -> Iterator[tuple[str, Figure]]:
+    """The unit's figures by name."""
+    discrete, parameters = unit.identification["discrete"], unit.identification["parameters"]
+    a1, b0, b1 = (parameters[name]["value"] for name in ("a1", "b0", "b1"))
+    yield "signals", signals(unit.recordings)
+    drawn = loops(unit.validation.traces)
+    if drawn is not None:
+        yield "loops", drawn
+    yield "bode", bode(a1, b0, b1, discrete["sample_rate_hz"], discrete["numerator"], discrete["denominator"])
+    yield "residuals", residuals(unit.validation.traces)
+
+
+def write_figures(folder: Path, units: Sequence[UnitReport], ending: str) -> list[Path]:
+    """Write each unit's figures as ``UNIT_WHAT.ending`` (svg, pdf, png) below ``folder``, and return them."""
+    return [
+        save(figure, folder / f"{unit.name}_{what}.{ending}") for unit in units for what, figure in figures_of(unit)
+    ]

@@ -1,14 +1,18 @@
-"""What every figure of a report shares: its look, its thinning, its SVG text."""
+"""What every figure for a paper shares: its look, its thinning, its file."""
 
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from smartshoe.atomic import replacing
 
 Array = NDArray[np.float64]
 
@@ -46,6 +50,17 @@ def svg(figure: Figure) -> str:
     FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
     text = buffer.getvalue()
     return text[text.index("<svg") :]
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write the figure in the format of ``path``'s ending (svg, pdf, png), whole or not at all, and return the path.
+
+    The same bytes every time.
+    """
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(path.suffix[1:])
+    with mpl.rc_context(STYLE), replacing(path) as temporary:
+        figure.savefig(temporary, format=path.suffix[1:], dpi=200, metadata=metadata)
+    return path
 
 
 def figure_of(width: float, height: float, columns: int, rows: int = 1) -> tuple[Figure, list[Any]]:

@@ -1,0 +1,116 @@
+"""The page of a calibration: the verdict first, a card a unit, worst first, and each unit's story below."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from smartshoe.report.calibration import charts, judgement
+from smartshoe.report.calibration.judgement import Judgement
+from smartshoe.report.calibration.unit_report import UnitReport
+from smartshoe.report.charts import Chart
+from smartshoe.report.document import polylines, write_document
+from smartshoe.report.trial import COLUMNS, TrialSection
+
+CARD_WIDTH, CARD_HEIGHT = 120.0, 56.0
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """A unit as the page shows it; ``anchor`` is its place there."""
+
+    unit: UnitReport
+    judged: Judgement
+    anchor: str
+    loop: Markup | None
+    shown: Sequence[Chart]
+    folded: Sequence[Chart]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the unit's story is unfolded from the start."""
+        return self.judged.grade != "good"
+
+    @property
+    def gain_says(self) -> str:
+        """How the corrected error compares with the static line's."""
+        return judgement.against_static(self.unit.validation.overall)
+
+    @property
+    def left_percent(self) -> float:
+        """What is left, in percent of full scale."""
+        return judgement.error_percent(self.unit.validation)
+
+
+def _small_loop(unit: UnitReport, most_n: float) -> Markup | None:
+    """The fastest residual loop without axes, all units on one scale of ``most_n`` newton either way."""
+    found = charts.residual_loop(unit.validation, fastest=True)
+    if found is None:
+        return None
+    _, at_n, errors = found
+    x = CARD_WIDTH * (at_n - at_n[0]) / max(float(np.ptp(at_n)), 1e-12)
+    curves = []
+    for kind in ("raw", "corrected"):
+        around = np.concatenate([errors[f"{kind} up"], errors[f"{kind} down"][::-1], errors[f"{kind} up"][:1]])
+        y = CARD_HEIGHT / 2 * (1 + around / most_n)
+        points = list(zip(np.concatenate([x, x[::-1], x[:1]])[::2].tolist(), y[::2].tolist(), strict=True))
+        curves.append((kind, points))
+    return polylines(
+        [("axis", [(0, CARD_HEIGHT / 2), (CARD_WIDTH, CARD_HEIGHT / 2)]), *curves], CARD_WIDTH, CARD_HEIGHT
+    )
+
+
+def cards(units: Sequence[UnitReport]) -> list[Card]:
+    """A card a unit, worst first, by grade and then by what is left."""
+    loops, errors = charts.common_limits(units)
+    made = []
+    for number, unit in enumerate(units, 1):
+        shown = [
+            charts.error_by_rate(unit, errors),
+            charts.loop_chart(unit, False, loops),
+            charts.loop_chart(unit, True, loops) if len(unit.validation.rates) > 1 else None,
+        ]
+        folded = [charts.signals(unit, recording) for recording in unit.recordings] + [charts.response(unit)]
+        made.append(
+            Card(
+                unit, judgement.judge(unit), f"unit-{number}", _small_loop(unit, loops[1]),
+                [chart for chart in shown if chart is not None], folded,
+            )
+        )  # fmt: skip
+    return sorted(made, key=lambda card: (judgement.WORST_FIRST.index(card.judged.grade), -card.left_percent))
+
+
+def write_page(
+    path: Path,
+    title: str,
+    about: str,
+    facts: Mapping[str, str],
+    units: Sequence[UnitReport],
+    trial: TrialSection | None = None,
+    commands: Sequence[str] = (),
+) -> Path:
+    """Write the report to ``path``, whole or not at all, and return it. ``commands`` made it and what it shows."""
+    made = cards(units)
+    grade, says = judgement.headline([card.judged for card in made])
+    return write_document(
+        path,
+        "calibration.html",
+        {
+            "title": title,
+            "about": about,
+            "facts": facts,
+            "grade": grade,
+            "headline": says,
+            "cards": made,
+            "trial": trial,
+            "trial_columns": COLUMNS,
+            "commands": commands,
+            "good_percent": judgement.GOOD_PERCENT,
+            "bad_percent": judgement.BAD_PERCENT,
+            "loop_percent": judgement.LOOP_PERCENT,
+        },
+    )

@@ -1,0 +1,169 @@
+"""Charts as numbers: what a page draws, reduced to a budget and packed for the browser."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Style = Literal["line", "dashed", "points"]
+
+PAGE_BYTES = 620_000  # of packed numbers on one page, so that page, script and texts stay under a megabyte
+FEWEST_POINTS = 400  # of a line, however many charts share a page
+BYTES_OF_X, BYTES_OF_Y, BASE64 = 4, 2, 4 / 3
+STEPS = 65_000  # of a line's range in its 16-bit numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One line of a chart: ``values`` (n,) over the chart's x; NaN leaves a gap.
+
+    ``colour`` is the name of a colour of the page's style. ``low`` and ``high`` (n,) draw a band about a line and
+    error bars about points.
+    """
+
+    label: str
+    values: Array
+    colour: str
+    style: Style = "line"
+    low: Array | None = None
+    high: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Lines over one vertical scale; ``limits`` fixes it, so that charts beside each other compare."""
+
+    label: str
+    lines: Sequence[Line]
+    limits: tuple[float, float] | None = None
+    height: int = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A span ``start`` to ``end`` of x that is shaded; one line where both are equal."""
+
+    start: float
+    end: float
+    colour: str
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Panels under each other over one ``x`` (n,), ascending.
+
+    ``says`` tells in words what is to be seen: it is the text for those who do not see it. Charts of one ``group``
+    share cursor and zoom. ``dates``: x is in seconds since 1970.
+    """
+
+    title: str
+    says: str
+    x_label: str
+    x: Array
+    panels: Sequence[Panel]
+    group: str = ""
+    log_x: bool = False
+    dates: bool = False
+    marks: Sequence[Mark] = field(default_factory=tuple)
+
+    @property
+    def lines(self) -> list[Line]:
+        """The lines of all panels."""
+        return [line for panel in self.panels for line in panel.lines]
+
+    @property
+    def bytes_of_point(self) -> float:
+        """What one x and all that stands over it takes on the page."""
+        columns = sum(1 + (line.low is not None) + (line.high is not None) for line in self.lines)
+        return (BYTES_OF_X + BYTES_OF_Y * columns) * BASE64
+
+
+def reduced(x: Array, signals: Sequence[Array], most: int) -> NDArray[np.intp]:
+    """Indices of at most about ``most`` samples that keep each stretch's extremes of every signal."""
+    if x.size <= most:
+        return np.arange(x.size)
+    block = -(-x.size * 2 * len(signals) // most)
+    count = x.size // block
+    start = np.arange(count) * block
+    chosen = [np.array([0, x.size - 1])]
+    for signal in signals:
+        cut = np.where(np.isfinite(signal), signal, 0.0)[: count * block].reshape(count, block)
+        chosen += [start + cut.argmin(axis=1), start + cut.argmax(axis=1)]
+    return np.unique(np.concatenate(chosen))
+
+
+def shares(charts: Sequence[Chart], page_bytes: float = PAGE_BYTES) -> list[int]:
+    """How many points each chart may keep: those that need less leave the rest to the others."""
+    allowed = [0] * len(charts)
+    left = page_bytes
+    order = sorted(range(len(charts)), key=lambda k: charts[k].x.size * charts[k].bytes_of_point)
+    for done, k in enumerate(order):
+        each = charts[k].bytes_of_point
+        allowed[k] = min(charts[k].x.size, max(FEWEST_POINTS, int(left / (len(order) - done) / each)))
+        left -= allowed[k] * each
+    return allowed
+
+
+def _text(values: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def _packed(values: Array) -> dict[str, Any]:
+    """(n,) as 16-bit steps over its range; the lowest integer marks what is missing."""
+    there = np.isfinite(values)
+    low, high = (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
+    step = (high - low) / STEPS or 1.0
+    steps = np.full(values.size, -32768, dtype="<i2")
+    middle = 0.5 * low + 0.5 * high
+    steps[there] = np.round((values[there] - middle) / step).astype("<i2")
+    return {"middle": middle, "step": step, "steps": _text(steps)}
+
+
+def _line(line: Line, index: NDArray[np.intp]) -> dict[str, Any]:
+    packed: dict[str, Any] = {"label": line.label, "colour": line.colour, "style": line.style}
+    packed["y"] = _packed(line.values[index])
+    for name, values in (("low", line.low), ("high", line.high)):
+        if values is not None:
+            packed[name] = _packed(values[index])
+    return packed
+
+
+def packed(chart: Chart, most: int) -> dict[str, Any]:
+    """The chart as the page's script reads it, with at most about ``most`` points."""
+    index = reduced(chart.x, [line.values for line in chart.lines], most)
+    x0 = float(chart.x[0]) if chart.x.size else 0.0
+    return {
+        "title": chart.title,
+        "xLabel": chart.x_label,
+        "x0": x0,
+        "x": _text((chart.x[index] - x0).astype("<f4")),
+        "of": int(chart.x.size),
+        "group": chart.group,
+        "logX": chart.log_x,
+        "dates": chart.dates,
+        "marks": [[mark.start, mark.end, mark.colour, mark.label] for mark in chart.marks],
+        "panels": [
+            {
+                "label": panel.label,
+                "limits": panel.limits,
+                "height": panel.height,
+                "lines": [_line(line, index) for line in panel.lines],
+            }
+            for panel in chart.panels
+        ],
+    }
+
+
+def script_text(charts: Sequence[Chart]) -> str:
+    """All charts as JSON that may stand inside a script element."""
+    allowed = shares(charts)
+    text = json.dumps([packed(c, most) for c, most in zip(charts, allowed, strict=True)], allow_nan=False)
+    return text.replace("<", "\\u003c")
