@@ -96,43 +96,82 @@ def test_a_curve_rises_between_fixed_ends_with_the_slope_that_its_weights_say(na
     assert np.diff(out[-199:]) == pytest.approx(1e-3 * slope[-1] / summed[-1])
 
 
+def scale_of(kind: str, load: Array) -> Array:
+    """What the friction is even over: the load, or a logarithm of it, in proportion to load + 0.2."""
+    return load if kind == "even" else np.sign(load) * np.log(1.0 + np.abs(load) / 0.2) / np.log(6.0)
+
+
+def one_bank(kind: str, seed: int) -> tuple[Array, Array]:
+    """Drawn weights of one operator, and all of the block's, the other's null."""
+    weights = within_bounds(effect("flexible_loop"), seed)[: HALF_WIDTHS.size]
+    null = np.zeros_like(weights)
+    return weights, np.concatenate([weights, null] if kind == "even" else [null, weights])
+
+
+KINDS = ("even", "growing")
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @given(seed=seeds)
-@settings(max_examples=25)
-def test_a_loop_loses_the_shares_of_slope_that_its_weights_say_after_each_reversal(seed: int) -> None:
-    weights = within_bounds(effect("flexible_loop"), seed)
-    load = np.concatenate([np.linspace(0.0, 1.0, 1001), np.linspace(1.0, 0.1, 901)[1:]])
+@settings(max_examples=15)
+def test_a_loop_loses_the_shares_of_slope_that_its_weights_say_after_each_reversal(kind: str, seed: int) -> None:
+    weights, values = one_bank(kind, seed)
+    x = np.concatenate([np.linspace(0.0, 1.0, 1001), np.linspace(1.0, 0.1, 901)[1:]])
+    load = x if kind == "even" else 0.2 * (6.0**x - 1.0)
     at = Conditions(STEP_S * np.arange(load.size), load, STEP_S)
-    slope = np.diff(effect("flexible_loop").apply(load, at, weights)) / np.diff(load)
+    slope = np.diff(scale_of(kind, effect("flexible_loop").apply(load, at, values))) / np.diff(x)
     past = np.concatenate([np.arange(1000), np.arange(900)]) * 1e-3 + 5e-4  # the reversal, at the middle of each step
     ranges = np.searchsorted(2.0 * HALF_WIDTHS, past)
     clear = np.min(np.abs(past[:, None] - 2.0 * HALF_WIDTHS), axis=1) > 1e-3
     assert slope[clear] == pytest.approx(1.0 - np.append(weights, 0.0)[ranges[clear]], abs=1e-9)
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @given(seed=seeds)
-@settings(max_examples=10)
-def test_a_loop_is_the_sum_of_its_plays(seed: int) -> None:
-    at, weights = loading(seed), within_bounds(effect("flexible_loop"), seed)
+@settings(max_examples=8)
+def test_a_loop_is_the_sum_of_its_plays(kind: str, seed: int) -> None:
+    at = loading(seed)
+    weights, values = one_bank(kind, seed)
+    x = scale_of(kind, at.load)
     friction = []
     for width in HALF_WIDTHS:
         place, along = width, []
-        for load in at.load:
+        for load in x:
             place = min(max(place, load - width), load + width)
             along.append(load - place + width)
         friction.append(along)
-    expected = at.load - weights @ np.diff(np.array(friction), axis=0, prepend=0.0)
-    assert effect("flexible_loop").apply(at.load, at, weights) == pytest.approx(expected, abs=1e-12)
+    expected = x - weights @ np.diff(np.array(friction), axis=0, prepend=0.0)
+    out = effect("flexible_loop").apply(at.load, at, values)
+    assert scale_of(kind, out) == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_loop_closes_without_load_and_holds_still_against_noise() -> None:
-    one, weights = effect("flexible_loop"), np.full(6, 0.3)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_loop_closes_without_load_and_holds_still_against_noise(kind: str) -> None:
+    one, null, lost = effect("flexible_loop"), np.zeros(HALF_WIDTHS.size), np.full(HALF_WIDTHS.size, 0.3)
+    values = np.concatenate([lost, null] if kind == "even" else [null, lost])
     load = np.interp(np.arange(400), [0, 100, 200, 300, 399], [0.0, 1.0, 0.0, 0.5, 0.0])
-    out = one.apply(load, Conditions(STEP_S * np.arange(400), load, STEP_S), weights)
+    out = one.apply(load, Conditions(STEP_S * np.arange(400), load, STEP_S), values)
     assert out[[0, 200, 399]] == pytest.approx(0.0, abs=1e-12)
+    assert np.all(out[101:200] > out[99:0:-1])  # unloading above loading, at the same load
     noisy = 0.5 + 0.004 * np.random.default_rng(1).standard_normal(5000)
     hold = Conditions(STEP_S * np.arange(5000), noisy, STEP_S, load_noise=0.004)
-    drift = one.apply(noisy, hold, weights) - noisy * (1.0 - 0.3)  # within a reversal of every play
-    assert np.ptp(drift[1000:]) < 1e-9
+    moved = scale_of(kind, one.apply(noisy, hold, values)) - 0.7 * scale_of(kind, noisy)  # within every reversal
+    assert np.ptp(moved[1000:]) < 1e-9
+
+
+def test_friction_that_grows_with_load_makes_wider_loops_at_higher_loads() -> None:
+    one, count = effect("flexible_loop"), HALF_WIDTHS.size
+
+    def height(kind: str, low: float) -> float:
+        lost = np.zeros((2, count))
+        lost[KINDS.index(kind), :2] = 0.3
+        load = np.interp(np.arange(500), [0, 100, 200, 300, 400, 499], [0, low + 0.3, low, low + 0.3, low, low])
+        out = one.apply(load, Conditions(STEP_S * np.arange(500), load, STEP_S), lost.ravel())
+        return float(out[350] - out[250])  # at the middle of the load, down and up
+
+    assert height("even", 0.0) > 0.01
+    assert height("even", 0.7) == pytest.approx(height("even", 0.0), rel=1e-9)
+    assert height("growing", 0.7) > 1.5 * height("growing", 0.0)
 
 
 @given(seed=seeds, share=st.floats(1e-3, 5.0), rate_per_s=st.floats(0.01, 50.0))
