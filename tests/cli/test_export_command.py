@@ -24,6 +24,7 @@ def calibration(tmp_path: Path) -> str:
         ("c", {"smartshoe_filter.h", "smartshoe_filter.c", "smartshoe_filter_test.c", "smartshoe_filter_test.csv"}),
         ("matlab", {"smartshoe_filter.m", "smartshoe_filter_test.m", "smartshoe_filter_test.csv"}),
         ("json", {"smartshoe_filter.json"}),
+        ("fmu", {"smartshoe_filter.fmu"}),
     ],
 )
 def test_each_target_writes_its_files_and_lists_them(
@@ -46,6 +47,7 @@ def test_each_target_writes_its_files_and_lists_them(
         (["--to", "c", "--precision", "half"], "half"),
         (["--to", "json", "--precision", "float"], "json"),
         (["--to", "json", "--fixed", "q15"], "q15"),
+        (["--to", "c", "--twin"], "--twin"),
         (["--to", "c", "--fixed", "q7"], "q7"),
         (["--to", "c", "--name", "left toe"], "left toe"),
     ],

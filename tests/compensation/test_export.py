@@ -196,7 +196,7 @@ def test_octave_passes_the_self_check(tmp_path: Path) -> None:
     assert done.stdout.startswith("passed")
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", [target for target in TARGETS if target != "fmu"])
 def test_every_file_says_where_it_comes_from(target: str) -> None:
     for text in export_files(LEFT_TOE, target, sample_rate_hz=50.0).values():
         for word in ("left_toe", "50.0 Hz", "0123abcd", "mbar", "smartshoe 0"):

@@ -1,4 +1,4 @@
-"""A calibration's filter for firmware and other tools: C99, MATLAB/Octave, JSON, each with a test vector.
+"""A calibration's filter for firmware and other tools: C99, MATLAB/Octave, JSON, FMI 3.0 (`fmu`).
 
 A target is a function that takes a `FilterModel` and gives its files; the model's ``kind`` names the templates, so a
 further kind of model is a further `FilterModel` and its templates, and no change here.
@@ -15,14 +15,17 @@ from typing import Literal, get_args
 from smartshoe.atomic import make_folder, replacing
 from smartshoe.compensation.calibration import Calibration
 from smartshoe.compensation.export.c99 import c_files
+from smartshoe.compensation.export.fmu import fmu_files, twin_files
 from smartshoe.compensation.export.json_file import json_files
 from smartshoe.compensation.export.matlab import matlab_files
 from smartshoe.compensation.export.model import FilterModel
-from smartshoe.compensation.export.names import DEFAULT_NAME, names_of
+from smartshoe.compensation.export.names import DEFAULT_NAME, TWIN_NAME, names_of
+from smartshoe.compensation.export.twin import TwinModel
 from smartshoe.errors import UsageError
 
 Precision = Literal["double", "float"]
 Fixed = Literal["q15", "q31"]
+Files = Mapping[str, str | bytes]
 
 
 @dataclass(frozen=True)
@@ -34,10 +37,11 @@ class Arithmetic:
     apart: bool = False
 
 
-_TARGETS: Mapping[str, Callable[[FilterModel, Arithmetic], dict[str, str]]] = {
+_TARGETS: Mapping[str, Callable[[FilterModel, Arithmetic], Files]] = {
     "c": lambda model, a: c_files(model, a.precision, a.fixed, apart=a.apart),
     "matlab": lambda model, _: matlab_files(model),
     "json": lambda model, _: json_files(model),
+    "fmu": lambda model, _: fmu_files(model),
 }
 TARGETS = tuple(_TARGETS)
 
@@ -50,7 +54,7 @@ def export_files(
     precision: str = "double",
     fixed: str | None = None,
     name: str = DEFAULT_NAME,
-) -> dict[str, str]:
+) -> Files:
     """File name to text of ``calibration``'s filter for target ``to``, at its own rate where none is given.
 
     ``precision`` is that of the C code, ``fixed`` ("q15", "q31") its integer arithmetic in place of it; ``name`` is
@@ -70,7 +74,7 @@ def export_shoe(
     precision: str = "double",
     fixed: str | None = None,
     names: Sequence[str] = (),
-) -> dict[str, str]:
+) -> Files:
     """As `export_files`, for several units whose C links into one program: file name to text.
 
     ``names``: a name each, or one that goes before the units' names, or none: then the units' names (of a single
@@ -89,14 +93,29 @@ def export_shoe(
         against = "--precision float" if to == "c" else f"target {to}"
         raise UsageError(f"fixed point {fixed} is for target c without --precision, not for {against}: leave it away")
     arithmetic = Arithmetic(precision, fixed, apart=len(calibrations) > 1)
-    found: dict[str, str] = {}
+    found: dict[str, str | bytes] = {}
     for calibration, name in zip(calibrations, names_of(calibrations, names), strict=True):
         found |= _TARGETS[to](FilterModel.of(calibration, sample_rate_hz, name), arithmetic)
     return found
 
 
-def write_files(files: Mapping[str, str], folder: Path | str, *, force: bool = False) -> list[Path]:
-    """Write ``files`` (name to text) into ``folder``, made where it is missing: all of them or none.
+def export_twins(
+    calibrations: Sequence[Calibration], *, sample_rate_hz: float | None = None, names: Sequence[str] = ()
+) -> Files:
+    """The units themselves as FMI 3.0 units, load in and reading out: file name to bytes.
+
+    ``names`` as for `export_shoe`, the default ``smartshoe_twin``. Raises `UsageError` for an effect that is not
+    written forward, `InputError` for coefficients that are no passive solid.
+    """
+    found: dict[str, str | bytes] = {}
+    for calibration, name in zip(calibrations, names_of(calibrations, names, TWIN_NAME), strict=True):
+        rate_hz = FilterModel.of(calibration, sample_rate_hz).sample_rate_hz
+        found |= twin_files(TwinModel(calibration, rate_hz, name))
+    return found
+
+
+def write_files(files: Mapping[str, str | bytes], folder: Path | str, *, force: bool = False) -> list[Path]:
+    """Write ``files`` (name to text or bytes) into ``folder``, made where it is missing: all of them or none.
 
     Raises `UsageError` naming a file that is there already, unless ``force`` allows it to be replaced.
     """
@@ -108,9 +127,10 @@ def write_files(files: Mapping[str, str], folder: Path | str, *, force: bool = F
     for place in dict.fromkeys(path.parent for path in paths):
         make_folder(place)
     with ExitStack() as stack:
-        for path, text in zip(paths, files.values(), strict=True):
-            stack.enter_context(replacing(path)).write_text(text, encoding="utf-8", newline="\n")
+        for path, content in zip(paths, files.values(), strict=True):
+            # Text as it is: no line ending of the platform's.
+            stack.enter_context(replacing(path)).write_bytes(content.encode() if isinstance(content, str) else content)
     return paths
 
 
-__all__ = ["TARGETS", "FilterModel", "Fixed", "Precision", "export_files", "export_shoe", "write_files"]
+__all__ = ["TARGETS", "FilterModel", "Fixed", "Precision", "export_files", "export_shoe", "export_twins", "write_files"]

@@ -6,9 +6,8 @@ import numpy as np
 
 from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
 from smartshoe.compensation.export.rendering import finite_or, render, vector_csv
+from smartshoe.compensation.export.twin import SHIFTS
 from smartshoe.errors import UsageError
-
-SHIFTS = ("zero_offset", "load_cell_tare")
 
 
 def matlab_files(model: FilterModel) -> dict[str, str]:

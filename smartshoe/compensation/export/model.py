@@ -116,30 +116,16 @@ class FilterModel:
     @property
     def provenance(self) -> dict[str, str]:
         """What a reader of the file must know of its origin, key to one line of text."""
-        import smartshoe
-
         calibration = self.calibration
-        low_high = calibration.load_range_n
-        rates = calibration.rate_range_n_per_s
-        said = {
-            "unit": calibration.unit or "(unnamed)",
-            "reading": f"{calibration.reading_unit.symbol}, offset {calibration.offset!r} (taken off by the filter)",
-            "force": "N, compression positive",
-            "sample rate": f"{self.sample_rate_hz!r} Hz: call once a sample at this rate and no other",
-            "model": f"force = (b0 s + b1)/(s + a1) (reading - offset), a1 = {calibration.a1!r} 1/s,"
-            f" b0 = {calibration.b0!r}, b1 = {calibration.b1!r} 1/s, bilinear transform",
-            "calibrated load": "not known" if low_high is None else f"{low_high[0]:g} to {low_high[1]:g} N",
-            "loading rates": "not known" if rates is None else f"{rates[0]:g} to {rates[1]:g} N/s",
-            "delay": f"{calibration.delay_s:g} s between the reading and load logs, not compensated",
-            "calibrated": calibration.created or "date not known",
-            "identified by": f"smartshoe {calibration.smartshoe_version or '(version not known)'}",
-            "exported by": f"smartshoe {smartshoe.__version__}",
-        }
-        for number, source in enumerate(calibration.sources, start=1):
-            said[f"source {number}"] = (
-                f"{source.get('name') or '(unnamed)'}, sha256 {source.get('sha256') or 'not known'}"
-            )
-        return {key: one_safe_line(text) for key, text in said.items()}
+        found = origin(calibration, self.sample_rate_hz)
+        found["reading"] = one_safe_line(
+            f"{calibration.reading_unit.symbol}, offset {calibration.offset!r} (taken off by the filter)"
+        )
+        found["model"] = (
+            f"force = (b0 s + b1)/(s + a1) (reading - offset), a1 = {calibration.a1!r} 1/s,"
+            f" b0 = {calibration.b0!r}, b1 = {calibration.b1!r} 1/s, bilinear transform"
+        )
+        return found
 
 
 @dataclass(frozen=True)
@@ -192,3 +178,27 @@ def one_safe_line(text: str) -> str:
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
     # A slash or star after the other, and ??/ (a trigraph for the backslash), mean something in a C comment.
     return line.replace("/*", "/ *").replace("*/", "* /").replace("\\", "/").replace("??", "? ?").replace("/*", "/ *")
+
+
+def origin(calibration: Calibration, sample_rate_hz: float) -> dict[str, str]:
+    """Where a calibration comes from and what it holds for, key to one line of text; "model" is for the caller."""
+    import smartshoe
+
+    low_high = calibration.load_range_n
+    rates = calibration.rate_range_n_per_s
+    said = {
+        "unit": calibration.unit or "(unnamed)",
+        "reading": calibration.reading_unit.symbol,
+        "force": "N, compression positive",
+        "sample rate": f"{sample_rate_hz!r} Hz: call once a sample at this rate and no other",
+        "model": "",
+        "calibrated load": "not known" if low_high is None else f"{low_high[0]:g} to {low_high[1]:g} N",
+        "loading rates": "not known" if rates is None else f"{rates[0]:g} to {rates[1]:g} N/s",
+        "delay": f"{calibration.delay_s:g} s between the reading and load logs, not compensated",
+        "calibrated": calibration.created or "date not known",
+        "identified by": f"smartshoe {calibration.smartshoe_version or '(version not known)'}",
+        "exported by": f"smartshoe {smartshoe.__version__}",
+    }
+    for number, source in enumerate(calibration.sources, start=1):
+        said[f"source {number}"] = f"{source.get('name') or '(unnamed)'}, sha256 {source.get('sha256') or 'not known'}"
+    return {key: one_safe_line(text) for key, text in said.items()}

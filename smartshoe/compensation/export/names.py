@@ -9,6 +9,7 @@ from smartshoe.compensation.calibration import Calibration
 from smartshoe.errors import UsageError
 
 DEFAULT_NAME = "smartshoe_filter"
+TWIN_NAME = "smartshoe_twin"
 LONGEST = 63  # what C99 and MATLAB both tell apart
 
 # C99 6.4.1 and C++ keywords that C lacks, MATLAB's keywords, and names that the C code itself uses.
@@ -27,17 +28,19 @@ _HEADERS = """
 _TAKEN = frozenset(f"{_KEYWORDS} {_HEADERS}".split())
 
 
-def names_of(calibrations: Sequence[Calibration], given: Sequence[str] = ()) -> tuple[str, ...]:
+def names_of(
+    calibrations: Sequence[Calibration], given: Sequence[str] = (), default: str = DEFAULT_NAME
+) -> tuple[str, ...]:
     """One name a calibration, ``given`` by the user or made of the units' names.
 
-    One calibration: the name given, else `DEFAULT_NAME`. Several: a name each, or one that goes before the unit's
+    One calibration: the name given, else ``default``. Several: a name each, or one that goes before the unit's
     name, or the units' names. Raises `UsageError` for a name that C or MATLAB cannot use, and where two are alike.
     """
     count = len(calibrations)
     if len(given) not in (0, 1, count):
         raise UsageError(f"--name is given {len(given)} times for {count} calibrations: give it once, or once for each")
     if count == 1:
-        found = tuple(given) or (DEFAULT_NAME,)
+        found = tuple(given) or (default,)
     elif len(given) == count:
         found = tuple(given)
     else:

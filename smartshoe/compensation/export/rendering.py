@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,19 @@ from numpy.typing import NDArray
 from smartshoe.compensation.export.model import FilterModel
 
 
-def render(template: str, model: FilterModel, **values: Any) -> str:
+class Named(Protocol):
+    """What every template says of its model."""
+
+    @property
+    def name(self) -> str:
+        """Of files and symbols."""
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Key to one line of text."""
+
+
+def render(template: str, model: Named, **values: Any) -> str:
     """The text of ``templates/template`` for ``model``; a value that it lacks is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
