@@ -15,7 +15,8 @@ import numpy as np
 
 from simulators import hidden_protocols, presets
 from simulators.hidden_effects import EFFECTS, SHARE_OF_RANGE, Hideable, Options, Subject, merged
-from simulators.scaling import SILENT, HiddenEffect, machine_of, scaled
+from simulators.hidden_machine import machine_of
+from simulators.scaling import SILENT, HiddenEffect, scaled
 from smartshoe.errors import UsageError
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
@@ -92,7 +93,7 @@ def hide(
     noise = noise if noise_percent_fs is None else noise_percent_fs
     share = share if coloured_share is None else coloured_share
     plans = _protocols(protocol, np.random.default_rng([seed, 3]), count, hold_out)
-    subject = _subject(rng, unit, plans[0].duration_s, "second_relaxation" in asked)
+    subject = drawn_subject(rng, unit, plans[0].duration_s, "second_relaxation" in asked)
     load_noise_n, colour_s = float(rng.uniform(0.3, 0.8)), float(np.exp(rng.uniform(np.log(0.03), np.log(0.5))))
     logger = {"daq": {"sample_rate_hz": sample_rate_hz}}
 
@@ -105,10 +106,10 @@ def hide(
         found.append(effect)
         if name == "gas_compression":
             subject = replace(subject, range_mbar=overlay["sensor"]["range_mbar"])
-    annoyances = _nuisances(rng, nuisances, {e.family for e in found}, subject, plans[0], seed, logger)
+    annoyances = small_effects(rng, nuisances, {e.family for e in found}, subject, plans[0], seed, logger)
 
     small = [overlay for overlay, _ in annoyances.values()]
-    noisy = merged({"load_noise_n": load_noise_n}, _noise(noise, share, colour_s, {e.name for e in found}))
+    noisy = merged({"load_noise_n": load_noise_n}, noise_options(noise, share, colour_s, {e.name for e in found}))
     clean = merged(subject.options(), logger, *small, SILENT)
     # A hidden kind of noise lies over the base noise.
     whole = merged(subject.options(), logger, *small, noisy, *overlays)
@@ -155,7 +156,7 @@ def _protocols(protocol: str | Protocol, rng: np.random.Generator, fitted: int, 
     return tuple(replace(p, name=f"{p.name}_{k + 1}") for k, p in enumerate(built))
 
 
-def _subject(rng: np.random.Generator, unit: str | None, duration_s: float, strong_arm: bool) -> Subject:
+def drawn_subject(rng: np.random.Generator, unit: str | None, duration_s: float, strong_arm: bool) -> Subject:
     """The unit; ``strong_arm``: beside a weak arm a second one is taken for it, and leaves little."""
     names = sorted(presets.TABLE_1)
     drawn = names[int(rng.integers(len(names)))]
@@ -170,7 +171,7 @@ def _subject(rng: np.random.Generator, unit: str | None, duration_s: float, stro
     return Subject(drawn, k1, k2, c, range_mbar, duration_s)
 
 
-def _noise(noise: float, share: float, colour_s: float, hidden: set[str]) -> Options:
+def noise_options(noise: float, share: float, colour_s: float, hidden: set[str]) -> Options:
     """White and coloured noise of the reading; a hidden kind of noise takes the coloured part's place."""
     if hidden & {"coloured_noise", "heteroscedastic_noise"}:
         share = 0.0
@@ -182,7 +183,7 @@ def _noise(noise: float, share: float, colour_s: float, hidden: set[str]) -> Opt
     return {"sensor": sensor, "daq": {}}
 
 
-def _nuisances(
+def small_effects(
     rng: np.random.Generator,
     count: int,
     families: set[str],

@@ -121,10 +121,81 @@ def idle(rng: np.random.Generator, other: bool) -> list[Segment]:
     return [Segment("rest", 0.0, 120.0), *triangles, Segment("rest", 0.0, 120.0)]
 
 
+def staircase(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Eight levels of the paper's static protocol; ``other``: seven between them, in another order."""
+    loads = np.arange(100.0, 801.0, 100.0)
+    levels = rng.permutation(loads[:-1] + 50.0) if other else loads
+    return list(static_protocol([float(x) for x in levels], rate_n_per_s=100.0, approach_s=2.0).segments)
+
+
+def holds(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Holds of 3 to 24 s at levels in random order, at mixed rates, rests of 2 to 14 s after two in three."""
+    segments = [Segment("rest", 0.0, 5.0)]
+    load = 0.0
+    levels = rng.permutation(np.linspace(100.0, 0.97 * PEAK_N, 9 if other else 11))
+    for k, level in enumerate(levels):
+        to_n, rate = float(level), float(rng.choice([60.0, 200.0, 500.0, 1200.0]))
+        segments += [
+            Segment("ramp", to_n, max(abs(to_n - load), 1.0) / rate),
+            Segment("hold", to_n, float(rng.choice([3.0, 6.0, 12.0, 24.0]))),
+        ]
+        load = to_n
+        if rng.random() < 0.65 or k == len(levels) - 1:
+            segments += [
+                Segment("ramp", 0.0, load / float(rng.choice([120.0, 400.0, 1200.0]))),
+                Segment("rest", 0.0, float(rng.choice([2.0, 4.0, 8.0, 14.0]))),
+            ]
+            load = 0.0
+    return segments
+
+
+def recovery(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Idle, a long hold and a long rest, two shorter ones at other loads, three triangles."""
+    loads = rng.permutation([0.9 * PEAK_N, 0.6 * PEAK_N, 0.35 * PEAK_N])
+    segments = [Segment("rest", 0.0, 15.0)]
+    for load_n, hold_s, rest_s in zip(loads, (50, 30, 20) if other else (80, 30, 30), (40, 20, 20), strict=True):
+        segments += _hold(float(load_n), float(hold_s), float(rest_s), float(rng.choice([200.0, 600.0])))
+    return segments + _triangles([PEAK_N] * 3, 400.0, 3.0)
+
+
+def walking(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Bouts of steps of two humps, 0.8 to 1.1 a second, with standing and rests between them."""
+    humps = np.array([0.35, 0.82, 1.0, 0.9, 0.74, 0.7, 0.8, 0.97, 0.9, 0.55, 0.2, 0.0])
+    segments = [Segment("rest", 0.0, 4.0)]
+    for bout in range(4 if other else 3):
+        stride_s = 1.0 / rng.uniform(0.8, 1.1)
+        for _ in range(int(rng.integers(10, 16))):
+            height_n, own_s = PEAK_N * rng.uniform(0.6, 1.0), stride_s * rng.uniform(0.95, 1.05)
+            segments += [Segment("ramp", float(height_n * h), 0.6 * own_s / humps.size) for h in humps]
+            segments.append(Segment("rest", 0.0, 0.4 * own_s))
+        segments.append(Segment("rest", 0.0, 3.0))
+        if bout % 2 == 0:
+            segments += _hold(float(PEAK_N * rng.uniform(0.35, 0.6)), float(rng.uniform(10, 18)), 6.0, 500.0)
+    return segments
+
+
+def mixed(rng: np.random.Generator, other: bool) -> list[Segment]:
+    """Ramps to random loads at random rates, some held, some not back to zero."""
+    segments = [Segment("rest", 0.0, 5.0)]
+    load = 0.0
+    for k in range(16 if other else 20):
+        rate = float(np.exp(rng.uniform(np.log(50.0), np.log(900.0))))
+        to_n = float(rng.uniform(0.3, 1.0) * PEAK_N)
+        segments.append(Segment("ramp", to_n, max(abs(to_n - load), 1.0) / rate))
+        if rng.random() < 0.45:
+            segments.append(Segment("hold", to_n, float(rng.uniform(1.0, 12.0))))
+        load = float(rng.uniform(0.04, 0.2) * PEAK_N) if rng.random() < 0.3 and k < 15 else 0.0
+        segments.append(Segment("ramp", load, (to_n - load) / float(rng.choice([100.0, 300.0, 800.0]))))
+        if load == 0.0 and rng.random() < 0.6:
+            segments.append(Segment("rest", 0.0, float(rng.uniform(1.0, 8.0))))
+    return [*segments, Segment("ramp", 0.0, max(load, 1.0) / 200.0), Segment("rest", 0.0, 6.0)]
+
+
 PROTOCOLS: dict[str, Callable[[np.random.Generator, bool], list[Segment]]] = {
     f.__name__: f
     for f in (
-        rates, rates_and_holds, static, single_rate, shuffled, long_hold, step, multisine, minor_loops, idle,
+        rates, rates_and_holds, static, single_rate, shuffled, long_hold, step, multisine, minor_loops, idle, staircase,
+        holds, recovery, walking, mixed,
     )
 }  # fmt: skip
 
@@ -132,3 +203,24 @@ PROTOCOLS: dict[str, Callable[[np.random.Generator, bool], list[Segment]]] = {
 def build(name: str, rng: np.random.Generator, other: bool = False) -> Protocol:
     """The named protocol; ``other`` is its variant for holding out."""
     return Protocol(name, tuple(PROTOCOLS[name](rng, other)))
+
+
+def never_unloaded(protocol: Protocol, floor_n: float, before_s: float = 60.0) -> Protocol:
+    """The protocol over a load that is never left, after ``before_s`` under it (what is before a record begins)."""
+    share = 1.0 - floor_n / max(protocol.peak_load_n, floor_n)
+    lifted = tuple(
+        Segment("hold" if s.kind == "rest" else s.kind, floor_n + share * s.load_n, s.duration_s)
+        for s in protocol.segments
+    )
+    return Protocol(protocol.name, (*_before(floor_n, before_s), *lifted))
+
+
+def begun_loaded(protocol: Protocol, floor_n: float, before_s: float = 60.0) -> Protocol:
+    """The protocol after ``before_s`` under a load that its first rest still has."""
+    first, *rest = protocol.segments
+    start = Segment("hold", floor_n, max(first.duration_s, 1.0)) if first.load_n == 0.0 else first
+    return Protocol(protocol.name, (*_before(floor_n, before_s), start, Segment("ramp", 0.0, 1.0), *rest))
+
+
+def _before(load_n: float, before_s: float) -> tuple[Segment, ...]:
+    return Segment("ramp", load_n, 2.0), Segment("hold", load_n, before_s - 2.0)

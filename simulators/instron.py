@@ -183,7 +183,7 @@ class SimulatedInstron(TestMachine):
         neighbour = self.parameters.neighbour
         if neighbour.logged or neighbour.cross_talk != 0:
             neighbour_pa = neighbour.pressure_pa(time_s, self._room_rng)
-            felt_pa = pressure_pa + neighbour.cross_talk * neighbour_pa
+            felt_pa = pressure_pa + neighbour.added_pa(neighbour_pa, rate)
         reading_v = sensor.read(felt_pa, rate, self.parameters.room.warmer_k(time_s))
         truth = Truth(time_s, command_n, load_n, pressure_pa, reading_v, bladder.deformation, neighbour_pa)
         self.truth = truth

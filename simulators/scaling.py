@@ -10,9 +10,8 @@ import numpy as np
 
 from simulators.baseline import left_over
 from simulators.hidden_effects import SHARE_OF_RANGE, Hideable, Options, Subject, merged
-from simulators.hidden_truths import catalogue_parameters
+from simulators.hidden_machine import machine_of
 from simulators.instron import SimulatedInstron
-from simulators.provider import provider
 from smartshoe.protocol import Protocol
 
 Trial = Callable[[float], tuple[float, bool]]
@@ -28,7 +27,7 @@ class HiddenEffect:
 
     ``parameters`` are the truth's own, by their place in the machine's options (``bladder.contact.gap_n``);
     ``catalogue`` are those that an equation of the catalogue would have, as far as the two compare
-    (`simulators.hidden_truths`);
+    (`simulators.hidden_effects`);
     ``strength_percent_fs`` is the one reached, ``asked_percent_fs`` the one asked for; ``note`` says why where the
     two differ by more than a twentieth.
     """
@@ -44,10 +43,6 @@ class HiddenEffect:
     note: str = ""
 
 
-def machine_of(options: Options, seed: int) -> SimulatedInstron:
-    return provider.open_machine("instron", options, np.random.default_rng([seed, 2]))
-
-
 def scaled(
     effect: Hideable, asked: float, subject: Subject, protocol: Protocol, seed: int, logger: Options
 ) -> tuple[Options, HiddenEffect]:
@@ -61,7 +56,7 @@ def scaled(
         given = merged(subject.options(), logger, options(amount), SILENT)
         return _strength(given, subject, effect, protocol, seed)
 
-    amount, reached, note = _search(strength, asked, effect)
+    amount, reached, note = search(strength, asked, effect)
     return options(amount), HiddenEffect(
         name=effect.name,
         family=effect.family,
@@ -70,7 +65,7 @@ def scaled(
         asked_percent_fs=asked,
         strength_percent_fs=reached,
         parameters=_flat(options(amount)),
-        catalogue=catalogue_parameters(effect.name, amount, draws, subject, logger["daq"]["sample_rate_hz"]),
+        catalogue=effect.catalogue(amount, draws, subject, logger["daq"]["sample_rate_hz"]),
         note=note,
     )
 
@@ -81,20 +76,24 @@ def _strength(
     """Strength in percent of full scale of the unit with ``options``, and whether the sensor's output was clipped."""
     with machine_of(options, seed) as machine:
         recording = machine.run(protocol)
-        truth = machine.truth
-        sensor = machine.specimen.sensor.parameters
+        clipped = clipped_at_an_end(machine)
     load_n = recording.force_n
     reading = recording["pressure"].with_nan()
     full_scale = SHARE_OF_RANGE * float(options["sensor"]["range_mbar"])
     left = left_over(load_n, reading, recording.sample_time_s, constant=not effect.needs_zero)
-    clipped = False
-    if truth is not None:
-        share = (truth.reading_v - sensor.unloaded_v) / sensor.span_v
-        clipped = bool(np.abs(share).max() >= 1.0 + sensor.over_range_fraction - 1e-9)
     return 100.0 * left / full_scale, clipped
 
 
-def _search(strength: Trial, asked: float, effect: Hideable) -> tuple[float, float, str]:
+def clipped_at_an_end(machine: SimulatedInstron) -> bool:
+    """Whether the sensor's output met an end of its range in the machine's last run."""
+    if machine.truth is None:
+        return False
+    sensor = machine.specimen.sensor.parameters
+    share = (machine.truth.reading_v - sensor.unloaded_v) / sensor.span_v
+    return bool(np.abs(share).max() >= 1.0 + sensor.over_range_fraction - 1e-9)
+
+
+def search(strength: Trial, asked: float, effect: Hideable) -> tuple[float, float, str]:
     """The amount for the ``asked`` strength, the strength reached, and a remark where they differ.
 
     A secant in logarithms within the bracket of what was too weak and too strong; where even the largest amount is

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from simulators.bounds import STRICT_KEYS, Finite, NotNegative, Positive
 
@@ -38,7 +40,8 @@ class Neighbour:
     """A second unit whose load has nothing to do with the machine's, logged as ``neighbour``.
 
     Its pressure comes and goes in pushes of random size about ``period_s`` apart, the largest to ``highest_mbar``.
-    ``cross_talk`` of it adds to the sensor's.
+    ``cross_talk`` of it adds to the sensor's, seen through ``lag_s``, and only what is above the share ``from_share``
+    of the highest.
     """
 
     __pydantic_config__ = STRICT_KEYS
@@ -47,6 +50,20 @@ class Neighbour:
     highest_mbar: Positive = 60.0
     period_s: Positive = 4.0
     noise_mbar: NotNegative = 0.05
+    lag_s: NotNegative = 0.0
+    from_share: Annotated[float, Field(ge=0, lt=1)] = 0.0
+
+    def added_pa(self, neighbour_pa: Array, rate_hz: float) -> Array:
+        """What of the neighbour's pressure (n,) at ``rate_hz`` the sensor feels beside its own, in Pa."""
+        felt = neighbour_pa
+        if self.from_share > 0:
+            felt = np.maximum(felt - 100.0 * self.highest_mbar * self.from_share, 0.0)
+        if self.lag_s > 0:
+            from scipy.signal import lfilter
+
+            keep = np.exp(-1.0 / (rate_hz * self.lag_s))
+            felt = np.asarray(lfilter([1.0 - keep], [1.0, -keep], felt))
+        return self.cross_talk * felt
 
     def pressure_pa(self, time_s: Array, rng: np.random.Generator) -> Array:
         """Pressure (n,) in Pa: raised cosines between random heights at random times."""

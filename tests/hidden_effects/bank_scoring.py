@@ -173,7 +173,7 @@ INVERSE = {("gas_heat", "time_constant_s"): "cooling_rate"}
 
 
 def _compared(cause: Cause, case: HiddenCase) -> list[Compared]:
-    """The parameters of a named hidden effect that have a counterpart in the truth (`simulators.hidden_truths`)."""
+    """The parameters of a named hidden effect that have a counterpart in the truth (`simulators.hidden_effects`)."""
     hidden = next((effect for effect in case.effects if effect.name == cause.name), None)
     found = []
     for name, truth in hidden.catalogue.items() if hidden is not None else ():

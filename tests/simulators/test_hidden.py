@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from simulators.baseline import lagged, left_over, residual
 from simulators.hidden import hide
 from simulators.hidden_effects import EFFECTS
+from simulators.hidden_effects.noise import alias_hz
 from simulators.hidden_protocols import PROTOCOLS, build
-from simulators.hidden_truths import alias_hz
 from smartshoe.errors import UsageError
 from smartshoe.protocol import dynamic_protocol
 
