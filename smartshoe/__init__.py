@@ -36,6 +36,7 @@ _HOME = {
     "diagnose": "smartshoe.diagnosis",
     "Diagnosis": "smartshoe.diagnosis",
     "ExtendedModel": "smartshoe.models.extended",
+    "sweep": "smartshoe.sweeps",
     "SmartShoeError": "smartshoe.errors",
 }
 
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
     from smartshoe.store import CalibrationStore
+    from smartshoe.sweeps import sweep
     from smartshoe.validation import validate
 
 __all__ = [
@@ -85,6 +87,7 @@ __all__ = [
     "select_order",
     "stack",
     "static_protocol",
+    "sweep",
     "validate",
     "write",
 ]

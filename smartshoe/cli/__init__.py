@@ -15,6 +15,7 @@ from smartshoe.gate.limits import raise_limits
 
 _COMMANDS = {
     "run": "run a scenario: devices, identification, compensation, validation",
+    "sweep": "a scenario many times: over values of its keys and over seeds, on all cores or a cluster",
     "simulate": "run only a scenario's devices and write the recordings",
     "identify": "identify one unit from one or more experiments",
     "compensate": "force from pressure, by a calibration",

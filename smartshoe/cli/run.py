@@ -10,11 +10,23 @@ from smartshoe.cli.output import figures_option
 @click.command("run", epilog="Example: smartshoe run scenarios/calibration.toml --out out/calibration")
 @click.argument("scenario")
 @click.option("--seed", type=click.IntRange(min=0), help="In the place of the scenario's own seed.")
+@click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="In the place of the scenario's own value (repeatable): unit.left_toe.bladder.k1=1.5.",
+)
 @click.option("--out", "out_folder", metavar="DIR", help="Write report.html, result.json and the calibrations.")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 @figures_option
 def command(
-    scenario: str, seed: int | None, out_folder: str | None, json_path: str | None, figures: str | None
+    scenario: str,
+    seed: int | None,
+    assignments: tuple[str, ...],
+    out_folder: str | None,
+    json_path: str | None,
+    figures: str | None,
 ) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
     from smartshoe.kernels import warm_up
@@ -24,11 +36,12 @@ def command(
     from smartshoe.cli.output import emit_json, progress
     from smartshoe.report.tables import print_summary
     from smartshoe.scenario import load, run
+    from smartshoe.scenario.keys import parse_assignments
     from smartshoe.scenario.publish import publish
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
-    loaded, source = load(scenario)
+    loaded, source = load(scenario, parse_assignments(assignments))
     if seed is not None:
         loaded = loaded.model_copy(update={"seed": seed})
     folder = make_folder(out_folder) if out_folder is not None else None

@@ -1,6 +1,17 @@
 """Scenarios: a TOML file that says which devices, protocols and steps; read, checked and run."""
 
-from smartshoe.scenario.run import ScenarioResult, UnitResult, run, simulate, simulate_trial
-from smartshoe.scenario.schema import Scenario, load
+from smartshoe.scenario.run import ScenarioResult, UnitResult, check_simulated, run, simulate, simulate_trial
+from smartshoe.scenario.schema import Scenario, checked, load, read_tables
 
-__all__ = ["Scenario", "ScenarioResult", "UnitResult", "load", "run", "simulate", "simulate_trial"]
+__all__ = [
+    "Scenario",
+    "ScenarioResult",
+    "UnitResult",
+    "check_simulated",
+    "checked",
+    "load",
+    "read_tables",
+    "run",
+    "simulate",
+    "simulate_trial",
+]

@@ -14,13 +14,14 @@ from pydantic import ValidationError
 import smartshoe
 from smartshoe.compensation import Calibration
 from smartshoe.devices import open_machine
+from smartshoe.devices.base import TestMachine
 from smartshoe.errors import LimitError, SmartShoeError
 from smartshoe.identification import Identification, identify
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
 from smartshoe.scenario.schema import DiagnoseTable, Scenario, Source
-from smartshoe.scenario.trial import RecordedTrial, TrialResult, analyse_trial, record_trial
+from smartshoe.scenario.trial import RecordedTrial, TrialResult, analyse_trial, opened_shoe, record_trial
 from smartshoe.validation import Validation, validate
 
 if TYPE_CHECKING:
@@ -124,25 +125,51 @@ def _record(
                 name=path.stem,
             )
         return found
-    options = _beside(source, {**scenario.machine.options, **unit.options})
-    try:
-        machine = open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit.name), **options)
-    except ValidationError as error:
-        key = error.errors(include_url=False)[0]["loc"][:1]
-        in_machine = bool(key) and key[0] in scenario.machine.options and key[0] not in unit.options
-        raise source.from_validation(error, ("machine",) if in_machine else ("unit", index)) from error
     recordings: dict[str, Recording] = {}
-    with machine:
+    with _machine_of(scenario, source, index) as machine:
         # Every protocol is checked before the first one moves anything.
-        for name, protocol in protocols.items():
-            try:
-                machine.check(protocol)
-            except LimitError as error:
-                raise source.error(("protocol", name), str(error)) from error
+        _check_protocols(machine, protocols, source)
         for name, protocol in protocols.items():
             progress(f"{unit.name}: {name}")
             recordings[name] = machine.run(protocol)
     return recordings
+
+
+def _machine_of(scenario: Scenario, source: Source, index: int) -> TestMachine:
+    """The machine with the unit under it; raises `ScenarioError` for an option that is none."""
+    unit = scenario.unit[index]
+    options = _beside(source, {**scenario.machine.options, **unit.options})
+    try:
+        return open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit.name), **options)
+    except ValidationError as error:
+        key = error.errors(include_url=False)[0]["loc"][:1]
+        in_machine = bool(key) and key[0] in scenario.machine.options and key[0] not in unit.options
+        raise source.from_validation(error, ("machine",) if in_machine else ("unit", index)) from error
+
+
+def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], source: Source) -> None:
+    for name, protocol in protocols.items():
+        try:
+            machine.check(protocol)
+        except LimitError as error:
+            raise source.error(("protocol", name), str(error)) from error
+
+
+def check_simulated(scenario: Scenario, source: Source) -> None:
+    """Open every simulated device of the scenario and check its protocols, and move nothing.
+
+    So a misspelt option is told before the first experiment. Devices that are not simulated are left alone. Raises
+    `ScenarioError`, which points into the scenario.
+    """
+    protocols = _protocols(scenario, source)
+    if scenario.machine.backend.startswith("sim:"):
+        for index, unit in enumerate(scenario.unit):
+            if not unit.recordings:
+                with _machine_of(scenario, source, index) as machine:
+                    _check_protocols(machine, protocols, source)
+    if scenario.trial is not None and scenario.trial.shoe.startswith("sim:"):
+        with opened_shoe(scenario, source, scenario.seed):
+            pass
 
 
 def _beside(source: Source, options: dict[str, Any]) -> dict[str, Any]:

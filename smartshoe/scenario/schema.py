@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import tomllib
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -26,6 +28,7 @@ from smartshoe.protocol import (
     dynamic_protocol,
     static_protocol,
 )
+from smartshoe.scenario.keys import Tables, with_values
 from smartshoe.scenario.lines import line_of
 
 
@@ -202,20 +205,28 @@ class Scenario(_Table):
         return raw
 
 
+class ScenarioKeyError(ScenarioError):
+    """A key of a scenario is wrong: ``reason`` is what is wrong with it, without file, line and key."""
+
+    reason = ""
+
+
 class Source:
     """A scenario's text, to turn a path of keys into 'FILE, line N, key K'."""
 
     def __init__(self, path: Path, text: str) -> None:
         self.path, self.text = path, text
 
-    def error(self, keys: tuple[str | int, ...], message: str) -> ScenarioError:
+    def error(self, keys: tuple[str | int, ...], message: str) -> ScenarioKeyError:
         """A `ScenarioError` that points at ``keys``."""
         line = line_of(self.text, keys)
         where = f"{self.path}, line {line}" if line else str(self.path)
         named = ".".join(str(key) for key in keys) or "the file"
-        return ScenarioError(f"{where}, key {named}: {message}")
+        made = ScenarioKeyError(f"{where}, key {named}: {message}")
+        made.reason = message
+        return made
 
-    def from_validation(self, error: ValidationError, prefix: tuple[str | int, ...] = ()) -> ScenarioError:
+    def from_validation(self, error: ValidationError, prefix: tuple[str | int, ...] = ()) -> ScenarioKeyError:
         """The first of pydantic's complaints as one sentence."""
         first = error.errors(include_url=False)[0]
         keys = (
@@ -232,11 +243,8 @@ class Source:
         return self.error(keys, message)
 
 
-def load(path: Path | str) -> tuple[Scenario, Source]:
-    """Read and check a scenario file.
-
-    Raises `ScenarioError`: what is wrong, with line and key.
-    """
+def read_tables(path: Path | str) -> tuple[Tables, Source]:
+    """A scenario's tables as they stand in its file, and the file itself; raises `ScenarioError`."""
     file = Path(path)
     try:
         text = file.read_text(encoding="utf-8")
@@ -244,13 +252,26 @@ def load(path: Path | str) -> tuple[Scenario, Source]:
         raise ScenarioError(f"{file} is not UTF-8 text (byte {error.start}): save it as UTF-8") from error
     except OSError as error:
         raise ScenarioError(f"{file} cannot be read ({error.strerror}): give the path of a scenario") from error
-    source = Source(file, text)
     try:
-        raw = tomllib.loads(text)
+        return tomllib.loads(text), Source(file, text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{file} is not valid TOML: {error}") from error
+
+
+def load(path: Path | str, values: Mapping[str, Any] | None = None) -> tuple[Scenario, Source]:
+    """Read and check a scenario file, with ``values`` by dotted key (`smartshoe.scenario.keys`) in its values' places.
+
+    Raises `ScenarioError`: what is wrong, with line and key.
+    """
+    tables, source = read_tables(path)
+    return checked(with_values(tables, values or {}), source), source
+
+
+def checked(tables: Tables, source: Source) -> Scenario:
+    """The scenario in ``tables``, whatever its ``[sweep]``; raises `ScenarioError`, which points into ``source``."""
     try:
-        scenario = Scenario.model_validate(raw)
+        # A copy: kinds of protocols are filled in on the way.
+        scenario = Scenario.model_validate(copy.deepcopy({k: v for k, v in tables.items() if k != "sweep"}))
     except ValidationError as error:
         raise source.from_validation(error) from error
     names = [unit.name for unit in scenario.unit]
@@ -270,7 +291,7 @@ def load(path: Path | str) -> tuple[Scenario, Source]:
         for name in wanted:
             if name not in known:
                 raise source.error(keys, f"{name!r} is no experiment here; there are {', '.join(sorted(known))}")
-    return scenario, source
+    return scenario
 
 
-__all__ = ["Scenario", "Source", "UnitTable", "load"]
+__all__ = ["Scenario", "ScenarioKeyError", "Source", "UnitTable", "checked", "load", "read_tables"]

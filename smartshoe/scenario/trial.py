@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from smartshoe.devices import open_shoe
+from smartshoe.devices.base import Shoe
 from smartshoe.errors import UsageError
 from smartshoe.recording import Channel, Recording
 from smartshoe.scenario.against_truth import compare
@@ -127,22 +128,27 @@ def record_trial(scenario: Scenario, source: Source, seed: int) -> RecordedTrial
     table = scenario.trial
     if table is None:
         raise UsageError(f"{source.path} has no [trial]: add one")
-    options = {"seed": seed, **table.options}
-    if table.shoe.startswith("sim:"):
-        worn = {unit.name: {k: v for k, v in unit.options.items() if k in WORN} for unit in scenario.unit}
-        options = {"units": worn, **options}
-    try:
-        shoe = open_shoe(_beside(source, table.shoe), **options)
-    except ValidationError as error:
-        raise source.from_validation(error, ("trial",)) from error
-    except UsageError as error:
-        raise source.error(("trial", "shoe"), str(error)) from error
-    with shoe:
+    with opened_shoe(scenario, source, seed) as shoe:
         try:
             recording = shoe.record(name=table.name)
         except UsageError as error:
             raise source.error(("trial",), str(error)) from error
     return RecordedTrial(recording, getattr(shoe, "truth", None))
+
+
+def opened_shoe(scenario: Scenario, source: Source, seed: int) -> Shoe:
+    """The trial's shoe, not started yet; raises `ScenarioError` for a shoe or an option that is none."""
+    table = scenario.trial or TrialTable()
+    options = {"seed": seed, **table.options}
+    if table.shoe.startswith("sim:"):
+        worn = {unit.name: {k: v for k, v in unit.options.items() if k in WORN} for unit in scenario.unit}
+        options = {"units": worn, **options}
+    try:
+        return open_shoe(_beside(source, table.shoe), **options)
+    except ValidationError as error:
+        raise source.from_validation(error, ("trial",)) from error
+    except UsageError as error:
+        raise source.error(("trial", "shoe"), str(error)) from error
 
 
 def _beside(source: Source, shoe: str) -> str:

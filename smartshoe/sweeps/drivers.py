@@ -1,0 +1,79 @@
+"""Which varied key drives which figure: rank correlations over the cases of a sweep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smartshoe.sweeps.plan import Plan
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MAIN = ("rmse_compensated_n", "trial.rmse_total_n.corrected", "explained_percent")
+LOW_IS_BAD = ("explained_percent", "fit_percent", "improvement_percent", "improvement_over_static_percent")
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """How a figure goes with a key.
+
+    ``strength`` is Spearman's rank correlation in [-1, 1] where the key is a number (``is_signed``), else the
+    correlation ratio of the figure's ranks over the key's values, in [0, 1]; ``p_value`` is that of no dependence
+    (of Spearman's test, of Kruskal and Wallis'), other keys left to chance.
+    """
+
+    key: str
+    figure: str
+    strength: float
+    is_signed: bool
+    p_value: float
+
+
+def figures_in(table: pd.DataFrame, plan: Plan) -> list[str]:
+    """The columns that hold figures that are numbers and not the same for all cases."""
+    own = {axis.key for axis in plan.design.axes} | {"seed", "status", "says", "case"}
+    import pandas as pd
+
+    numeric = [name for name in table.columns if name not in own and pd.api.types.is_numeric_dtype(table[name])]
+    return [name for name in numeric if table[name].nunique() > 1]
+
+
+def main_figures(table: pd.DataFrame, plan: Plan) -> list[str]:
+    """The figures that the page begins with: each unit's error after compensation, and the trial's."""
+    there = figures_in(table, plan)
+    return [name for name in there if name.endswith(MAIN)] or there[:1]
+
+
+def drivers_of(table: pd.DataFrame, plan: Plan, figures: list[str]) -> list[Driver]:
+    """One for each figure and key that take more than one value, the strongest first."""
+    found: list[Driver] = []
+    for figure in figures:
+        for axis in plan.design.axes:
+            there = table[[axis.key, figure]].dropna()
+            if there[axis.key].nunique() > 1 and there[figure].nunique() > 1:
+                found.append(_driver(there, axis.key, figure))
+    return sorted(found, key=lambda driver: -abs(driver.strength))
+
+
+def _driver(there: pd.DataFrame, key: str, figure: str) -> Driver:
+    import pandas as pd
+    from scipy import stats
+
+    if pd.api.types.is_numeric_dtype(there[key]) and not pd.api.types.is_bool_dtype(there[key]):
+        spearman = stats.spearmanr(there[key], there[figure])
+        return Driver(key, figure, float(spearman.statistic), True, float(spearman.pvalue))
+    ranks = there[figure].rank()
+    groups = [own.to_numpy() for _, own in ranks.groupby(there[key])]
+    between = sum(own.size * (own.mean() - ranks.mean()) ** 2 for own in groups)
+    whole = float(((ranks - ranks.mean()) ** 2).sum())
+    p_value = float(stats.kruskal(*groups).pvalue)
+    return Driver(key, figure, float(np.sqrt(between / whole)), False, p_value)
+
+
+def worst_first(table: pd.DataFrame, figure: str, count: int) -> pd.DataFrame:
+    """The ``count`` rows in which ``figure`` is worst, the worst first."""
+    ordered = table.dropna(subset=[figure]).sort_values(figure, ascending=figure.endswith(LOW_IS_BAD), kind="stable")
+    return ordered.head(count)

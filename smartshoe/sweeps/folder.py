@@ -1,0 +1,188 @@
+"""A sweep's folder: which sweep it holds, which cases are done, and the table that follows from them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from smartshoe.atomic import json_text, make_folder, write_text
+from smartshoe.errors import InputError, UsageError
+from smartshoe.sweeps.design import design_of
+from smartshoe.sweeps.plan import Plan
+
+SCHEMA = "smartshoe.sweep/1"
+LEFT_OVER_S = 3600.0  # after which an unfinished file is a killed process's, not another one's at work
+
+
+@dataclass(frozen=True, slots=True)
+class SweepFolder:
+    """``path`` with ``sweep.json``, ``cases/NAME.json``, ``results.csv``."""
+
+    path: Path
+
+    @property
+    def cases(self) -> Path:
+        """Where the cases lie."""
+        return self.path / "cases"
+
+    def claim(self, plan: Plan) -> None:
+        """Make the folder this plan's; raises `UsageError` where it is another sweep's or another version's.
+
+        A plan that holds all cases of the one before goes on with the folder: so a sweep grows.
+        """
+        make_folder(self.cases)
+        note = self.path / "sweep.json"
+        mine = {
+            "schema": SCHEMA,
+            "scenario": plan.source.path.name,
+            "version": plan.version,
+            "cases": len(plan),
+            "base": plan.base,
+            "sweep": _table_of(plan),
+        }
+        if note.is_file():
+            theirs = self._note(note)
+            if theirs["version"] != plan.version:
+                raise UsageError(
+                    f"{self.path} holds a sweep of smartshoe {theirs['version']}, this is {plan.version}:"
+                    " choose another --out"
+                )
+            if theirs != json.loads(json_text(_plain(mine))):
+                self._refuse_another(plan, theirs)
+        elif any(self.done()):
+            raise UsageError(
+                f"{self.cases} holds cases of an unknown sweep ({note.name} is gone): choose another --out"
+            )
+        write_text(note, json_text(_plain(mine)))
+        self._sweep_up()
+
+    def _note(self, note: Path) -> dict[str, Any]:
+        try:
+            theirs = json.loads(note.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise UsageError(f"{note} is no sweep's ({error}): choose another --out") from error
+        if not isinstance(theirs, dict) or theirs.get("schema") != SCHEMA or "sweep" not in theirs:
+            raise UsageError(f"{note} is no sweep's: choose another --out")
+        return theirs
+
+    def _refuse_another(self, plan: Plan, theirs: dict[str, Any]) -> None:
+        mine = set(plan.names())
+        old = Plan(plan.source, theirs["base"], design_of(theirs["sweep"], 0, plan.source.error), theirs["version"])
+        foreign = sum(name not in mine for name in set(old.names()))
+        if foreign:
+            raise UsageError(
+                f"{self.path} holds another sweep ({theirs['scenario']}; {foreign} of its {len(old)} cases are not in"
+                " this one): choose another --out"
+            )
+
+    def _sweep_up(self) -> None:
+        """Remove what killed processes left half-written."""
+        with os.scandir(self.cases) as entries:
+            for entry in entries:
+                is_partial = entry.name.startswith(".") and ".partial" in entry.name
+                if is_partial and time.time() - entry.stat().st_mtime > LEFT_OVER_S:
+                    Path(entry.path).unlink(missing_ok=True)
+
+    def done(self) -> set[str]:
+        """The names of the cases that are there."""
+        with os.scandir(self.cases) as entries:
+            return {e.name[:-5] for e in entries if e.name.endswith(".json") and not e.name.startswith(".")}
+
+    def read(self, name: str) -> dict[str, Any]:
+        """A case's JSON; raises `InputError` where it is damaged."""
+        file = self.cases / f"{name}.json"
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+            if not isinstance(found["figures"], dict):
+                raise ValueError("figures is no object")
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{file} is damaged ({error}): remove it and give the same command again") from error
+        return dict(found)
+
+
+def write_case(folder: Path, name: str, text: str) -> None:
+    """Write a case's JSON, whole or not at all; raises `UsageError` where the disk does not take it."""
+    try:
+        write_text(folder / f"{name}.json", text)
+    except OSError as error:
+        raise UsageError(
+            f"{folder / name}.json cannot be written ({error.strerror}): make room and give the same command again"
+        ) from error
+
+
+def _table_of(plan: Plan) -> dict[str, Any]:
+    """The design as a ``[sweep]`` table that gives it again."""
+    design = plan.design
+    vary: dict[str, Any] = {}
+    for axis in design.axes:
+        spread = {"log_uniform" if axis.is_log else "uniform": [axis.low, axis.high]}
+        vary[axis.key] = spread if axis.is_range else list(axis.values)
+    seeds = list(design.seeds)
+    table: dict[str, Any] = {"seeds": seeds, "design": design.kind, "vary": vary}
+    if seeds == list(range(seeds[0], seeds[0] + len(seeds))):
+        table["seeds"] = {"from": seeds[0], "count": len(seeds)}
+    return table if design.kind == "grid" else {**table, "count": design.count, "draw": design.draw}
+
+
+def _plain(content: dict[str, Any]) -> dict[str, Any]:
+    """Dates and times of TOML as text."""
+    return dict(json.loads(json.dumps(content, default=str)))
+
+
+def results_text(plan: Plan, folder: SweepFolder) -> str:
+    """The table of all cases, in the design's order, as CSV text."""
+    keys = [axis.key for axis in plan.design.axes]
+    figures: dict[str, None] = {}
+    rows: list[tuple[tuple[str, ...], list[Any]]] = []
+    shapes: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for number in range(len(plan)):
+        name = plan.name(number)
+        case = folder.read(name)
+        shape = tuple(case["figures"])
+        if shape not in shapes:
+            shapes[shape] = shape
+            figures.update(dict.fromkeys(shape))
+        values = plan.design.values(number)
+        begin = [_cell(values[key]) for key in keys]
+        end = [case["status"], case["says"] or "", name]
+        rows.append((shapes[shape], [*begin, plan.design.seed(number), *case["figures"].values(), *end]))
+    header = [*keys, "seed", *figures, "status", "says", "case"]
+    return "".join(_lines(header, _full(rows, len(keys) + 1, list(figures))))
+
+
+def _full(rows: Iterable[tuple[tuple[str, ...], list[Any]]], before: int, figures: list[str]) -> Iterator[list[Any]]:
+    """Each row with an empty cell for each figure that it has not."""
+    everything = tuple(figures)
+    for shape, cells in rows:
+        if shape == everything:
+            yield [*cells[:before], *map(_cell, cells[before : before + len(shape)]), *cells[-3:]]
+            continue
+        own = dict(zip(shape, cells[before : before + len(shape)], strict=True))
+        yield [*cells[:before], *(_cell(own.get(name)) for name in figures), *cells[-3:]]
+
+
+def _lines(header: list[str], rows: Iterable[list[Any]]) -> Iterator[str]:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(row)
+    yield buffer.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """A value in a table: numbers in full, nothing for None, JSON for what is neither number nor word."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value)
+    return value if isinstance(value, int | str) else json.dumps(value, default=str, ensure_ascii=False)

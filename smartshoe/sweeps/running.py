@@ -1,0 +1,205 @@
+"""The verb: a scenario over its design, each case computed once, whatever is killed in between."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smartshoe.atomic import replacing, write_text
+from smartshoe.errors import DeviceError, UsageError
+from smartshoe.sweeps import places
+from smartshoe.sweeps.case import computed
+from smartshoe.sweeps.folder import SweepFolder, results_text, write_case
+from smartshoe.sweeps.places import Compute, Task, WorkerLostError
+from smartshoe.sweeps.plan import Plan, read_plan
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Progress = Callable[[int, int], None]
+
+LOST_WITHOUT_PROGRESS = 5  # workers killed in a row, with no case done between, before the sweep gives up
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """What a sweep came to: ``cases`` in all, ``computed`` this time, ``missing`` still (another shard's), ``failed``.
+
+    ``failed`` is None while cases are missing: then there are no ``results`` and no ``report`` yet either.
+    """
+
+    plan: Plan
+    folder: Path
+    cases: int
+    computed: int
+    missing: int
+    failed: int | None
+    results: Path | None
+    report: Path | None
+
+    def table(self) -> pd.DataFrame:
+        """``results.csv``: one row a case in the design's order; raises `UsageError` while cases are missing."""
+        import pandas as pd
+
+        if self.results is None:
+            raise UsageError(f"{self.folder} still misses {self.missing} of {self.cases} cases: run the other shards")
+        return pd.read_csv(self.results, keep_default_na=False, na_values=[""])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The counts as a plain object, schema smartshoe.sweep_summary/1."""
+        return {
+            "schema": "smartshoe.sweep_summary/1",
+            "scenario": self.plan.source.path.name,
+            "version": self.plan.version,
+            "cases": self.cases,
+            "computed": self.computed,
+            "missing": self.missing,
+            "failed": self.failed,
+            "results": None if self.results is None else str(self.results),
+            "report": None if self.report is None else str(self.report),
+        }
+
+
+def sweep(
+    scenario: Path | str,
+    out: Path | str,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    shard: tuple[int, int] = (1, 1),
+    progress: Progress | None = None,
+) -> SweepResult:
+    """Run a scenario for each case of its ``[sweep]``, and gather the figures in one table.
+
+    A case is computed once: the same call again goes on where the last one stopped.
+
+    Parameters
+    ----------
+    scenario
+        The scenario's file, with a table ``[sweep]``.
+    out
+        The sweep's folder. ``cases/`` gets one JSON a case, ``results.csv`` (``.parquet`` where pyarrow is there) one
+        row a case, ``sweep.html`` what drives the figures.
+    jobs
+        Processes on this machine; None: one a core; 1: this process.
+    scheduler
+        Address of a Dask scheduler (``tcp://host:8786``) whose workers compute instead.
+    shard
+        (k, n): only every n-th case from the k-th on (1-based), for one of n runs that share the folder.
+    progress
+        Called with the number of cases done and to do, of this run.
+
+    Raises
+    ------
+    ScenarioError
+        The scenario or its ``[sweep]`` is wrong.
+    UsageError
+        The folder is another sweep's, or cannot be written.
+    DeviceError
+        The scheduler is not there or went away, or workers are killed again and again.
+    """
+    return sweep_plan(read_plan(scenario), Path(out), jobs, scheduler, shard, progress)
+
+
+def sweep_plan(
+    plan: Plan,
+    out: Path,
+    jobs: int | None = 1,
+    scheduler: str | None = None,
+    shard: tuple[int, int] = (1, 1),
+    progress: Progress | None = None,
+    compute: Compute = computed,
+) -> SweepResult:
+    """`sweep` of a plan that was read already; ``compute`` turns a case into its JSON text."""
+    part, parts = shard
+    if not 1 <= part <= parts:
+        raise UsageError(f"shard {part}/{parts} is none: give K/N with K from 1 to N")
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"jobs is {jobs}: give 1 or more")
+    folder = SweepFolder(out)
+    folder.claim(plan)
+    mine = range(part - 1, len(plan), parts)
+    count = _compute_all(plan, folder, mine, _place(jobs, scheduler, len(mine)), progress, compute)
+    done = folder.done()
+    missing = sum(name not in done for name in set(plan.names()))
+    if missing:
+        return SweepResult(plan, out, len(plan), count, missing, None, None, None)
+    return _concluded(plan, folder, count)
+
+
+Place = Callable[[Iterator[Task]], Iterator[tuple[str, str | None]]]
+
+
+def _place(jobs: int | None, scheduler: str | None, cases: int) -> Place:
+    if scheduler is not None:
+        return lambda tasks: places.on_a_cluster(tasks, scheduler)
+    if jobs is None:
+        from joblib import cpu_count
+
+        jobs = int(cpu_count())
+    wanted = min(jobs, cases)
+    if wanted <= 1:
+        return places.in_this_process
+    return lambda tasks: places.in_processes(tasks, wanted)
+
+
+def _compute_all(
+    plan: Plan, folder: SweepFolder, mine: Sequence[int], place: Place, progress: Progress | None, compute: Compute
+) -> int:
+    """Compute what is not there; how many that were."""
+    to_do = _to_do(plan, folder, mine)
+    whole = len(to_do)
+    counted = lost = 0
+    while to_do:
+        before = counted
+        try:
+            for name, text in place(Task(plan.case(number), str(folder.cases), compute) for number in to_do):
+                if text is not None:
+                    write_case(folder.cases, name, text)
+                counted += 1
+                if progress is not None:
+                    progress(counted, whole)
+        except WorkerLostError as error:
+            lost = lost + 1 if counted == before else 1
+            if lost >= LOST_WITHOUT_PROGRESS:
+                raise DeviceError(
+                    f"{error}, {lost} times in a row; {len(to_do)} cases are left, the first is"
+                    f" {plan.name(to_do[0])}: the same command goes on where this one stopped"
+                ) from error
+            to_do = _to_do(plan, folder, mine)
+            counted = whole - len(to_do)
+        else:
+            break
+    return counted
+
+
+def _to_do(plan: Plan, folder: SweepFolder, mine: Sequence[int]) -> list[int]:
+    """The first of each kind of equal cases that is not done."""
+    seen = folder.done()
+    found: list[int] = []
+    for number in mine:
+        name = plan.name(number)
+        if name not in seen:
+            seen.add(name)
+            found.append(number)
+    return found
+
+
+def _concluded(plan: Plan, folder: SweepFolder, count: int) -> SweepResult:
+    """The table and the page, from the cases."""
+    from smartshoe.sweeps.page import write_page
+
+    results = folder.path / "results.csv"
+    write_text(results, results_text(plan, folder))
+    report = folder.path / "sweep.html"
+    result = SweepResult(plan, folder.path, len(plan), count, 0, 0, results, report)
+    table = result.table()
+    if importlib.util.find_spec("pyarrow") is not None:
+        with replacing(folder.path / "results.parquet") as temporary:
+            table.to_parquet(temporary, index=False)
+    write_page(report, plan, table)
+    failed = int((table["status"] == "failed").sum())
+    return SweepResult(plan, folder.path, len(plan), count, 0, failed, results, report)
