@@ -107,16 +107,6 @@ class SweepFolder:
         return dict(found)
 
 
-def write_case(folder: Path, name: str, text: str) -> None:
-    """Write a case's JSON, whole or not at all; raises `UsageError` where the disk does not take it."""
-    try:
-        write_text(folder / f"{name}.json", text)
-    except OSError as error:
-        raise UsageError(
-            f"{folder / name}.json cannot be written ({error.strerror}): make room and give the same command again"
-        ) from error
-
-
 def _table_of(plan: Plan) -> dict[str, Any]:
     """The design as a ``[sweep]`` table that gives it again."""
     design = plan.design

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-
-from smartshoe.atomic import write_text
+from smartshoe.report.charts import Chart
+from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain
-from smartshoe.sweeps import figures
+from smartshoe.sweeps.charts import against_key, over_pairs
 from smartshoe.sweeps.drivers import Driver, drivers_of, main_figures, worst_first
 from smartshoe.sweeps.plan import Plan
 from smartshoe.sweeps.repeating import command_of
@@ -21,52 +20,56 @@ if TYPE_CHECKING:
 
 WORST = 8
 SENTENCES = 10
+CLEAR = 0.01  # p value below which a dependence is called one
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One figure of merit: its quantiles over the cases, what drives it, pictures, the worst cases."""
+    """One figure of merit: its quantiles over the cases, what drives it, charts, the worst cases."""
 
     figure: str
     quantiles: list[str]
+    says: str
     drivers: list[Driver]
-    pictures: list[tuple[str, Markup]]
+    alone: Sequence[Chart]
+    pairs: Sequence[Chart]
     worst: list[tuple[str, str]]
 
 
 def write_page(path: Path, plan: Plan, table: pd.DataFrame) -> None:
     """Write the page to ``path``, whole or not at all; ``table`` is ``results.csv``."""
-    environment = Environment(
-        loader=ChoiceLoader([PackageLoader("smartshoe.sweeps"), PackageLoader("smartshoe.report")]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-    )
-    environment.filters.update(plain=plain)
     main = main_figures(table, plan)
     failed = table[table["status"] == "failed"]
     sentences = failed.groupby("says", sort=False)["case"].agg(["size", "first"]).sort_values("size", ascending=False)
-    page = environment.get_template("sweep.html").render(
-        title=str(plan.base.get("title", "scenario")),
-        about=str(plan.base.get("about", "")),
-        facts={
-            "scenario": plan.source.path.name,
-            "design": plan.design.kind,
-            "cases": str(len(plan)),
-            "seeds": str(len(plan.design.seeds)),
-            "smartshoe": plan.version,
+    sections = [_section(plan, table, figure) for figure in main]
+    done = f"{len(plan) - len(failed)} of {len(plan)} cases done" if len(failed) else f"All {len(plan)} cases done"
+    write_document(
+        path,
+        "sweep.html",
+        {
+            "title": str(plan.base.get("title", "scenario")),
+            "about": str(plan.base.get("about", "")),
+            "grade": "look" if len(failed) else "good",
+            "headline": "; ".join([done, *(section.says for section in sections[:1])]),
+            "facts": {
+                "scenario": plan.source.path.name,
+                "design": plan.design.kind,
+                "cases": str(len(plan)),
+                "seeds": str(len(plan.design.seeds)),
+                "smartshoe": plan.version,
+            },
+            "keys": [(axis.key, _range_of(table, axis.key)) for axis in plan.design.axes],
+            "shares": [f"{100 * share:.0f} %" for share in QUANTILES],
+            "failed": len(failed),
+            "sentences": [
+                (str(says), int(row["size"]), _command(plan, table, str(row["first"])))
+                for says, row in sentences.head(SENTENCES).iterrows()
+            ],
+            "sections": sections,
+            "command": f"smartshoe sweep {plan.source.path} --out {path.parent}",
         },
-        keys=[(axis.key, _range_of(table, axis.key)) for axis in plan.design.axes],
-        quantiles=[f"{100 * share:.0f} %" for share in QUANTILES],
-        failed=len(failed),
-        sentences=[
-            (str(says), int(row["size"]), _command(plan, table, str(row["first"])))
-            for says, row in sentences.head(SENTENCES).iterrows()
-        ],
-        sections=[_section(plan, table, figure) for figure in main],
     )
-    write_text(path, page)
 
 
 def _range_of(table: pd.DataFrame, key: str) -> str:
@@ -85,18 +88,22 @@ def _command(plan: Plan, table: pd.DataFrame, case: str) -> str:
 def _section(plan: Plan, table: pd.DataFrame, figure: str) -> Section:
     found = drivers_of(table, plan, [figure])
     keys = [driver.key for driver in found]
-    # The SVG comes from matplotlib, which escapes the texts it draws.
-    pictures = [
-        (caption, Markup(drawn))
-        for caption, drawn in (
-            ("Against each key: cases, median and quartiles.", figures.one_at_a_time(table, keys, figure)),
-            ("Median over pairs of keys, the strongest first.", figures.pair_maps(table, keys, figure)),
-        )
-        if drawn is not None
-    ]
     worst = [
         (plain(float(row[figure]), 4), command_of(plan, int(str(number))))
         for number, row in worst_first(table, figure, WORST).iterrows()
     ]
     quantiles = [plain(float(table[figure].quantile(share)), 4) for share in QUANTILES]
-    return Section(figure, quantiles, found, pictures, worst)
+    alone = [against_key(table, key, figure) for key in keys]
+    return Section(figure, quantiles, _says(figure, found), found, alone, over_pairs(table, keys, figure), worst)
+
+
+def _says(figure: str, drivers: list[Driver]) -> str:
+    """What drives the figure, in one clause."""
+    clear = [driver for driver in drivers if driver.p_value < CLEAR]
+    if not clear:
+        return f"no varied key drives {figure} beyond chance"
+    strongest = clear[0]
+    way = "with" if strongest.strength > 0 else "against"
+    if not strongest.is_signed:
+        return f"{figure} depends most on {strongest.key} (correlation ratio {strongest.strength:.2f})"
+    return f"{figure} goes most {way} {strongest.key} (rank correlation {strongest.strength:+.2f})"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from smartshoe.atomic import write_text
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.sweeps.case import computed
-from smartshoe.sweeps.folder import write_case
 from smartshoe.sweeps.plan import Case
 
 Done = Callable[[], None]
@@ -38,7 +38,7 @@ class Task:
             return self.case.name, None
         text = self.compute(self.case)
         if folder.is_dir():
-            write_case(folder, self.case.name, text)
+            write_text(folder / f"{self.case.name}.json", text)
             return self.case.name, None
         return self.case.name, text
 

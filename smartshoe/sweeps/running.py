@@ -12,7 +12,7 @@ from smartshoe.atomic import replacing, write_text
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.sweeps import places
 from smartshoe.sweeps.case import computed
-from smartshoe.sweeps.folder import SweepFolder, results_text, write_case
+from smartshoe.sweeps.folder import SweepFolder, results_text
 from smartshoe.sweeps.places import Compute, Task, WorkerLostError
 from smartshoe.sweeps.plan import Plan, read_plan
 
@@ -158,7 +158,7 @@ def _compute_all(
         try:
             for name, text in place(Task(plan.case(number), str(folder.cases), compute) for number in to_do):
                 if text is not None:
-                    write_case(folder.cases, name, text)
+                    write_text(folder.cases / f"{name}.json", text)
                 counted += 1
                 if progress is not None:
                     progress(counted, whole)
