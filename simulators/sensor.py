@@ -166,10 +166,10 @@ class SimulatedHdiSensor(Sensor):
 
 def _first_order(signal: Array, steps: float, output: float, last: float) -> tuple[Array, float]:
     """Through a lag of ``steps`` samples, linear within a step, from its ``output`` and ``last`` input; its end too."""
-    from scipy.signal import lfilter
+    from smartshoe.kernels.linear_filter import linear_filter
 
     z = 1.0 / steps
     keep, mean = np.exp(-z), -np.expm1(-z) / z
     start = [keep * output + (mean - keep) * last]
-    lagged, _ = lfilter([1.0 - mean, mean - keep], [1.0, -keep], signal, zi=start)
+    lagged, _ = linear_filter([1.0 - mean, mean - keep], [1.0, -keep], signal, start)
     return lagged, float(lagged[-1])

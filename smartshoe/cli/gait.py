@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from smartshoe.cli.output import figures_option
+
 
 @click.command(
     "gait",
@@ -40,6 +42,7 @@ import click
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 @click.option("--c3d", "c3d_path", metavar="OUT.c3d", help="Write forces and events as C3D (needs ezc3d).")
 @click.option("--out", "out_folder", metavar="DIR", help="Write gait.html, gait.json, events, strides, forces as CSV.")
+@figures_option
 @click.option(
     "--stream/--whole",
     "stream",
@@ -60,6 +63,7 @@ def command(
     c3d_path: str | None,
     out_folder: str | None,
     stream: bool | None,
+    figures: str | None,
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
     from smartshoe.atomic import make_folder
@@ -69,9 +73,11 @@ def command(
     from smartshoe.gait.coverage import Coverage
     from smartshoe.logs import read
 
+    if figures is not None and out_folder is None:
+        raise click.UsageError("--figures writes into --out DIR: give --out as well")
     streamed = is_streamed(files, stream)
     if streamed:
-        refuse_with({"--estimator": estimator, "--reference": reference, "--c3d": c3d_path})
+        refuse_with({"--estimator": estimator, "--reference": reference, "--c3d": c3d_path, "--figures": figures})
         if stream is None:
             click.echo("note: a large recording goes through as a stream (--whole takes it into memory)", err=True)
     recordings = [] if streamed else [read(file, time=time) for file in files]
@@ -101,7 +107,9 @@ def command(
             step("writing the report")
             from smartshoe.report.gait.folder import publish_gait
 
-            written = publish_gait(folder, found, title, {"files": ", ".join(Path(file).name for file in files)})
+            written = publish_gait(
+                folder, found, title, {"files": ", ".join(Path(file).name for file in files)}, figures
+            )
         if c3d_path is not None:
             from smartshoe.gait.c3d import write_c3d
 

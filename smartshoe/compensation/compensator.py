@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from smartshoe.compensation.filter import ForceFilter
 from smartshoe.errors import UsageError
+from smartshoe.kernels.linear_filter import linear_filter
 from smartshoe.models import discretise
 from smartshoe.units import Unit
 
@@ -64,5 +64,5 @@ class Compensator(ForceFilter):
         self._state = np.array([(self._static_gain - self.numerator[0]) * (first - self.offset)])
 
     def _advance(self, readings: Array, count: int) -> Array:
-        force_n, self._state = lfilter(self.numerator, self.denominator, readings - self.offset, zi=self._state)
+        force_n, self._state = linear_filter(self.numerator, self.denominator, readings - self.offset, self._state)
         return np.asarray(force_n)

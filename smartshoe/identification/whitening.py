@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from smartshoe.identification.experiment import Array
 from smartshoe.identification.parametrisation import Shape
+from smartshoe.kernels.linear_filter import linear_filter
 from smartshoe.models.first_order import hold_coefficients, hold_slopes
 
 
@@ -63,7 +63,7 @@ def whitening(shape: Shape, slope: Array, step_s: float, ratio: float, ratio_slo
 
 def whitened(white: Whitening, error: Array) -> Array:
     """``error`` (n,) behind the filter, from rest."""
-    return np.asarray(lfilter(np.array([1.0, -white.pole]) / white.deviation, [1.0, -white.zero], error))
+    return linear_filter(np.array([1.0, -white.pole]) / white.deviation, [1.0, -white.zero], error)[0]
 
 
 def whiten(white: Whitening, error: Array, jacobian: Array) -> tuple[Array, Array]:
@@ -71,11 +71,11 @@ def whiten(white: Whitening, error: Array, jacobian: Array) -> tuple[Array, Arra
     poles = [1.0, -white.zero]
     before = np.concatenate([[0.0], error[:-1]])
     innovation = (error - white.pole * before) / white.deviation
-    residual = np.asarray(lfilter([1.0], poles, innovation))
+    residual = linear_filter([1.0], poles, innovation)[0]
     residual_before = np.concatenate([[0.0], residual[:-1]])
     drive = jacobian / white.deviation
     drive[:, 1:] -= white.pole / white.deviation * jacobian[:, :-1]
     drive -= np.outer(white.deviation_slope / white.deviation, innovation)
     drive -= np.outer(white.pole_slope / white.deviation, before)
     drive += np.outer(white.zero_slope, residual_before)
-    return residual, np.asarray(lfilter([1.0], poles, drive, axis=1))
+    return residual, np.stack([linear_filter([1.0], poles, row)[0] for row in drive])

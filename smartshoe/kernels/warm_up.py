@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-KERNELS = ("first_order", "shift", "srivc", "residual")
+KERNELS = ("first_order", "shift", "srivc", "residual", "linear_filter")
 
 
 def begin() -> None:
@@ -30,6 +30,7 @@ def compile_all() -> None:
     import numpy as np
 
     from smartshoe.kernels.first_order import COLUMNS, inner_products, respond
+    from smartshoe.kernels.linear_filter import linear_filter
     from smartshoe.kernels.residual import lagged_products, orthogonalise
     from smartshoe.kernels.shift import NEIGHBOURS, fill_taps, shift
     from smartshoe.kernels.srivc import delayed_products, instrument_products
@@ -43,6 +44,7 @@ def compile_all() -> None:
     shift(u, 0.5, 1.0, np.empty(32), np.empty(32))
     inner_products(u, none, u, every, step, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.zeros((0, 0)), products)
     lagged_products(u, np.ones(32, dtype=bool), np.zeros(2), np.zeros(2, dtype=int))
+    linear_filter([1.0, 1.0], [1.0, 0.5], u)
     orthogonalise(np.ones((2, 32)), 1)
 
 

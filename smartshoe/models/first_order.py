@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from smartshoe.errors import UsageError
+from smartshoe.kernels.linear_filter import linear_filter
 
 Array = NDArray[np.float64]
 Steps = float | Array
@@ -91,7 +91,7 @@ def lag(u: Array, alpha: float, step: Steps) -> Array:
     """w (n,) = alpha/(s + alpha) u, as if u[0] had lasted for ever; ``alpha`` in 1/s, ``step`` from `steps`."""
     if isinstance(step, float):
         decay, now, before = (float(value) for value in hold_coefficients(alpha * step))
-        return np.asarray(lfilter([now, before], [1.0, -decay], u, zi=[u[0] - now * u[0]])[0])
+        return linear_filter([now, before], [1.0, -decay], u, [u[0] - now * u[0]])[0]
     decay, now, before = hold_coefficients(alpha * step)
     return _recur(float(u[0]), decay, now * u[1:] + before * u[:-1])
 
@@ -103,7 +103,7 @@ def lag_and_slope(u: Array, alpha: float, step: Steps) -> tuple[Array, Array]:
     drive = step * (d_decay * w[:-1] + d_now * u[1:] + d_before * u[:-1])
     if isinstance(step, float):
         full = np.concatenate([[0.0], drive])
-        return w, np.asarray(lfilter([1.0], [1.0, -float(np.exp(-alpha * step))], full))
+        return w, linear_filter([1.0], [1.0, -float(np.exp(-alpha * step))], full)[0]
     return w, _recur(0.0, np.exp(-alpha * step), drive)
 
 

@@ -62,6 +62,7 @@ class Chart:
 
     ``says`` tells in words what is to be seen: it is the text for those who do not see it. Charts of one ``group``
     share cursor and zoom. ``dates``: x is in seconds since 1970.
+    ``window`` is what is seen of x at first, all where it is None.
     """
 
     title: str
@@ -73,6 +74,7 @@ class Chart:
     log_x: bool = False
     dates: bool = False
     marks: Sequence[Mark] = field(default_factory=tuple)
+    window: tuple[float, float] | None = None
 
     @property
     def lines(self) -> list[Line]:
@@ -149,6 +151,7 @@ def packed(chart: Chart, most: int) -> dict[str, Any]:
         "group": chart.group,
         "logX": chart.log_x,
         "dates": chart.dates,
+        "window": chart.window,
         "marks": [[mark.start, mark.end, mark.colour, mark.label] for mark in chart.marks],
         "panels": [
             {

@@ -6,34 +6,30 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from smartshoe.gait.result import GaitResult
-from smartshoe.report.gait import figures
+from smartshoe.report.charts import Chart, Line, Panel, Style
+from smartshoe.report.gait import charts as gait_charts
 from smartshoe.report.numbers import plain
-from smartshoe.report.paper.drawing import STYLE, figure_of, svg, thin
 from smartshoe.report.tables import new_console, table_of
 
 Array = NDArray[np.float64]
 
-TRUTH, RAW, CORRECTED = "#1f2937", "#d97706", "#059669"
-WINDOW_STRIDES = 3
 COLUMNS = ("truth", "raw", "corrected")
 
 
 @dataclass(frozen=True, eq=False)
 class TrialSection:
     """What the page says of a trial: numbers against the truth (label and one text each of `COLUMNS`), sentences,
-    figures with captions, and where the trial's own page lies (relative to the report)."""
+    charts, and where the trial's own page lies (relative to the report)."""
 
     name: str
     verdict: str
     rows: list[tuple[str, list[str]]]
     notes: list[str]
-    pictures: list[tuple[str, Markup]]
+    charts: list[Chart]
     page: str
 
 
@@ -41,17 +37,8 @@ def section(
     result: Mapping[str, Any], found: GaitResult, time_s: Array, totals: Mapping[str, Array], page: str
 ) -> TrialSection:
     """The section of a trial; ``result`` is `TrialResult.to_dict()`, ``totals`` (n,) in N by `COLUMNS`."""
-    pictures = [
-        ("Total vertical force of both feet, and what each estimate misses", total_course(found, time_s, totals))
-    ]
-    if found.strides:
-        pictures += [
-            ("Left and right as a butterfly: right is drawn downwards", figures.butterfly(found) or ""),
-            ("Load of each unit over a stride, mean and one standard deviation", figures.regions(found) or ""),
-        ]
-    # The SVG comes from matplotlib, which escapes the texts it draws.
-    drawn = [(caption, Markup(text)) for caption, text in pictures if text]
-    return TrialSection(result["name"], verdict(result), rows(result), notes(result), drawn, page)
+    charts = [total_chart(found, time_s, totals), *gait_charts.mean_strides(found)]
+    return TrialSection(result["name"], verdict(result), rows(result), notes(result), charts, page)
 
 
 def verdict(result: Mapping[str, Any]) -> str:
@@ -120,34 +107,20 @@ def notes(result: Mapping[str, Any]) -> list[str]:
     return said
 
 
-def total_course(found: GaitResult, time_s: Array, totals: Mapping[str, Array]) -> str:
-    """Both feet's force against time, and the estimates less the truth: the whole trial, or a few strides of it."""
-    start, end = float(time_s[0]), float(time_s[-1])
-    own = [s for s in found.strides if s.foot == found.strides[0].foot]
-    if own:
-        middle = len(own) // 2
-        start, end = own[middle].start_s, own[min(middle + WINDOW_STRIDES, len(own)) - 1].end_s
-    kept = (time_s >= start) & (time_s <= end)
-    colours = dict(zip(COLUMNS, (TRUTH, RAW, CORRECTED), strict=True))
-    with mpl.rc_context(STYLE):
-        figure, axes = figure_of(9.6, 5.0, 1, 2)
-        for name in ("raw", "corrected", "truth"):
-            if name in totals:
-                axes[0].plot(*thin(time_s[kept], totals[name][kept]), color=colours[name], label=name)
-                if name != "truth" and "truth" in totals:
-                    left = (totals[name] - totals["truth"])[kept]
-                    axes[1].plot(*thin(time_s[kept], left), color=colours[name], lw=0.8)
-        weight = found.forces.body_weight
-        if weight is not None:
-            axes[0].axhline(weight.value, color="#6b7280", lw=0.8, ls="--", label=f"body weight {weight.value:.0f} N")
-        axes[0].set_ylabel("total (N)")
-        # Above the axes: a course may fill all of them.
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, fontsize=8, borderpad=0.1)
-        axes[1].set_ylabel("estimate − truth (N)")
-        axes[1].set_xlabel("time (s)")
-        for axis in axes:
-            axis.set_xlim(start, end)
-        return svg(figure)
+def total_chart(found: GaitResult, time_s: Array, totals: Mapping[str, Array]) -> Chart:
+    """Both feet's force against time, and the estimates less the truth where it is known."""
+    styles: dict[str, Style] = {"truth": "line", "raw": "dashed", "corrected": "line"}
+    lines = [Line(name, totals[name], name, styles[name]) for name in COLUMNS if name in totals]
+    panels = [Panel("total force (N)", lines)]
+    says = "Total vertical force of both feet."
+    weight = found.forces.body_weight
+    if weight is not None:
+        says = f"Total vertical force of both feet; body weight {plain(weight.value, 4)} N."
+    if "truth" in totals:
+        apart = [Line(f"{name} − truth", totals[name] - totals["truth"], name, styles[name])
+                 for name in COLUMNS[1:] if name in totals]  # fmt: skip
+        panels.append(Panel("estimate − truth (N)", apart, height=150))
+    return Chart("The trial's total force", says, "time (s)", time_s, panels, window=gait_charts.some_strides(found))
 
 
 def print_trial(result: Mapping[str, Any]) -> None:

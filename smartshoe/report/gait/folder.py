@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.atomic import json_text, write_text
+from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.gait.result import GaitResult
 from smartshoe.report.gait.page import write_gait_page
 
@@ -16,10 +16,13 @@ DIGITS = 9  # of a number in the tables of strides and events
 TIME_FORMAT, FORMAT = "%.9g", "%.6g"  # of the forces: a load is not known to a millionth of itself
 
 
-def publish_gait(folder: Path, found: GaitResult, title: str, facts: Mapping[str, str]) -> dict[str, Path]:
+def publish_gait(
+    folder: Path, found: GaitResult, title: str, facts: Mapping[str, str], figures: str | None = None
+) -> dict[str, Path]:
     """Write ``gait.html``, ``gait.json``, ``strides.csv``, ``events.csv`` and ``forces.csv`` below ``folder``.
 
-    Returns them by what they are. ``forces.csv`` is a plain table, a trial again for ``smartshoe gait``.
+    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns them by what they are.
+    ``forces.csv`` is a plain table, a trial again for ``smartshoe gait``.
     """
     import smartshoe
 
@@ -33,6 +36,11 @@ def publish_gait(folder: Path, found: GaitResult, title: str, facts: Mapping[str
         write_text(written[table], text)
     write_text(written["forces"], forces_text(found.columns()))
     write_gait_page(written["report"], found, f"Gait: {title}", {**facts, "smartshoe": smartshoe.__version__})
+    if figures is not None:
+        from smartshoe.report.paper.gait import write_figures
+
+        written["figures"] = make_folder(folder / "figures")
+        write_figures(written["figures"], found, figures)
     return written
 
 

@@ -2,11 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
+
 from smartshoe.gait.result import GaitResult
+from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
+
+COVERAGE_NOTE = (
+    "* no --coverage was given: peaks, impulses and loading rates are those of the load on the units alone, lower than"
+    " the foot's where part of it passes beside them"
+)
+
+
+def depends_on_coverage(found: GaitResult) -> bool:
+    """Whether forces of feet rest on a coverage that nobody gave."""
+    return found.coverage == 1.0 and any(foot.force_n is not None for foot in found.feet.values())
+
+
+def _peaks(found: GaitResult, foot: str) -> str:
+    """The mean peak with its 95 % interval: of the mean over strides, and the estimate's own error."""
+    own = [stride.peak_n for stride in main_strides(found, foot) if stride.peak_n is not None]
+    if len(own) < 2:
+        return "–"
+    own_sd = float(np.std(own, ddof=1)) / math.sqrt(len(own))
+    sd = math.hypot(own_sd, found.forces.rmse_estimate_n or 0.0)
+    return f"{plain(float(np.mean(own)))} ± {plain(1.96 * sd, 2)}"
 
 
 def _cv(spread: dict[str, Any] | None, digits: int = 3) -> str:
@@ -20,14 +44,16 @@ def by_foot(found: GaitResult) -> list[tuple[str, list[str]]]:
     """Rows of the table: what, and each foot's cell; rows that say nothing are left out."""
     summary = found.summary
     feet = list(found.feet)
+    mark = "*" if depends_on_coverage(found) else ""
     rows: list[tuple[str, list[str]]] = [
         ("strides", [str(summary["strides"].get(foot, 0)) for foot in feet]),
         ("stride time (s)", [_cv(summary["stride_time_s"].get(foot)) for foot in feet]),
         ("step time on to it (s)", [_cv(summary["step_time_s"].get(foot)) for foot in feet]),
         ("stance (% of stride)", [plain(summary["stance_percent"].get(foot)) for foot in feet]),
-        ("peak force (N)", [_cv(summary["peak_n"].get(foot)) for foot in feet]),
-        ("impulse (N s)", [_cv(summary["impulse_n_s"].get(foot)) for foot in feet]),
-        ("loading rate (N/s)", [_cv(summary["loading_rate_n_per_s"].get(foot)) for foot in feet]),
+        (f"peak force{mark} (N)", [_cv(summary["peak_n"].get(foot)) for foot in feet]),
+        (f"mean peak{mark} ± 95 % (N)", [_peaks(found, foot) for foot in feet]),
+        (f"impulse{mark} (N s)", [_cv(summary["impulse_n_s"].get(foot)) for foot in feet]),
+        (f"loading rate{mark} (N/s)", [_cv(summary["loading_rate_n_per_s"].get(foot)) for foot in feet]),
         ("sequence errors (%)", [plain(found.indices[foot]["sequence_error_percent"], 2) for foot in feet]),
         ("deviation from pattern (%)", [plain(found.indices[foot]["deviation_percent"], 2) for foot in feet]),
         ("abnormality (%)", [plain(found.indices[foot]["abnormality_percent"], 2) for foot in feet]),
@@ -44,6 +70,8 @@ def print_gait(found: GaitResult, title: str) -> None:
     console = new_console()
     if table.row_count:
         console.print(table)
+        if depends_on_coverage(found):
+            console.print(COVERAGE_NOTE, soft_wrap=True)
     else:
         console.print(f"{title}: {found.activity}")
     said = [

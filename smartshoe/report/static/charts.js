@@ -174,6 +174,7 @@
       return u;
     });
     drawn.set(key, plots);
+    if (chart.window) zoom(plots, ...chart.window);
     plot.addEventListener("keydown", (event) => onKey(event, chart, plots));
     figure.querySelector("button.whole").addEventListener("click", () => zoom(plots, ...edge));
     const own = figure.querySelector("button.own");

@@ -7,20 +7,21 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from smartshoe.gait.insole import OUTLINE, PLACES
 from smartshoe.gait.result import FootCourse, GaitResult
-from smartshoe.report.gait.figures import FOOT_COLOURS, REGION_COLOURS, TOTAL, main_strides
-from smartshoe.report.paper.drawing import STYLE, svg
+from smartshoe.report.gait.shapes import INWARDS, MIDDLE, paths_of, placed
+from smartshoe.report.gait.strides import main_strides
+from smartshoe.report.paper.drawing import STYLE
+from smartshoe.report.paper.gait import FOOT_COLOURS, REGION_COLOURS, TOTAL
 
 Array = NDArray[np.float64]
 
-MIDDLE = {"left": -0.23, "right": 0.23}  # of each insole's axis, in insole lengths to the right
-INWARDS = {"left": 1.0, "right": -1.0}
-MOST_STANCES, PATH_POINTS = 30, 45
+MOST_STANCES = 30
 MOST_SWAY = 3000
 
 
@@ -36,23 +37,6 @@ def outline(foot: str) -> Path:
         vertices += [points[k] + slope[k], points[following] - slope[following], points[following]]
         codes += [Path.CURVE4] * 3
     return Path(vertices, codes)
-
-
-def placed(foot: str, centre: Array) -> Array:
-    """Centres (n, 2), along and medial, as points of the drawing (n, 2)."""
-    return np.column_stack([MIDDLE[foot] + INWARDS[foot] * centre[:, 1], centre[:, 0]])
-
-
-def _paths(found: GaitResult, foot: FootCourse) -> tuple[list[Array], Array]:
-    """Each stance's path, and the mean one (`PATH_POINTS`, 2), at 2 to 98 % of stance."""
-    share = np.linspace(0.02, 0.98, PATH_POINTS)
-    paths = []
-    for stride in main_strides(found, foot.name):
-        at = stride.start_s + share * (stride.toe_off_s - stride.start_s)
-        known = np.isfinite(foot.centre[:, 0])
-        path = np.column_stack([np.interp(at, foot.time_s[known], foot.centre[known, way]) for way in range(2)])
-        paths.append(path)
-    return paths, np.mean(paths, axis=0) if paths else np.zeros((0, 2))
 
 
 def _draw_sole(axis: Any, foot: FootCourse) -> None:
@@ -76,10 +60,8 @@ def _plain(axis: Any, title: str) -> None:
     axis.set_title(title)
 
 
-def centre(found: GaitResult) -> str:
+def centre(found: GaitResult) -> Figure:
     """Left: each foot's centre of pressure over its insole. Right: that of both feet, drawn side by side."""
-    from matplotlib.figure import Figure
-
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 4.9))
         both = len(found.feet) == 2 and found.total_n is not None
@@ -87,7 +69,7 @@ def centre(found: GaitResult) -> str:
         figure.subplots_adjust(0.02, 0.02, 0.98, 0.93, 0.06)
         for foot in found.feet.values():
             _draw_sole(axes[0], foot)
-            paths, mean = _paths(found, foot)
+            paths, mean = paths_of(found, foot)
             for path in paths[:: max(1, len(paths) // MOST_STANCES)]:
                 axes[0].plot(*placed(foot.name, path).T, color=FOOT_COLOURS[foot.name], lw=0.5, alpha=0.3, zorder=2)
             if paths:
@@ -109,7 +91,7 @@ def centre(found: GaitResult) -> str:
                 )
             axes[1].plot(*_of_both(found).T, color=TOTAL, lw=0.5, alpha=0.5)
             _plain(axes[1], "both feet, as if side by side")
-        return svg(figure)
+        return figure
 
 
 def _of_both(found: GaitResult) -> Array:

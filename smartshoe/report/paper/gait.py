@@ -1,23 +1,26 @@
-"""A trial's figures as SVG texts: strides overlaid, the butterfly of both feet, phases as bands, the trial's course."""
+"""A trial's figures: strides overlaid, the butterfly of both feet, phases as bands, the trial's course."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from smartshoe.gait.indices import POINTS, overlaid
 from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
-from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.gait.result import GaitResult
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
-from smartshoe.report.paper.drawing import STYLE, figure_of, svg, thin
+from smartshoe.report.gait.strides import main_strides, whole_of
+from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
 
 Array = NDArray[np.float64]
 
@@ -38,16 +41,6 @@ def bundle(x: Array, rows: Array, colour: str) -> LineCollection:
     return LineCollection(list(pieces), colors=colour, linewidths=0.4, alpha=0.25)
 
 
-def whole_of(foot: FootCourse) -> Array:
-    """The foot's whole force (n,) in N, or the sum of its readings where there is no force."""
-    return foot.force_n if foot.force_n is not None else np.asarray(foot.load.sum(axis=1))
-
-
-def main_strides(found: GaitResult, foot: str) -> list[Stride]:
-    """The foot's strides that the summary counts."""
-    return [stride for stride in of_main_activity(found.strides) if stride.foot == foot]
-
-
 def _unit(found: GaitResult) -> str:
     foot = next(iter(found.feet.values()))
     return "vertical force (N)" if foot.force_n is not None else f"sum of readings ({foot.symbol})"
@@ -57,7 +50,7 @@ def _toe_off(strides: Sequence[Stride]) -> float:
     return float(np.mean([stride.stance_percent for stride in strides]))
 
 
-def strides(found: GaitResult) -> str | None:
+def strides(found: GaitResult) -> Figure | None:
     """Every foot's strides overlaid, with mean and band of one sd; None without strides."""
     feet = [foot for foot in found.feet.values() if main_strides(found, foot.name)]
     if not feet:
@@ -82,10 +75,10 @@ def strides(found: GaitResult) -> str | None:
             axis.set_ylim(min(0.0, -0.04 * top), 1.06 * top)
         axes[0].set_ylabel(_unit(found))
         axes[0].legend(loc="upper right", fontsize=8)
-        return svg(figure)
+        return figure
 
 
-def butterfly(found: GaitResult) -> str | None:
+def butterfly(found: GaitResult) -> Figure | None:
     """Left above and right below one line, mean and band each, and how far they differ; None with one foot."""
     feet = [foot for foot in found.feet.values() if main_strides(found, foot.name)]
     if len(feet) < 2:
@@ -112,10 +105,10 @@ def butterfly(found: GaitResult) -> str | None:
         axis.set_xlabel("stride (%), each from its own heel strike; dashed: toe off")
         axis.set_ylabel(_unit(found))
         axis.legend(loc="upper right", ncols=3, fontsize=8)
-        return svg(figure)
+        return figure
 
 
-def regions(found: GaitResult) -> str | None:
+def regions(found: GaitResult) -> Figure | None:
     """Mean load of each unit over the stride, with a band of one sd; None without strides."""
     feet = [foot for foot in found.feet.values() if main_strides(found, foot.name)]
     if not feet:
@@ -139,10 +132,10 @@ def regions(found: GaitResult) -> str | None:
             axis.set_ylim(-0.05 * top, 1.06 * top)
         axes[0].set_ylabel("load (N)" if feet[0].is_force else f"reading ({feet[0].symbol})")
         axes[-1].legend(loc="upper right", fontsize=8)
-        return svg(figure)
+        return figure
 
 
-def phases(found: GaitResult) -> str | None:
+def phases(found: GaitResult) -> Figure | None:
     """Some strides of both feet with their crisp phases as bands; None without strides."""
     own = of_main_activity(found.strides)
     if not own:
@@ -168,10 +161,10 @@ def phases(found: GaitResult) -> str | None:
         axes[-1].set_xlabel("time (s)")
         handles = [Patch(color=colour, label=name) for colour, name in zip(PHASE_COLOURS, PHASES, strict=True)]
         axes[0].legend(handles=handles, **ABOVE)
-        return svg(figure)
+        return figure
 
 
-def memberships(found: GaitResult) -> str | None:
+def memberships(found: GaitResult) -> Figure | None:
     """Mean membership in the six phases over the stride, stacked, for each foot; None without strides."""
     feet = [foot for foot in found.feet.values() if main_strides(found, foot.name)]
     if not feet:
@@ -193,10 +186,10 @@ def memberships(found: GaitResult) -> str | None:
             axis.grid(visible=False)
         axes[0].set_ylabel("membership")
         axes[-1].legend(loc="lower right", fontsize=7, frameon=True, framealpha=0.85)
-        return svg(figure)
+        return figure
 
 
-def course(found: GaitResult) -> str:
+def course(found: GaitResult) -> Figure:
     """The whole trial against time: each foot's force, the total, and body weight."""
     with mpl.rc_context(STYLE):
         figure, axes = figure_of(9.6, 4.6, 1, 2)
@@ -227,10 +220,10 @@ def course(found: GaitResult) -> str:
         for axis in axes:
             axis.set_xlim(float(first.time_s[0]), float(first.time_s[-1]))
         axes[1].set_xlabel("time (s)")
-        return svg(figure)
+        return figure
 
 
-def variability(found: GaitResult) -> str | None:
+def variability(found: GaitResult) -> Figure | None:
     """Stride time and peak, stride by stride; None with fewer than three strides of a foot."""
     feet = [foot for foot in found.feet.values() if len(main_strides(found, foot.name)) > 2]
     if not feet:
@@ -250,4 +243,16 @@ def variability(found: GaitResult) -> str | None:
             axis.set_ylabel(label)
             axis.set_xlabel("time (s)")
         axes[0].legend(**ABOVE)
-        return svg(figure)
+        return figure
+
+
+def write_figures(folder: Path, found: GaitResult, ending: str) -> list[Path]:
+    """Write the trial's figures (svg, pdf, png by ``ending``) below ``folder``, and return them."""
+    from smartshoe.report.paper.soles import centre
+
+    drawn = {
+        "trial": course(found), "strides": strides(found), "butterfly": butterfly(found), "units": regions(found),
+        "phases": phases(found), "memberships": memberships(found), "centre": centre(found),
+        "variability": variability(found),
+    }  # fmt: skip
+    return [save(figure, folder / f"{what}.{ending}") for what, figure in drawn.items() if figure is not None]

@@ -1,0 +1,52 @@
+"""A linear filter over a signal, as `scipy.signal.lfilter`: importing scipy.signal takes longer than a calibration."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def run(numerator, denominator, values, state, out):  # type: ignore[no-untyped-def]
+    """Direct form II transposed; ``state`` (order,) is what the past left and is moved on."""
+    order = state.size
+    if order == 1:
+        b0, b1, a1, z = numerator[0], numerator[1], denominator[1], state[0]
+        for k in range(values.size):
+            x = values[k]
+            y = z + b0 * x
+            z = x * b1 - y * a1
+            out[k] = y
+        state[0] = z
+        return
+    for k in range(values.size):
+        x = values[k]
+        y = numerator[0] * x
+        if order > 0:
+            y += state[0]
+            for j in range(order - 1):
+                state[j] = state[j + 1] + x * numerator[j + 1] - y * denominator[j + 1]
+            state[order - 1] = x * numerator[order] - y * denominator[order]
+        out[k] = y
+
+
+def linear_filter(
+    numerator: ArrayLike, denominator: ArrayLike, values: Array, state: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """``values`` (n,) through numerator/denominator (in z to the minus k, constant first), and the state it leaves.
+
+    ``state`` (order,) is what came before, nothing (zeros) where it is not given: `scipy.signal.lfilter`'s ``zi``.
+    The numbers are lfilter's, bit for bit.
+    """
+    top, bottom = np.asarray(numerator, dtype=float), np.asarray(denominator, dtype=float)
+    size = max(top.size, bottom.size)
+    b, a = np.zeros(size), np.zeros(size)
+    b[: top.size], a[: bottom.size] = top / bottom[0], bottom / bottom[0]
+    left = np.zeros(size - 1) if state is None else np.array(state, dtype=float)
+    given = np.array(values, dtype=float)  # a writeable copy: numba compiles anew for read-only arrays
+    out = np.empty(given.size)
+    run(b, a, given, left, out)
+    return out, left

@@ -1,0 +1,91 @@
+"""The insoles from above: outlines, units by their peaks, the path of the centre of pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from smartshoe.gait.insole import OUTLINE, PLACES
+from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.report.gait.strides import main_strides
+from smartshoe.report.numbers import plain
+
+Array = NDArray[np.float64]
+
+MIDDLE = {"left": -0.23, "right": 0.23}  # of each insole's axis, in insole lengths to the right
+INWARDS = {"left": 1.0, "right": -1.0}
+PATH_POINTS = 45
+SIZE = 100.0  # of an insole's length in the drawing
+WIDE, HIGH = 96.0, 110.0
+
+
+def placed(foot: str, centre: Array) -> Array:
+    """Centres (n, 2), along and medial, as points of the drawing (n, 2) in insole lengths."""
+    return np.column_stack([MIDDLE[foot] + INWARDS[foot] * centre[:, 1], centre[:, 0]])
+
+
+def paths_of(found: GaitResult, foot: FootCourse) -> tuple[list[Array], Array]:
+    """Each stance's path, and the mean one (`PATH_POINTS`, 2), at 2 to 98 % of stance."""
+    share = np.linspace(0.02, 0.98, PATH_POINTS)
+    paths = []
+    for stride in main_strides(found, foot.name):
+        at = stride.start_s + share * (stride.toe_off_s - stride.start_s)
+        known = np.isfinite(foot.centre[:, 0])
+        path = np.column_stack([np.interp(at, foot.time_s[known], foot.centre[known, way]) for way in range(2)])
+        paths.append(path)
+    return paths, np.mean(paths, axis=0) if paths else np.zeros((0, 2))
+
+
+def _points(points: Array) -> Array:
+    """Insole lengths, upwards, as the drawing's units, downwards."""
+    return np.column_stack([WIDE / 2 + SIZE * points[:, 0], HIGH - 5 - SIZE * points[:, 1]])
+
+
+def _outline(foot: str) -> str:
+    points = _points(np.array([(MIDDLE[foot] + INWARDS[foot] * medial, along) for along, medial in OUTLINE]))
+    slope = (np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)) / 6.0
+    # Catmull-Rom through the points, as cubic Bézier pieces.
+    pieces = [f"M{points[0][0]:.1f},{points[0][1]:.1f}"]
+    for k in range(len(points)):
+        n = (k + 1) % len(points)
+        corners = (points[k] + slope[k], points[n] - slope[n], points[n])
+        pieces.append("C" + " ".join(f"{x:.1f},{y:.1f}" for x, y in corners))
+    return "".join(pieces) + "Z"
+
+
+def _foot(found: GaitResult, foot: FootCourse) -> Markup:
+    drawn = [Markup('<path class="sole" d="{}"/>').format(_outline(foot.name))]
+    peaks = foot.usual_peak
+    share = peaks / max(float(peaks.max()), 1e-12)
+    spots = _points(placed(foot.name, np.array([PLACES[region] for region in foot.regions])))
+    for region, (x, y), part in zip(foot.regions, spots, share, strict=True):
+        radius = SIZE * (0.015 + 0.03 * float(np.sqrt(max(part, 0.0))))
+        drawn.append(
+            Markup('<circle cx="{:.1f}" cy="{:.1f}" r="{:.1f}" style="fill:var(--{})"/>').format(x, y, radius, region)
+        )
+    _, mean = paths_of(found, foot)
+    if len(mean):
+        points = _points(placed(foot.name, mean))
+        text = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+        drawn.append(Markup('<polyline class="path" points="{}"/>').format(text))
+        drawn.append(Markup('<circle class="begin" cx="{:.1f}" cy="{:.1f}" r="1.6"/>').format(*points[0]))
+    outward = -INWARDS[foot.name]
+    outside, anchor = WIDE / 2 + SIZE * (MIDDLE[foot.name] + 0.19 * outward), "end" if outward < 0 else "start"
+    for region, (_, y), peak in zip(foot.regions, spots, peaks, strict=True):
+        unit = "N" if foot.is_force else foot.symbol
+        drawn.append(
+            Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="{}">{} {} {}</text>').format(
+                outside, y + 1.3, anchor, region, plain(float(peak)), unit
+            )
+        )
+    return Markup("").join(drawn)
+
+
+def insoles(found: GaitResult) -> Markup:
+    """Both insoles with the units' usual peaks and each foot's mean path of the centre of pressure."""
+    feet = Markup("").join(_foot(found, foot) for foot in found.feet.values())
+    return Markup(
+        '<svg class="soles" viewBox="-36 0 168 110" role="img" aria-label="Insoles seen from above, with each unit\'s'
+        ' usual peak and the mean path of the centre of pressure, from heel strike (dot) to toe off.">{}</svg>'
+    ).format(feet)

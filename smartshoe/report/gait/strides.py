@@ -1,0 +1,22 @@
+"""What a trial's charts, pages and figures take from a result: the strides that count, a foot's whole force."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.gait.strides import Stride
+from smartshoe.gait.summary import of_main_activity
+
+Array = NDArray[np.float64]
+
+
+def whole_of(foot: FootCourse) -> Array:
+    """The foot's whole force (n,) in N, or the sum of its readings where there is no force."""
+    return foot.force_n if foot.force_n is not None else np.asarray(foot.load.sum(axis=1))
+
+
+def main_strides(found: GaitResult, foot: str) -> list[Stride]:
+    """The foot's strides that the summary counts."""
+    return [stride for stride in of_main_activity(found.strides) if stride.foot == foot]
