@@ -60,7 +60,8 @@ def test_nothing_is_clipped_small_faint_or_fetched(browser: Browser, page: Path,
 @pytest.mark.browser
 def test_the_trial_opens_on_some_strides_and_zooms_out(browser: Browser, page: Path) -> None:
     browser.open(page)
-    whole = "[...document.querySelectorAll('figure.chart')].find(f => f.querySelector('h3').textContent === 'The trial')"
+    titled = "f => f.querySelector('h3').textContent === 'The trial'"
+    whole = f"[...document.querySelectorAll('figure.chart')].find({titled})"
     browser.run(f"{whole}.scrollIntoView()")
     browser.settle()
     hidden = f"{whole}.querySelector('button.whole').hidden"
