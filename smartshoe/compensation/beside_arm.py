@@ -6,6 +6,8 @@ u, the load follows without a loop.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,6 +46,20 @@ class _Lag:
     {state} = {self.before!r} * {given} + {self.decay!r} * {into};
 """
 
+    def c_increments(self, state: str, begun: str, into: str, given: str) -> str:
+        """The same for single precision; ``state`` is the lag itself, ``state``_before what was given before."""
+        return f"""    if (!({begun} > 0.0)) {{
+        {state} = {given};
+        {state}_before = {given};
+    }}
+    {{
+        const double step = {self.now!r} * ({given} - {state}) + {self.before!r} * ({state}_before - {state});
+        {state} += step;
+        {state}_before = {given};
+    }}
+    const double {into} = {state};
+"""
+
 
 class BesideArm(Inverse):
     """A block of the wall: the core is given u + kappa (u - q), of which kappa (u - q) is the arm's.
@@ -68,9 +84,15 @@ class BesideArm(Inverse):
 
     def c_step(self, name: str) -> CStep:
         """The same, around the spring's own."""
-        step = self.spring.c_step(name)
+        return self._around(name, self.spring.c_step(name), self.lag.c_lines)
+
+    def c_single(self, name: str) -> CStep:
+        """The same by increments."""
+        return self._around(name, self.spring.c_single(name), self.lag.c_increments)
+
+    def _around(self, name: str, step: CStep, lag: Callable[[str, str, str, str], str]) -> CStep:
         kept, begun, arm = f"{name}_lag", f"{name}_begun", f"{name}_arm"
-        lagged = self.lag.c_lines(f"f->{kept}", f"f->{begun}", f"{name}_lagged", "x")
+        lagged = lag(f"f->{kept}", f"f->{begun}", f"{name}_lagged", "x")
         body = f"""{{
 {lagged}    const double {arm} = {self.part!r} * (x - {name}_lagged);
     f->{begun} = 1.0;
@@ -78,7 +100,7 @@ class BesideArm(Inverse):
     {step.body}
     x += {arm};
 }}"""
-        return CStep({**step.states, kept: 0.0, begun: 0.0}, body)
+        return CStep({**step.states, **_members(body, kept), begun: 0.0}, body)
 
 
 class GasBesideArm(Inverse):
@@ -109,13 +131,24 @@ class GasBesideArm(Inverse):
 
     def c_step(self, name: str) -> CStep:
         """The same, around the spring's own."""
-        step = self.spring.c_step(name)
+        return self._around(name, self.spring.c_step(name), _Lag.c_lines)
+
+    def c_single(self, name: str) -> CStep:
+        """The same by increments."""
+        return self._around(name, self.spring.c_single(name), _Lag.c_increments)
+
+    def _around(self, name: str, step: CStep, lag: Callable[[_Lag, str, str, str, str], str]) -> CStep:
         arm, core, begun, bent = (f"{name}_{word}" for word in ("arm", "core", "begun", "bent"))
         body = f"""{{
     const double {bent} = {1.0 + self.ratio!r} * x / (1.0 + {self.ratio!r} * x);
-{self.arm.c_lines(f"f->{arm}", f"f->{begun}", f"{name}_relaxed", bent)}    {step.body}
+{lag(self.arm, f"f->{arm}", f"f->{begun}", f"{name}_relaxed", bent)}    {step.body}
     x += {self.share!r} * ({bent} - {name}_relaxed);
-{self.core.c_lines(f"f->{core}", f"f->{begun}", f"{name}_lagged", "x")}    f->{begun} = 1.0;
+{lag(self.core, f"f->{core}", f"f->{begun}", f"{name}_lagged", "x")}    f->{begun} = 1.0;
     x -= {self.part!r} * (x - {name}_lagged);
 }}"""
-        return CStep({**step.states, arm: 0.0, core: 0.0, begun: 0.0}, body)
+        return CStep({**step.states, **_members(body, arm), **_members(body, core), begun: 0.0}, body)
+
+
+def _members(body: str, lag: str) -> dict[str, float]:
+    """The members of the struct that a lag's C has."""
+    return {name: 0.0 for name in (lag, f"{lag}_before") if f"f->{name}" in body}

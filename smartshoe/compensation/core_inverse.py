@@ -67,20 +67,39 @@ class CoreInverse(Inverse):
         """The same sums in the same order."""
         if self._push is None:
             return CStep({}, f"x /= {self.direct!r};")
+        states, lines = self._solved(name)
+        for i, row in enumerate(self.transition):
+            terms = [f"{float(self.drive[i])!r} * x"]
+            terms += [f"{float(value)!r} * f->{state}" for state, value in zip(states, row, strict=True) if value]
+            lines.append(f"const double moved_{i} =\n    " + "\n    + ".join(terms) + ";")
+        lines += [f"f->{state} = moved_{i};" for i, state in enumerate(states)]
+        return self._step(name, states, lines)
+
+    def c_single(self, name: str) -> CStep:
+        """By increments: a slow state's transition is 1 less a little, of which single precision keeps four digits."""
+        if self._push is None:
+            return self.c_step(name)
+        states, lines = self._solved(name)
+        for i, row in enumerate(self.transition - np.eye(len(states))):
+            terms = [f"{float(self.drive[i])!r} * x"]
+            terms += [f"{float(value)!r} * f->{state}" for state, value in zip(states, row, strict=True) if value]
+            lines.append(f"const double moved_{i} =\n    " + "\n    + ".join(terms) + ";")
+        lines += [f"f->{state} += moved_{i};" for i, state in enumerate(states)]
+        return self._step(name, states, lines)
+
+    def _solved(self, name: str) -> tuple[list[str], list[str]]:
+        """Names of the states, and the lines that begin them and turn the pressure x into the load."""
         states = [f"{name}_{i}" for i in range(self.read.size)]
         begun = f"{name}_begun"
         lines = [f"if (!(f->{begun} > 0.0)) {{"]
         lines += [f"    f->{state} = {float(value)!r} * x;" for state, value in zip(states, self.start, strict=True)]
         lines += [f"    f->{begun} = 1.0;", "}"]
         lines += [f"x -= {float(value)!r} * f->{state};" for state, value in zip(states, self.read, strict=True)]
-        lines.append(f"x /= {self.direct!r};")
-        for i, row in enumerate(self.transition):
-            terms = [f"{float(self.drive[i])!r} * x"]
-            terms += [f"{float(value)!r} * f->{state}" for state, value in zip(states, row, strict=True) if value]
-            lines.append(f"const double moved_{i} =\n    " + "\n    + ".join(terms) + ";")
-        lines += [f"f->{state} = moved_{i};" for i, state in enumerate(states)]
+        return states, [*lines, f"x /= {self.direct!r};"]
+
+    def _step(self, name: str, states: list[str], lines: list[str]) -> CStep:
         body = "\n".join(f"    {line}" for text in lines for line in text.split("\n"))
-        return CStep({**dict.fromkeys(states, 0.0), begun: 0.0}, f"{{\n{body}\n}}")
+        return CStep({**dict.fromkeys(states, 0.0), f"{name}_begun": 0.0}, f"{{\n{body}\n}}")
 
 
 def _bilinear(core: Core, step_s: float) -> tuple[Array, Array, Array]:

@@ -131,9 +131,14 @@ class ExtendedCompensator(ForceFilter):
                 signal = undone if finite.all() else np.where(finite, undone, signal)
         return np.asarray(self.model.full_scale_load_n * signal)
 
-    def c_steps(self) -> tuple[tuple[str, CStep], ...]:
-        """Every block's name and C99, in the order in which they run, between the two scalings."""
-        return tuple((name, inverse.c_step(name)) for name, inverse in self.blocks)
+    def c_steps(self, *, single: bool = False) -> tuple[tuple[str, CStep], ...]:
+        """Every block's name and C99, in the order in which they run, between the two scalings.
+
+        ``single`` asks for the form that loses least in single precision, still written in doubles.
+        """
+        return tuple(
+            (name, inverse.c_single(name) if single else inverse.c_step(name)) for name, inverse in self.blocks
+        )
 
 
 def _why_not(part: Part) -> str:

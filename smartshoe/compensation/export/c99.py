@@ -12,6 +12,7 @@ from smartshoe.compensation.export.cost import cost_lines
 from smartshoe.compensation.export.fixed_point import FixedPoint, FixedVector
 from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel, one_safe_line
 from smartshoe.compensation.export.rendering import columns_csv, finite_or, render, vector_csv
+from smartshoe.compensation.export.single import in_single
 from smartshoe.errors import UsageError
 
 Files = dict[str, str]
@@ -106,14 +107,12 @@ def _rounded_up(value: float) -> float:
 
 def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, Any]:
     """What the templates of the extended filter need beside the shared values."""
-    if precision != "double":
-        raise UsageError(
-            "an extended model is written in double only: its bisections stop at double precision and its memory of"
-            " leaks and drifts is lost in single; export with --precision double"
-        )
     filter_ = model.filter
-    blocks = filter_.c_steps()
-    states = {name: _initial(value) for _, step in blocks for name, value in step.states.items()}
+    single = precision == "float"
+    blocks = filter_.c_steps(single=single)
+    if single:
+        blocks = tuple((name, in_single(step)) for name, step in blocks)
+    states = {name: _initial(value, precision) for _, step in blocks for name, value in step.states.items()}
     return {
         "states": states,
         "blocks": [
@@ -121,20 +120,20 @@ def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, Any]:
             for name, step in blocks
             if step.body
         ],
-        "reading_per_share": repr(filter_.reading_per_share),
-        "full_scale_load_n": repr(filter_.model.full_scale_load_n),
-        "step_s": repr(filter_.step_s),
-        "started_s": repr(filter_.started_s),
+        "reading_per_share": _literal(filter_.reading_per_share, precision, "full_scale_reading"),
+        "full_scale_load_n": _literal(filter_.model.full_scale_load_n, precision, "full_scale_load_n"),
+        "step_s": _literal(filter_.step_s, precision, "sample time"),
+        "started_s": _literal(filter_.started_s, precision, "started_s"),
     }
 
 
 def _needs_time(body: str) -> bool:
     """Whether a block reads the time ``t``; one may have a local of that name instead."""
-    return re.search(r"\bt\b", body) is not None and re.search(r"\bdouble t\b", body) is None
+    return re.search(r"\bt\b", body) is not None and re.search(r"\b(?:double|float) t\b", body) is None
 
 
-def _initial(value: float) -> str:
-    return finite_or(value, "NAN", "INFINITY", repr(float(value)))
+def _initial(value: float, precision: str) -> str:
+    return finite_or(value, "NAN", "INFINITY", _literal(value, precision, "a state") if np.isfinite(value) else "")
 
 
 def _literal(value: float, precision: str, name: str) -> str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-_SIZES = {"double": 8, "float": 4, "int": 4, "int64_t": 8, "int32_t": 4, "int16_t": 2}
+_SIZES = {"double": 8, "float": 4, "int": 4, "int64_t": 8, "int32_t": 4, "uint32_t": 4, "int16_t": 2}
 _TYPES = "|".join(_SIZES)
 _TABLE = re.compile(rf"static const ({_TYPES}) \w+\[(\d+)\] = \{{[^}}]*\}};")
 _CONSTANT = re.compile(rf"static const ({_TYPES}) \w+ = [^;]*;")
 _LOOP = re.compile(r"for \(\w+ = 0; \w+ (<=?) (\d+); \w+\+\+\) \{")
-_TOKEN = re.compile(rf"{_LOOP.pattern}|->|\+\+|--|[<>=!]=|<<|>>|&&|\|\||\w+ ?\(|[-+*/{{}}<>]|[\d.]+(?:[eE][-+]?\d+)?")
+_TOKEN = re.compile(rf"{_LOOP.pattern}|->|\+\+|--|[<>=!]=|<<|>>|&&|\|\||\w+\(|[-+*/{{}}<>]|[\d.]+(?:[eE][-+]?\d+)?")
 _KINDS = {
     "+": "additions",
     "-": "additions",
@@ -23,7 +23,12 @@ _KINDS = {
     ">>": "shifts",
     "<<": "shifts",
 }
-_CALLS = re.compile(r"(?:exp|log|pow|sqrt|tanh|log1p|expm1|fabs)f? ?\(")
+FUNCTIONS = (
+    "exp|exp2|expm1|log|log2|log1p|pow|sqrt|cbrt|hypot|sin|cos|tan|asin|acos|atan|sinh|cosh|tanh|asinh|acosh|atanh"
+    "|fabs|fmax|fmin|fmod|floor|ceil"
+)
+"""Functions of <math.h> that blocks may call; each has a twin of the same name and an f for floats."""
+_CALLS = re.compile(rf"(?:{FUNCTIONS})f?\(")
 
 
 def state_bytes(header: str) -> int:
@@ -70,8 +75,8 @@ def _of(name: str, bodies: dict[str, str]) -> Counter[str]:
             found[_KINDS[token]] += times[-1]
         elif _CALLS.fullmatch(token):
             found["library calls"] += times[-1]
-        elif token.endswith("(") and token[:-1].strip() in bodies:
-            for kind, count in _of(token[:-1].strip(), bodies).items():
+        elif token.endswith("(") and token[:-1] in bodies:
+            for kind, count in _of(token[:-1], bodies).items():
                 found[kind] += times[-1] * count
     return found
 

@@ -143,12 +143,14 @@ class ExtendedFilterModel(FilterModel):
         return found
 
     def tolerance_n(self, precision: str) -> float:
-        """Bound in N on what rounding may do to `test_forces_n`: a billionth of the largest force.
+        """Bound in N on what rounding may do to `test_forces_n`.
 
-        Each block is run in the order of operations of the filter. What is left comes from the library's exp and pow
-        and is some 1e-14 of full scale; a wrong constant shows in the fourth digit.
+        Each block is run in the order of operations of the filter. In double, what is left comes from the library's
+        exp and pow and is some 1e-14 of full scale; the bound is a billionth, and a wrong constant shows in the
+        fourth digit. In float it is two dozen roundings a block, of the largest force.
         """
-        return float(1e-9 * max(np.abs(self.test_forces_n).max(), self.filter.model.full_scale_load_n))
+        most_n = max(np.abs(self.test_forces_n).max(), self.filter.model.full_scale_load_n)
+        return float(most_n * (1e-9 if precision == "double" else 24 * FLOAT_ROUNDING * len(self.filter.blocks)))
 
     @property
     def provenance(self) -> dict[str, str]:

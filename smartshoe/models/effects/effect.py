@@ -94,6 +94,10 @@ class Inverse(ABC):
     def c_step(self, name: str) -> CStep:
         """The same as C99, for the export; ``name`` is unique in the chain and goes before every identifier."""
 
+    def c_single(self, name: str) -> CStep:
+        """`c_step` in the form that loses least in single precision: written in doubles, turned into floats later."""
+        return self.c_step(name)
+
 
 @dataclass(frozen=True, slots=True)
 class CStep:

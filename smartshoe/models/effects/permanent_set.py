@@ -55,9 +55,10 @@ class PermanentSet(Effect):
     for (k = 0; k < 12; k++) {{
         p = known - {c_number(half)} * (p > 0.0 ? pow(p, {m}) : 0.0);
     }}
-    {of["flow"]} = p > 0.0 ? pow(p, {m}) : 0.0;
-    {of["set"]} = x - p;
-    x = p;
+    p = p > 0.0 ? pow(p, {m}) : 0.0;
+    {of["set"]} += {c_number(half)} * ({of["flow"]} + p);
+    {of["flow"]} = p;
+    x -= {of["set"]};
 }} else {{
     {of["flow"]} = x > 0.0 ? pow(x, {m}) : 0.0;
 }}"""
