@@ -23,6 +23,7 @@ LONG_S = 4 * 3600.0  # of a simulated walk, where its address does not say
 @click.option("--record", metavar="FILE", help="Record from the start to a new plain table.")
 @click.option("--speed", type=click.FloatRange(0.01, 1000.0), default=1.0, show_default=True,
               help="How fast a replayed or simulated shoe goes.")  # fmt: skip
+@click.option("--lsl", is_flag=True, help="Send the samples to the Lab Streaming Layer too (extra lsl).")
 def command(
     urls: tuple[str, ...],
     calibrations: tuple[str, ...],
@@ -31,6 +32,7 @@ def command(
     token: str | None,
     record: str | None,
     speed: float,
+    lsl: bool,
 ) -> None:
     """A page that shows a shoe (or two) while it is worn: forces, events, checks; record, mark, zero; Ctrl-C ends."""
     if (host is None) != (token is None):
@@ -55,7 +57,7 @@ def command(
             raise UsageError("--shoe is given twice with one address: give each shoe its own")
         for shoe in shoes.values():
             stack.enter_context(shoe)
-        session = LiveSession(shoes, loaded, record=None if record is None else Path(record), speed=speed)
+        session = LiveSession(shoes, loaded, record=None if record is None else Path(record), speed=speed, lsl=lsl)
         stack.callback(session.close)
         server = LiveServer(session, host or "127.0.0.1", port or 0, token)
         session.start()

@@ -29,6 +29,7 @@ class Ring:
 
     def append(self, time_s: Array, rows: Array) -> None:
         """Add ``time_s`` (n,) and ``rows`` (n, width)."""
+        self.end += time_s.size
         time_s, rows = time_s[-self._capacity :], rows[-self._capacity :]
         if self._stop + time_s.size > self._time.size:
             keep = slice(max(self._stop - self._capacity, self._start), self._stop)
@@ -39,7 +40,6 @@ class Ring:
         self._time[self._stop : after], self._rows[self._stop : after] = time_s, rows
         self._stop = after
         self._start = max(self._start, after - self._capacity)
-        self.end += time_s.size
 
     def since(self, place: int) -> tuple[Array, Array]:
         """Copies of times (n,) and rows (n, width) from ``place`` on, or from the oldest that is still here."""

@@ -18,6 +18,7 @@ from smartshoe.devices.base import Block, Shoe
 from smartshoe.devices.events import ShoeEvent
 from smartshoe.errors import UsageError
 from smartshoe.live import recorder
+from smartshoe.live.lsl import Outlet
 from smartshoe.live.pace import Pace
 from smartshoe.live.shoe import LiveShoe, lost_in
 from smartshoe.live.source import Source
@@ -32,7 +33,8 @@ class LiveSession:
     """Open shoes, shown until `close`. ``changed`` is called, from any thread, when there is something new to show.
 
     ``calibrations`` are of any of the shoes' units. ``record`` is the file to record to from the start; without it the
-    page's button records to a file named by date and time in the working folder.
+    page's button records to a file named by date and time in the working folder. ``lsl`` opens an outlet for each shoe
+    on the Lab Streaming Layer.
     """
 
     def __init__(
@@ -42,6 +44,7 @@ class LiveSession:
         *,
         record: Path | None = None,
         speed: float = 1.0,
+        lsl: bool = False,
         changed: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
@@ -55,6 +58,7 @@ class LiveSession:
         self.recording: recorder.Recording | None = None
         self.recorded: str | None = None  # what the last recording came to
         self._file = record
+        self._outlets = [Outlet(live, clock()) for live in self.shoes] if lsl else []
         self._lock = RLock()
         self.notes: deque[dict[str, Any]] = deque(maxlen=NOTES_KEPT)
         self.steps: deque[dict[str, Any]] = deque(maxlen=STEPS_KEPT)
@@ -79,6 +83,7 @@ class LiveSession:
         """End reading, then the recording; raises `InputError` where the disk did not take all of it."""
         for source in self._sources:
             source.close()
+        self._outlets = []
         self.stop_recording()
 
     def _taker(self, index: int) -> Callable[[Block], None]:
@@ -89,6 +94,8 @@ class LiveSession:
             host_s = block.host_time_s
             times_s = np.full(len(block), self.pace.clock()) if host_s is None else host_s
             session_s = self.pace.of_host(times_s)
+            if self._outlets:
+                self._outlets[index].push(block, times_s, force_n)
             steps = live.take(block, session_s, force_n)
             with self._lock:
                 if self.recording is None:

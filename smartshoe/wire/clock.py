@@ -18,6 +18,7 @@ Where the choice changes, the line goes on where it was, so that the constant st
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -38,6 +39,7 @@ FEW_BINS = 8
 CRYSTALS_SD = 100e-6  # what skews are before anything is known
 TUKEY = 4.685  # Huber 1981: 95 % of least squares' efficiency under normal noise
 SWITCH_GAIN = 0.7
+ALIKE = 0.5  # how the levels' errors correlate: 0.1 to 0.8 under the laws of tests/wire
 ROUNDS = 10
 SETTLED = 0.02  # of a standard error
 MANY_BINS = 240  # beyond, a new line each second is enough
@@ -153,12 +155,13 @@ class DeviceClock:
             self._shift_s += float(np.median(delays[best][2])) - float(np.median(delays[self._level][2]))
             self._level = best
         line = lines[self._level]
+        slope, slope_sd = _common_slope(list(lines.values()))
         return ClockFit(
             line.about_s,
             line.offset_s + self._shift_s,
             line.offset_sd_s,
-            line.slope * 1e6,
-            line.slope_sd * 1e6,
+            slope * 1e6,
+            slope_sd * 1e6,
             self._level,
             len(self._centres),
             self._samples,
@@ -206,6 +209,16 @@ class _Line:
         return math.hypot(self.offset_sd_s, self.slope_sd * (time_s - self.about_s))
 
 
+def _common_slope(lines: Sequence[_Line]) -> tuple[float, float]:
+    """The skew that all levels see, each as sure as it is, and its standard error: they err alike in part only."""
+    sds = np.array([line.slope_sd for line in lines])
+    weights = sds**-2.0
+    slope = float(weights @ np.array([line.slope for line in lines])) / float(weights.sum())
+    shares = weights * sds / float(weights.sum())
+    alone, together = float(shares @ shares), float(shares.sum()) ** 2
+    return slope, math.sqrt((1.0 - ALIKE) * alone + ALIKE * together)
+
+
 def _line(time_s: Array, delay_s: Array) -> _Line:
     """The straight line through ``delay_s`` (n,), by reweighted least squares; skews of crystals are its prior."""
     weights = np.ones_like(delay_s)
@@ -227,4 +240,8 @@ def _line(time_s: Array, delay_s: Array) -> _Line:
         moved = np.abs(offset + slope * lever[[0, -1]] - ends_before)
         if moved.max() < SETTLED * scatter / math.sqrt(total):
             break
+    # Least delays scatter to one side: the median distance alone would say too little of them.
+    rest = delay_s - offset - slope * (time_s - about)
+    inside = np.abs(rest) < TUKEY * scatter
+    scatter = max(scatter, float(np.sqrt(np.mean(rest[inside] ** 2))) if inside.any() else 0.0)
     return _Line(about, offset, scatter / math.sqrt(max(total, 1.0)), slope, scatter / math.sqrt(spread))

@@ -48,7 +48,7 @@ def serving(*urls: str, token: str | None = None, **options: Any) -> Iterator[tu
         yield server, session
     finally:
         server.stop()
-        thread.join(10.0)
+        thread.join(30.0)
         session.close()
         for shoe in shoes.values():
             shoe.close()
@@ -63,7 +63,7 @@ def page(server: LiveServer, query: str = "", **options: Any) -> ClientConnectio
 def told(socket: ClientConnection, kind: str, is_it: Callable[[Any], bool] = lambda _: True) -> Any:
     """The next JSON message of a kind (of which ``is_it`` holds)."""
     for _ in range(2000):
-        message = socket.recv(timeout=10.0)
+        message = socket.recv(timeout=30.0)
         if isinstance(message, str):
             found = json.loads(message)
             if found["type"] == kind and is_it(found):
@@ -73,11 +73,11 @@ def told(socket: ClientConnection, kind: str, is_it: Callable[[Any], bool] = lam
 
 def health(server: LiveServer) -> Any:
     """The health as JSON."""
-    with urllib.request.urlopen(f"{server.url}health", timeout=10.0) as answer:
+    with urllib.request.urlopen(f"{server.url}health", timeout=30.0) as answer:
         return json.load(answer)
 
 
-def until(is_so: Callable[[], bool], seconds: float = 20.0) -> None:
+def until(is_so: Callable[[], bool], seconds: float = 60.0) -> None:
     """Wait until something is so, for ``seconds`` at most."""
     end_s = time.monotonic() + seconds
     while not is_so():

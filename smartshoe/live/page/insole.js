@@ -1,5 +1,5 @@
 // The drawn insole: units by colour and number, the centre of pressure with its last second.
-const PHASES = ["swing", "heel", "flat", "push off"];
+const PHASES = ["swing", "on the heel", "flat", "push off"];
 const TRAIL = 50;
 
 function css(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
@@ -71,8 +71,10 @@ class Insole {
     });
     g.globalAlpha = 1;
     if (Number.isFinite(along)) {
-      g.beginPath(); g.arc(...at(along, medial), 5, 0, 7);
-      g.fillStyle = css("--bad"); g.fill(); g.lineWidth = 1.5; g.strokeStyle = css("--card"); g.stroke();
+      // A ring, so that the number beneath can be read.
+      g.beginPath(); g.arc(...at(along, medial), 7, 0, 7);
+      g.lineWidth = 5; g.strokeStyle = css("--card"); g.stroke();
+      g.lineWidth = 2.5; g.strokeStyle = css("--bad"); g.stroke();
     }
     const symbol = this.symbols[this.foot.columns[0]];
     const same = this.foot.columns.every((c) => this.symbols[c] === symbol);

@@ -78,7 +78,10 @@ function stripsOf(shoe, index) {
     new Strip(side === null ? "other units" : side ? side + " foot" : "foot", index, units, symbol, side));
 }
 
+// As many columns as there are pixels, strips as high as the window has room for.
 function fit() {
+  const room = innerWidth > 640 ? (innerHeight - 110) / Math.max(live.strips.length, 1) - 50 : 180;
+  for (const strip of live.strips) strip.height = Math.max(150, Math.min(room, 340));
   const wide = Math.max(100, Math.round((by("traces").clientWidth - LEFT) / 100) * 100);
   ask({ do: "view", seconds: live.seconds, columns: Math.min(wide, 1600) });
 }

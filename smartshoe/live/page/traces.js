@@ -1,9 +1,9 @@
 // Rolling traces: a strip for each foot (and unit of measurement), each column of pixels from its least to its greatest.
-const STRIP_HEIGHT = 190, BAND = 9, BELOW = 16, LEFT = 42;
+const BAND = 9, BELOW = 16, LEFT = 42;
 
 class Strip {
   constructor(title, shoe, units, symbol, side) {
-    this.shoe = shoe; this.units = units; this.side = side; this.top = 1; this.bottom = 0;
+    this.height = 190; this.shoe = shoe; this.units = units; this.side = side; this.top = 1; this.bottom = 0;
     this.element = document.createElement("div"); this.element.className = "strip";
     const head = document.createElement("p"), name = document.createElement("b");
     name.textContent = title + ", " + symbol; head.append(name);
@@ -14,7 +14,7 @@ class Strip {
     this.element.append(head, this.canvas);
   }
   draw(columns, width, last, seconds, notes, steps) {
-    const [g, w, h] = canvasFor(this.canvas, STRIP_HEIGHT);
+    const [g, w, h] = canvasFor(this.canvas, this.height);
     const count = Math.round(seconds / width), right = w - 2, bottom = h - BELOW - (this.side === null ? 0 : BAND + 2);
     const x = (time) => LEFT + ((time - (last + 1) * width) / seconds + 1) * (right - LEFT);
     this.scale(columns, last, count);
