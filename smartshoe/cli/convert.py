@@ -14,7 +14,7 @@ from smartshoe.cli.inputs import column_options, read_all
 def command(
     source: str, target: str, time: str | None, force: str | None, sensors: tuple[str, ...], unit: str | None
 ) -> None:
-    """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5)."""
+    """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
     from smartshoe.logs import write
 
     (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)

@@ -14,7 +14,7 @@ from smartshoe.logs.sheet import Format
 from smartshoe.recording import Recording
 
 # The order in which formats are asked: those with an unmistakable beginning first, any delimited text last.
-_MODULES = ("tdms", "xdf", "labview", "matlab", "hdf5", "plain", "bluehill", "foreign")
+_MODULES = ("tdms", "xdf", "labview", "matlab", "hdf5", "parquet", "plain", "bluehill", "foreign")
 _HEAD_BYTES = 1 << 16
 
 
@@ -53,7 +53,7 @@ def detect(path: Path | str) -> Format:
             return format_
     raise FormatError(
         f"{path} is binary and in no known format: give a plain table, Bluehill CSV, LabVIEW .lvm, NI .tdms,"
-        " MATLAB .mat, HDF5 or delimited text file"
+        " MATLAB .mat, HDF5, Parquet or delimited text file"
     )
 
 

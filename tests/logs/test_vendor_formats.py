@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +16,7 @@ import smartshoe
 from smartshoe.errors import FormatError, InputError
 from smartshoe.recording import Recording
 
-ENDINGS = ("lvm", "tdms", "mat", "h5")
+ENDINGS = ("lvm", "tdms", "mat", "h5", "parquet")
 number = st.floats(-1e9, 1e9, allow_subnormal=False) | st.just(float("nan"))
 word = st.from_regex(r"[A-Za-z][A-Za-z0-9._]{0,11}[A-Za-z0-9]", fullmatch=True)
 
@@ -69,6 +70,23 @@ def test_hdf5_opens_in_xarray(tmp_path: Path) -> None:
         np.testing.assert_array_equal(dataset["time"].values, [0, 0.5, 1.0])
         np.testing.assert_array_equal(dataset["pressure"].values, [0, np.nan, 1])
         assert dataset["force"].attrs["units"] == "N"
+
+
+def test_parquet_opens_in_pandas_and_one_of_pandas_is_read(tmp_path: Path) -> None:
+    recording = Recording.from_arrays(time_s=[0, 0.5, 1.0], force_n=[0, 1, 2], pressure_mbar=[0, np.nan, 1])
+    smartshoe.write(recording, tmp_path / "x.parquet")
+    frame = pd.read_parquet(tmp_path / "x.parquet")
+    assert list(frame) == ["time_s", "force_n", "pressure_mbar"]
+    assert frame["pressure_mbar"].isna().tolist() == [False, True, False]
+    frame.assign(says="a word").to_parquet(tmp_path / "y.parquet")
+    again = smartshoe.read(tmp_path / "y.parquet")
+    np.testing.assert_array_equal(again.sensor.with_nan(), recording.sensor.with_nan())
+    plain = pd.DataFrame({"time_s": [0.0, 1.0], "force_n": [1.0, 2.0], "left_toe_kpa": [3, 4], "says": ["a", "b"]})
+    plain.to_parquet(tmp_path / "z.parquet")
+    foreign = smartshoe.read(tmp_path / "z.parquet")
+    assert foreign.sensor.name == "left_toe"
+    assert foreign.sensor.si.tolist() == [3000.0, 4000.0]
+    assert any("says" in note for note in foreign.notes)
 
 
 HEAD = (
@@ -128,7 +146,7 @@ def test_lvm_faults_name_the_line_or_the_key(old: str, new: str, says: str, tmp_
         smartshoe.read(path)
 
 
-@pytest.mark.parametrize("ending", ["tdms", "mat", "h5"])
+@pytest.mark.parametrize("ending", ["tdms", "mat", "h5", "parquet"])
 def test_truncated_files_are_refused_by_name(ending: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     whole = tmp_path / f"x.{ending}"
