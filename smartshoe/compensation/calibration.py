@@ -282,19 +282,18 @@ def extended_calibration(
     from smartshoe import __version__
 
     newton_per_reading = model.full_scale_load_n / (model.gain * model.full_scale_reading)
-    values = {part.name: part.values for part in model.parts}
-    offset = float(values["zero_offset"][0]) * model.gain * model.full_scale_reading if "zero_offset" in values else 0.0
+    shift = sum(float(part.values[0]) for part in model.parts if part.effect.shifts == "reading")
     return Calibration(
         a1=model.relaxation_rate_per_s,
         b0=(1.0 + model.relaxing_share) * newton_per_reading,
         b1=model.relaxation_rate_per_s * newton_per_reading,
         reading_unit=find_unit(model.reading_unit) or declared(model.reading_unit),
-        offset=offset,
+        offset=shift * model.gain * model.full_scale_reading,
         unit=unit,
         parameters=dict(parameters or {}),
         covariance=covariance,
         scale=newton_per_reading if scale is None else scale,
-        delay_s=float(values["delay"][0]) if "delay" in values else 0.0,
+        delay_s=sum(part.effect.delay_s(part.values) for part in model.parts),
         load_range_n=load_range_n or (0.0, model.full_scale_load_n),
         rate_range_n_per_s=rate_range_n_per_s,
         sample_rate_hz=sample_rate_hz,

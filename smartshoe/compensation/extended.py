@@ -7,12 +7,11 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.compensation.beside_arm import BesideArm, GasBesideArm
 from smartshoe.compensation.core_inverse import CoreInverse
 from smartshoe.compensation.filter import ForceFilter
 from smartshoe.compensation.noise_limit import MOST, NoiseLimit, noise_gain
 from smartshoe.errors import UsageError
-from smartshoe.models.effects.effect import CStep, Inverse
+from smartshoe.models.effects.effect import Arm, CStep, Inverse
 from smartshoe.models.extended import ExtendedModel, Part
 from smartshoe.units import Unit, declared, find_unit
 
@@ -22,8 +21,6 @@ LEAK_CAUTION = (
     "the air that is gone is summed up from the readings, so that an error of their zero grows with time: reset the"
     " filter at rest"
 )
-BENDS_BESIDE_ARM = ("wall_hardening", "mullins_softening")
-"""Blocks of the wall that solve the balance of their spring and the relaxing arm (`shared` in the effects)."""
 
 
 class ExtendedCompensator(ForceFilter):
@@ -57,7 +54,7 @@ class ExtendedCompensator(ForceFilter):
         self.core = CoreInverse(model.core, self.step_s)
         self._blocks: list[tuple[str, Inverse]] = []
         self._passed_over: dict[str, str] = {}
-        leaks = (part for part in model.parts if part.effect.family == "leak")
+        leaks = (part for part in model.parts if part.effect.air == "leaves")
         self._cautions = {part.name: LEAK_CAUTION for part in leaks if not part.effect.is_null(part.values)}
         for part in reversed(model.chain):
             if part is None:
@@ -71,12 +68,13 @@ class ExtendedCompensator(ForceFilter):
 
     def _undo(self, part: Part) -> None:
         # A tone's phase belongs to the session it was fitted on, so that noise is never taken off.
-        inverse = part.effect.inverse(part.values, self.step_s) if part.effect.is_physical else None
+        arm = Arm(self.model.relaxing_share, self.model.relaxation_rate_per_s)
+        inverse = part.effect.inverse_beside(arm, part.values, self.step_s) if part.effect.is_physical else None
         if inverse is None:
             self._passed_over[part.name] = _why_not(part)
             return
-        self._blocks.append((part.name, self._beside_arm(part, inverse)))
-        if part.effect.family != "timing":
+        self._blocks.append((part.name, inverse))
+        if not part.effect.is_latency:
             return
         raised = noise_gain(inverse)
         if raised <= MOST:
@@ -88,15 +86,6 @@ class ExtendedCompensator(ForceFilter):
             f"undoing it would raise fast noise of the readings {raised:.3g} times: smoothed to {MOST:g} times, which"
             f" leaves a lag of {1e3 * limit.lag_steps * self.step_s:.3g} ms"
         )
-
-    def _beside_arm(self, part: Part, inverse: Inverse) -> Inverse:
-        """``inverse``, with the relaxing arm set apart where the block has it beside the spring that bends."""
-        share, rate_per_s = self.model.relaxing_share, self.model.relaxation_rate_per_s
-        if part.name in BENDS_BESIDE_ARM:
-            return BesideArm(inverse, share, rate_per_s, self.step_s)
-        if part.name == "gas_compression":
-            return GasBesideArm(inverse, float(part.values[0]), share, rate_per_s, self.step_s)
-        return inverse
 
     def _undo_core(self) -> None:
         self._blocks.append(("core", self.core))
@@ -145,12 +134,7 @@ def _why_not(part: Part) -> str:
     effect = part.effect
     if not effect.is_physical:
         return "noise and faults of the data cannot be taken off a single reading"
-    if effect.family == "timing":
-        return "undoing it takes readings that have not come yet: shift whole recordings instead"
-    if effect.family == "saturation":
-        return "what was clipped is lost"
-    if effect.needs:
-        return f"it follows another channel ({', '.join(sorted(effect.needs))}), which one unit's readings do not carry"
-    if any(parameter.unit.endswith("/K") for parameter in effect.parameters):
-        return "it follows the temperature, which one unit's readings do not carry"
-    return "it has no inverse that runs on a stream of readings"
+    channels = sorted({*effect.needs, *(parameter.channel for parameter in effect.parameters if parameter.channel)})
+    if channels:
+        return f"it follows another channel ({', '.join(channels)}), which one unit's readings do not carry"
+    return effect.why_not_undone

@@ -13,14 +13,14 @@ from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.result import Cause, NextExperiment
 from smartshoe.diagnosis.selection import Choice
 from smartshoe.diagnosis.session import Session
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, told_apart_by
 from smartshoe.protocol import Protocol
 
 DOUBTFUL = 5.0 * SEPARATED  # margins below this deserve another experiment
 CHANNELS = {
     "displacement": "displacement",
     "temperature": "temperature",
-    "pressure": "pressure reference",
+    "pressure_reference": "pressure reference",
     "neighbour": "neighbour",
 }
 
@@ -104,7 +104,7 @@ def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise: NoiseMode
 
 def _channel(name: str, rival: str, sessions: Sequence[Session]) -> str | None:
     """The channel that the catalogue says would tell them apart, if it was not logged already."""
-    said = f"{effect(name).separated_by.get(rival, '')} {effect(rival).separated_by.get(name, '')}"
+    said = told_apart_by(effect(name), effect(rival))
     logged = {channel for session in sessions for channel in session.recording.channels}
     for word, channel in CHANNELS.items():
         if word in said and channel not in logged:

@@ -234,6 +234,8 @@ def _extended(first: Calibration, second: Calibration, time_s: Array, load_n: Ar
 def _without_zero(calibration: Calibration) -> Calibration:
     if calibration.extended is None:
         return replace(calibration, offset=0.0)
-    names = calibration.extended.names
-    bare = calibration.extended.without("zero_offset") if "zero_offset" in names else calibration.extended
+    bare = calibration.extended
+    for part in bare.parts:
+        if part.effect.shifts == "reading":
+            bare = bare.without(part.name)
     return replace(calibration, offset=0.0, extended=bare)

@@ -34,7 +34,7 @@ def typical(one: Effect, seed: int) -> np.ndarray:
             found.append(shape[parameter.name])
             continue
         strength = parameter.size * rng.uniform(0.3, 3.0) * (1.0 if parameter.lower >= 0.0 else rng.choice([-1.0, 1.0]))
-        logged = not parameter.unit.endswith("/K")
+        logged = not parameter.channel
         found.append(float(np.clip(parameter.null + strength * logged, parameter.lower, parameter.upper)))
     values = np.array(found)
     strengths = [k for k, parameter in enumerate(one.parameters) if parameter.null is not None]

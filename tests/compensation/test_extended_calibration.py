@@ -18,7 +18,7 @@ from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.errors import InputError, UnitError
 from smartshoe.logs import read, write
 from smartshoe.models import Parameter
-from smartshoe.models.effects import effect
+from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
@@ -117,6 +117,37 @@ def test_a_recording_is_compensated_and_told_what_is_left() -> None:
     assert np.sqrt(np.mean(error_n**2)) > 1.0
     assert any("delay is not compensated" in note for note in found.notes)
     assert any("linear_leak" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("late_s", [0.03, -0.05])
+def test_a_calibrations_delay_is_the_time_by_which_the_reading_is_late(late_s: float) -> None:
+    model = BASELINE.with_part(effect("delay"), np.array([late_s]))
+    at = some_conditions(2)
+    late, prompt = model.reading(at), BASELINE.reading(at)
+    taken_back = np.interp(at.time_s + extended_calibration(model).delay_s, at.time_s, late)
+    inside = slice(20, -20)
+    assert np.max(np.abs(late - prompt)[inside]) > 1.0
+    assert taken_back[inside] == pytest.approx(prompt[inside], abs=1e-6)
+
+
+def test_a_calibrations_offset_is_the_reading_without_load() -> None:
+    model = BASELINE.with_part(effect("zero_offset"), np.array([0.02]))
+    rest = Conditions(0.01 * np.arange(5), np.zeros(5), 0.01)
+    assert model.reading(rest) == pytest.approx(np.full(5, extended_calibration(model).offset), rel=1e-12)
+
+
+def test_uneven_steps_give_the_same_force_whenever_the_recording_began() -> None:
+    at = some_conditions(3, 4)
+    uneven = np.flatnonzero(np.arange(at.time_s.size) % 7 != 3)
+    readings = MODEL.reading(at)[uneven]
+    now, later = (
+        compensate(Recording.from_arrays(time_s=began_s + at.time_s[uneven], pressure_mbar=readings), CALIBRATION)[
+            "force_estimate"
+        ].values
+        for began_s in (0.0, 1000.0)
+    )
+    assert np.ptp(now) > 100.0
+    assert later == pytest.approx(now, abs=1e-6)
 
 
 def test_uneven_steps_are_set_on_an_even_grid() -> None:

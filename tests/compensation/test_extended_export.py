@@ -152,7 +152,7 @@ def test_matlabs_numbers_give_the_filters_forces() -> None:
     text = files["smartshoe_filter.m"]
     names = ("transition", "drive", "read", "start")
     transition, drive, read, start = (_matlab_number(text, name) for name in names)
-    names = ("direct", "reading_per_share", "full_scale_load", "zero_offset", "load_cell_tare")
+    names = ("direct", "reading_per_share", "full_scale_load", "reading_shift", "load_shift")
     direct, per_share, full_scale_n, offset, tare = (_matlab_number(text, name).item() for name in names)
     readings = _readings(calibration.model(), 3)[2:2000]
     readings = readings[np.isfinite(readings)]

@@ -163,3 +163,20 @@ def test_a_recording_that_continues_another_begins_where_it_ended(name: str, val
     left_behind = {"largest_load": 0.8, "cycles": 2.0, "dose": float(np.trapezoid(first, dx=STEP_S))}
     continued = run(name, values, second, **{key: left_behind[key]})
     assert np.max(np.abs(continued[1:] - whole[first.size :])) <= 1e-12
+
+
+@pytest.mark.parametrize(("height", "counted"), [(0.085, True), (0.075, False)])
+def test_a_cycle_counts_from_eight_percent_of_full_scale_on(height: float, counted: bool) -> None:
+    load = between([height, 0.0, height, 0.0, 0.5], 50)
+    gain = run("cycle_conditioning", np.array([0.1, 2.0]), load)[-1] / load[-1]
+    assert gain == pytest.approx(1.0 + 0.1 * -np.expm1(-2.0 / 2.0) if counted else 1.0, rel=1e-12)
+
+
+def test_a_load_below_zero_sets_nothing_and_takes_no_set_back() -> None:
+    values = np.array([1e-2, 2.0])
+    pressed = between([0.0, 0.8, 0.8, 0.0], 100)
+    pulled = between([0.0, -0.8, -0.8, 0.0], 100)
+    assert np.array_equal(run("permanent_set", values, pulled), pulled)
+    whole = run("permanent_set", values, np.concatenate([pressed, pulled[1:]]))
+    assert whole[pressed.size - 1] > 1e-3
+    assert whole[-1] == pytest.approx(whole[pressed.size - 1], abs=1e-12)

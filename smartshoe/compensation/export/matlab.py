@@ -32,12 +32,15 @@ def matlab_files(model: FilterModel) -> dict[str, str]:
 
 def _extended(model: ExtendedFilterModel) -> dict[str, object]:
     filter_ = model.filter
-    others = [name for name, _ in filter_.blocks if name not in ("core", *SHIFTS)]
+    shifts = {part.name: part for part in filter_.model.parts if part.effect.shifts is not None}
+    others = [name for name, _ in filter_.blocks if name != "core" and name not in shifts]
     if others:
         raise UsageError(
             f"the inverses of {', '.join(others)} are not written in MATLAB: export with --to c, which has every block"
         )
-    shift = {part.name: float(part.values[0]) for part in filter_.model.parts if part.name in SHIFTS}
+    shift = {"load": 0.0, "reading": 0.0}
+    for part in shifts.values():
+        shift[str(part.effect.shifts)] += float(part.values[0])
     core = filter_.core
     return {
         "core": {
@@ -49,7 +52,8 @@ def _extended(model: ExtendedFilterModel) -> dict[str, object]:
         },
         "reading_per_share": repr(filter_.reading_per_share),
         "full_scale_load_n": repr(filter_.model.full_scale_load_n),
-        **{name: repr(shift.get(name, 0.0)) for name in SHIFTS},
+        "load_shift": repr(shift["load"]),
+        "reading_shift": repr(shift["reading"]),
     }
 
 

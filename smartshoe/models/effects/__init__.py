@@ -1,6 +1,37 @@
 """What a measurement may hold beside the standard linear solid: one file an effect, found by `catalogue`."""
 
-from smartshoe.models.effects.catalogue import blocks, catalogue, effect
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Place
+from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
+from smartshoe.models.effects.catalogue import blocks, catalogue, effect, told_apart_by
+from smartshoe.models.effects.effect import (
+    Arm,
+    Conditions,
+    CoreEffect,
+    CStep,
+    Effect,
+    EffectParameter,
+    Heat,
+    Inverse,
+    Leak,
+    Place,
+)
+from smartshoe.models.effects.exposure import by
 
-__all__ = ["Conditions", "Effect", "EffectParameter", "Inverse", "Place", "blocks", "catalogue", "effect"]
+__all__ = [
+    "Arm",
+    "CStep",
+    "Conditions",
+    "CoreEffect",
+    "Effect",
+    "EffectParameter",
+    "Heat",
+    "Inverse",
+    "Leak",
+    "Memoryless",
+    "Place",
+    "blocks",
+    "by",
+    "c_number",
+    "catalogue",
+    "effect",
+    "told_apart_by",
+]

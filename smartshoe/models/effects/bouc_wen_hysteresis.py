@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned, dead_zone
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
 
@@ -28,13 +29,14 @@ class BoucWenHysteresis(Effect):
         EffectParameter("turn", "1", "how much faster friction falls after a reversal", None, 0.0, 2.0, 0.5),
     )
     shapes = tuple({"width": width, "exponent": 1.5, "turn": 0.5} for width in (0.03, 0.1, 0.3))
-    exposed_by = frozenset({"rates", "peaks", "minor_loops"})
+    exposed_by = by("rates", "peaks", "minor_loops")
     separated_by = {
-        "play_hysteresis": "minor_loops",
-        "load_unload_asymmetry": "minor_loops",
-        "second_relaxation": "rates",
-        "power_law_creep": "rates",
+        "load_unload_asymmetry": by("minor_loops"),
+        "play_hysteresis": by("minor_loops"),
+        "power_law_creep": by("rates"),
+        "second_relaxation": by("rates"),
     }
+    departs_with = frozenset({"load", "direction", "memory"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load less friction."""

@@ -1,4 +1,8 @@
-"""Every effect, found from the modules of this folder: to add one is to add its file."""
+"""Every effect: those of this folder, where to add one is to add its file, and those of other packages.
+
+Another package offers one by an entry point of the group `smartshoe.effects`, whose object is an `Effect` or a class
+of it (docs/extending.md).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,16 @@ import importlib
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
 from smartshoe.errors import UsageError
 from smartshoe.models import effects
-from smartshoe.models.effects.effect import Effect
+from smartshoe.models.effects.effect import PLACES, Effect
+from smartshoe.models.effects.exposure import WORDS, Exposure
+
+GROUP = "smartshoe.effects"
 
 
 def _concrete(kind: Any) -> list[type[Effect]]:
@@ -23,8 +31,42 @@ def _concrete(kind: Any) -> list[type[Effect]]:
 def _found() -> Mapping[str, Effect]:
     for module in pkgutil.iter_modules(effects.__path__):
         importlib.import_module(f"{effects.__name__}.{module.name}")
-    own = [kind for kind in _concrete(Effect) if kind.__module__.startswith(effects.__name__)]
-    return MappingProxyType({made.name: made for made in sorted((kind() for kind in own), key=lambda one: one.name)})
+    own = (kind() for kind in _concrete(Effect) if kind.__module__.startswith(effects.__name__))
+    found = {made.name: made for made in own}
+    for entry in entry_points(group=GROUP):
+        made = _offered(entry)
+        if made.name in found:
+            raise UsageError(f"{_origin(entry)} has the name {made.name!r}, which is taken: give it another name")
+        found[made.name] = made
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+def _origin(entry: EntryPoint) -> str:
+    package = f" of the package {entry.dist.name}" if entry.dist else ""
+    return f"effect {entry.name!r}{package}"
+
+
+def _offered(entry: EntryPoint) -> Effect:
+    """The effect of another package; raises `UsageError` where it is none, or cannot take part in a chain."""
+    try:
+        made = entry.load()
+        made = made() if isinstance(made, type) else made
+    except Exception as error:  # whatever another package does
+        raise UsageError(f"{_origin(entry)} cannot be loaded ({error}): mend or uninstall the package") from error
+    if not isinstance(made, Effect):
+        raise UsageError(f"{_origin(entry)} is {made!r}, no smartshoe.models.effects.Effect: mend the package")
+    missing = [word for word in ("name", "family", "stage", "place", "says", "parameters") if not hasattr(made, word)]
+    if missing:
+        raise UsageError(f"{_origin(entry)} has no {', no '.join(missing)}: mend the package")
+    if made.place not in PLACES:
+        raise UsageError(f"{_origin(entry)} has the place {made.place!r}: use one of {', '.join(PLACES)}")
+    unknown = frozenset[str](made.exposed_by).union(*made.separated_by.values()) - WORDS
+    if unknown:
+        raise UsageError(
+            f"{_origin(entry)} is shown by {', '.join(sorted(unknown))}, which is not known:"
+            f" use of {', '.join(sorted(WORDS))}"
+        )
+    return made
 
 
 @cache
@@ -47,3 +89,8 @@ def effect(name: str) -> Effect:
     if found is None:
         raise UsageError(f"there is no effect {name!r}: use one of {', '.join(_found())}")
     return found
+
+
+def told_apart_by(one: Effect, other: Effect) -> frozenset[Exposure]:
+    """What tells the two apart, any of these; either may say it of the other."""
+    return one.separated_by.get(other.name, frozenset()) | other.separated_by.get(one.name, frozenset())

@@ -8,6 +8,7 @@ import numpy as np
 
 from smartshoe.models.effects._sensor_clock import running_time_s
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.models.effects.exposure import by
 
 FRACTIONS = 512  # of a sample; between two of them the weights are interpolated, 2e-6 of a signal's highest tones off
 
@@ -27,8 +28,14 @@ class ClockDrift(Effect):
     parameters = (
         EffectParameter("clock_rate_error", "1", "seconds lost by the reading's log a second", 0.0, -0.01, 0.01, 1e-4),
     )
-    exposed_by = frozenset({"rates", "repeats"})
-    separated_by = {"delay": "sync pulse at both ends", "sensor_lag": "sync pulse at both ends"}
+    exposed_by = by("rates", "repeats")
+    separated_by = {
+        "delay": by("repeats", "steps"),
+        "sensor_lag": by("repeats", "steps"),
+    }
+    departs_with = frozenset({"time"})
+    is_latency = True
+    why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal against the other clock."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from smartshoe.models.effects._sensor_evidence import Evidence, Waveformless
 from smartshoe.models.effects.effect import Array, Conditions, Effect
+from smartshoe.models.effects.exposure import by
 
 MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each
 QUANTILE = 3.588  # normal, of one false alarm in 1000 over the number of memories
@@ -22,8 +23,13 @@ class ColouredNoise(Waveformless, Effect):
 
     name, family, stage, place = "coloured_noise", "noise", "sensor", "sensor"
     says = "slow noise that differs from one equal load cycle to the next"
-    exposed_by = frozenset({"repeats"})
-    separated_by = {"gain_drift": "three repeats", "zero_drift": "three repeats", "quantisation": "lattice"}
+    exposed_by = by("repeats")
+    separated_by = {
+        "gain_drift": by("repeats"),
+        "hum": by("idle"),
+        "quantisation": by("holds"),
+        "zero_drift": by("repeats"),
+    }
 
 
 def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:

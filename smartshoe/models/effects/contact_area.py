@@ -8,6 +8,7 @@ import numpy as np
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 NEWTON_STEPS = 12
 
@@ -25,12 +26,16 @@ class ContactArea(Effect):
         EffectParameter("curvature", "1", "q: 0 bends most near zero load, 1 evenly", None, 0.1, 1.2, 0.5),
     )
     shapes = ({"curvature": 1.0}, {"curvature": 0.4})
-    exposed_by = frozenset({"peaks", "low_loads"})
+    exposed_by = by("peaks", "low_loads")
     separated_by = {
-        "gas_compression": "sign; displacement",
-        "wall_hardening": "displacement",
-        "sensor_nonlinearity": "displacement, or pressure applied to the sensor",
+        "cross_talk": by("neighbour"),
+        "dead_band": by("low_loads"),
+        "gas_compression": by("peaks", "displacement"),
+        "saturation": by("peaks"),
+        "sensor_nonlinearity": by("displacement", "pressure_reference"),
+        "wall_hardening": by("rates", "displacement"),
     }
+    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.models.effects.exposure import by
 
 
 class CrossTalk(Effect):
@@ -17,7 +18,11 @@ class CrossTalk(Effect):
         EffectParameter("coupling", "FS_reading", "reading at the neighbour's largest pressure", 0.0, -0.5, 0.5, 0.01),
     )
     needs = frozenset({"neighbour"})
-    separated_by = {"zero_drift": "load one unit alone", "contact_area": "load one unit alone"}
+    separated_by = {
+        "contact_area": by("neighbour"),
+        "zero_drift": by("neighbour"),
+    }
+    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the neighbour's share."""

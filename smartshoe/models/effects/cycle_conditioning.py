@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import NO_LOAD, Undone, cleaned_load
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
 
@@ -23,8 +24,13 @@ class CycleConditioning(Effect):
         EffectParameter("cycles", "1", "n0: cycles after which 63 % of it are there", None, 0.5, 50.0, 2.0),
     )
     shapes = tuple({"cycles": cycles} for cycles in (1.0, 4.0, 16.0))
-    exposed_by = frozenset({"repeats", "pauses"})
-    separated_by = {"gain_drift": "pauses", "mullins_softening": "loads in shuffled order", "warm_up": "pauses"}
+    exposed_by = by("repeats", "pauses")
+    separated_by = {
+        "gain_drift": by("pauses", "temperature"),
+        "mullins_softening": by("shuffled_loads"),
+        "warm_up": by("pauses"),
+    }
+    departs_with = frozenset({"memory", "time"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load with the gain so far; ``before["cycles"]`` counts along."""

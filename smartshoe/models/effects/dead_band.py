@@ -6,6 +6,7 @@ import numpy as np
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 BISECTIONS = 50
 
@@ -23,8 +24,15 @@ class DeadBand(Effect):
         EffectParameter("softness", "1", "how far the gaps spread, over the lost load", None, 0.03, 1.0, 0.3),
     )
     shapes = ({"softness": 0.2}, {"softness": 0.6})
-    exposed_by = frozenset({"low_loads", "rests"})
-    separated_by = {"zero_offset": "low_loads", "load_cell_tare": "low_loads", "contact_area": "low_loads"}
+    exposed_by = by("low_loads", "rests")
+    separated_by = {
+        "contact_area": by("low_loads"),
+        "dropouts": by("repeats"),
+        "load_cell_tare": by("low_loads"),
+        "sensor_nonlinearity": by("low_loads"),
+        "zero_offset": by("low_loads"),
+    }
+    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.models.effects.exposure import by
 
 
 class Delay(Effect):
@@ -17,8 +18,17 @@ class Delay(Effect):
     name, family, stage, place = "delay", "timing", "logger", "logger"
     says = "the reading is late against the load by a constant time, its corners as sharp as before"
     parameters = (EffectParameter("delay", "s", "time by which the reading is late", 0.0, -3.0, 3.0, 0.01),)
-    exposed_by = frozenset({"rates", "steps"})
-    separated_by = {"sensor_lag": "step or multisine", "clock_drift": "sync pulse at both ends"}
+    exposed_by = by("rates", "steps")
+    separated_by = {
+        "clock_drift": by("repeats", "steps"),
+        "sensor_lag": by("steps", "multisine"),
+    }
+    is_latency = True
+    why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
+
+    def delay_s(self, values: Array) -> float:
+        """Its one value."""
+        return float(values[0])
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The delayed signal."""

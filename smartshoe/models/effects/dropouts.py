@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_evidence import Waveformless
 from smartshoe.models.effects.effect import Effect
+from smartshoe.models.effects.exposure import by
 
 
 class Dropouts(Waveformless, Effect):
@@ -14,5 +15,9 @@ class Dropouts(Waveformless, Effect):
 
     name, family, stage, place = "dropouts", "data", "logger", "logger"
     says = "the reading falls to its unloaded value, or to nothing, while the load stays"
-    exposed_by = frozenset({"repeats"})
-    separated_by = {"spikes": "length: a spike is one or two samples", "dead_band": "repeats"}
+    exposed_by = by("repeats")
+    separated_by = {
+        "dead_band": by("repeats"),
+        "held_samples": by("rates"),
+        "spikes": by("holds"),
+    }

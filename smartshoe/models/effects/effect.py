@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import UsageError
+from smartshoe.models.effects.exposure import Direction, Exposure
 
 Array = NDArray[np.float64]
 Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
@@ -35,7 +36,8 @@ class EffectParameter:
     exponent), which means nothing while the strength is null. ``lower`` and ``upper`` are bounds, a physical sign
     among them. ``size``: a typical value, or change from null; the step of derivatives is a small part of it.
     ``prior_sd``: standard deviation of a Gaussian prior about the null value, which a fit takes as one more row of its
-    likelihood; None for a parameter that the data alone decide.
+    likelihood; None for a parameter that the data alone decide. ``channel``: what must be logged for the parameter to
+    do anything ("temperature"); '' where it needs nothing but load and time.
     """
 
     name: str
@@ -46,6 +48,7 @@ class EffectParameter:
     upper: float
     size: float
     prior_sd: float | None = None
+    channel: Exposure | Literal[""] = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +118,17 @@ class Effect(ABC):
     """One effect of the catalogue; a subclass a file, one instance a class.
 
     ``shapes``: points of a grid over the parameters without a null value, where the screen takes sensitivities.
-    ``needs``: channels without which it cannot be seen ("temperature", "neighbour").
-    ``exposed_by``: what a protocol must hold: "holds", "rests", "rates", "repeats", "peaks", "pauses", "idle",
-    "steps", "minor_loops", "low_loads".
-    ``separated_by``: neighbour's name to the experiment or channel that tells it from this one.
+    ``needs``: channels without which it cannot be seen ("neighbour").
+    ``exposed_by``: what a protocol must hold, in the words of `smartshoe.models.effects.exposure`.
+    ``separated_by``: neighbour's name to the words for what tells it from this one, any of them; the neighbour says
+    the same of this one.
+    ``departs_with``: what the difference between this equation and others of its kind usually depends on.
     ``is_physical``: False for noise and faults of the data, which are never a cause by their waveform.
+    ``is_latency``: True where the reading comes late, or early, and is changed in nothing else.
+    ``is_seen_at_rest``: True where the reading without load shows the effect's size.
+    ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
+    ``air``: "stiffens" or "leaves" where the effect is of the air in the tube, so that the wall bears another load.
+    ``why_not_undone``: half a sentence for a physical effect without an inverse.
     ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause.
     """
 
@@ -131,9 +140,15 @@ class Effect(ABC):
     parameters: ClassVar[tuple[EffectParameter, ...]]
     shapes: ClassVar[tuple[Mapping[str, float], ...]] = ({},)
     needs: ClassVar[frozenset[str]] = frozenset()
-    exposed_by: ClassVar[frozenset[str]] = frozenset()
-    separated_by: ClassVar[Mapping[str, str]] = {}
+    exposed_by: ClassVar[frozenset[Exposure]] = frozenset()
+    separated_by: ClassVar[Mapping[str, frozenset[Exposure]]] = {}
+    departs_with: ClassVar[frozenset[Direction]] = frozenset()
     is_physical: ClassVar[bool] = True
+    is_latency: ClassVar[bool] = False
+    is_seen_at_rest: ClassVar[bool] = False
+    shifts: ClassVar[Literal["load", "reading"] | None] = None
+    air: ClassVar[Literal["stiffens", "leaves"] | None] = None
+    why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False
 
     @abstractmethod
@@ -143,6 +158,14 @@ class Effect(ABC):
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""
         return None
+
+    def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse | None:
+        """The same in a chain whose wall has the relaxing ``arm``, for a spring that bends beside it."""
+        return self.inverse(values, step_s)
+
+    def delay_s(self, values: Array) -> float:
+        """The constant time by which it makes a reading late, and which a whole recording can be shifted back by."""
+        return 0.0
 
     def start(self, shape: Mapping[str, float] | None = None) -> Array:
         """Null strengths with the shape parameters at ``shape``, or at the first of ``shapes``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._monotone_curve import bent, slope_weights, straightened
 from smartshoe.models.effects.effect import Array, Conditions, Effect, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class FlexibleCharacteristic(Effect):
@@ -12,7 +13,7 @@ class FlexibleCharacteristic(Effect):
     name, family, stage, place = "flexible_characteristic", "static_curve", "sensor", "sensor"
     says = "the reading bends away from the straight line between zero and full scale, at every rate alike"
     parameters = slope_weights("pressure")
-    exposed_by = frozenset({"peaks", "low_loads"})
+    exposed_by = by("peaks", "low_loads")
     is_flexible = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._monotone_curve import bent, slope_weights, straightened
 from smartshoe.models.effects.effect import Array, Conditions, Effect, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class FlexibleCurve(Effect):
@@ -16,7 +17,7 @@ class FlexibleCurve(Effect):
     name, family, stage, place = "flexible_curve", "static_curve", "wall", "wall"
     says = "the reading against load is bent, in a way that relaxes with the wall"
     parameters = slope_weights("load")
-    exposed_by = frozenset({"peaks", "low_loads"})
+    exposed_by = by("peaks", "low_loads")
     is_flexible = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone, dead_zone
 from smartshoe.models.effects.effect import Array, Conditions, CStep, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 HALF_WIDTHS = np.geomspace(0.01, 0.4, 5)  # of the plays, shares of full scale
 LEAST_LOAD = 0.2  # of full scale: friction that grows with load is in proportion to the load and this
@@ -48,7 +49,7 @@ class FlexibleLoop(Effect):
         *_weights("even", "full scale", USUAL_HEIGHT),
         *_weights("growing", "the logarithmic scale of load", USUAL_HEIGHT / ((1.0 + LEAST_LOAD) * SCALE)),
     )
-    exposed_by = frozenset({"rates", "peaks", "minor_loops"})
+    exposed_by = by("rates", "peaks", "minor_loops")
     is_flexible = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

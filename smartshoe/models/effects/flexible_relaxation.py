@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element, Heat
+from smartshoe.models.effects.exposure import by
 
 RATES_PER_S = np.geomspace(0.01, 30.0, 6)
 GAS_SHARE = 1.6 / 0.6  # heat's share for one of the reading: N/(N - 1) at the usual wall ratio N of the core
@@ -28,7 +29,7 @@ class FlexibleRelaxation(CoreEffect):
         )
         for k, rate in enumerate(RATES_PER_S)
     )  # fmt: skip
-    exposed_by = frozenset({"holds", "rates", "rests"})
+    exposed_by = by("holds", "rates", "rests")
     is_flexible = True
 
     def elements(self, values: Array) -> tuple[Element, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_clock import drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 LEAST_GAIN = 0.01
 
@@ -21,13 +22,26 @@ class GainDrift(Effect):
     says = "the gain moves steadily with time (with the temperature, where it is logged): peaks grow or shrink"
     parameters = (
         EffectParameter("drift_rate", "1/s", "share of the gain gained a second", 0.0, -1e-2, 1e-2, 1e-5),
-        EffectParameter("temperature_coefficient", "1/K", "share of the gain gained a kelvin", 0.0, -0.3, 0.3, 1e-3),
+        EffectParameter(
+            "temperature_coefficient",
+            "1/K",
+            "share of the gain gained a kelvin",
+            0.0,
+            -0.3,
+            0.3,
+            1e-3,
+            channel="temperature",
+        ),
     )
-    exposed_by = frozenset({"repeats", "peaks", "pauses"})
+    exposed_by = by("repeats", "peaks", "pauses")
     separated_by = {
-        "cycle_conditioning": "pauses; a temperature channel", "mullins_softening": "pauses; loads in shuffled order",
-        "zero_drift": "rests", "load_unload_asymmetry": "repeats",
-    }  # fmt: skip
+        "coloured_noise": by("repeats"),
+        "cycle_conditioning": by("pauses", "temperature"),
+        "load_unload_asymmetry": by("repeats"),
+        "mullins_softening": by("pauses", "shuffled_loads"),
+        "zero_drift": by("rests", "peaks"),
+    }
+    departs_with = frozenset({"time"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the session's start."""

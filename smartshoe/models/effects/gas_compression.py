@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from smartshoe.models.effects._beside_arm import GasBesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects._wall_loop import relaxed, shared
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Arm, Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class GasCompression(Effect):
@@ -22,12 +24,14 @@ class GasCompression(Effect):
             "pressure_ratio", "1", "g: gauge pressure at full scale over the ambient one", 0.0, 0.0, 5.0, 0.1
         ),
     )
-    exposed_by = frozenset({"peaks"})
+    exposed_by = by("peaks")
     separated_by = {
-        "contact_area": "sign; displacement",
-        "wall_hardening": "sign; displacement",
-        "sensor_nonlinearity": "displacement, or pressure applied to the sensor",
+        "contact_area": by("peaks", "displacement"),
+        "sensor_nonlinearity": by("displacement", "pressure_reference"),
+        "wall_hardening": by("peaks", "displacement"),
     }
+    departs_with = frozenset({"load", "rate"})
+    air = "stiffens"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure of the stiffer gas."""
@@ -49,6 +53,10 @@ class GasCompression(Effect):
 
         # The load of which the linear core made the signal, less what relaxes.
         return pressure(shared(static, signal + relaxed(signal, conditions), conditions)[0])
+
+    def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
+        """What the arm bears set apart first."""
+        return GasBesideArm(self.inverse(values, step_s), float(values[0]), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from p, in closed form."""

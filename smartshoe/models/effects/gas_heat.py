@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter, Element, Heat
+from smartshoe.models.effects.exposure import by
 
 FASTER_MODES = ((0.131, 5.269), (0.177, 12.95))  # 4/j_2^2 and what is left beyond, (j_2/j_1)^2 and (j_3/j_1)^2
 
@@ -22,8 +23,14 @@ class GasHeat(CoreEffect):
         EffectParameter("spread", "1", "0: one time constant, 1: conduction in a cylinder", None, 0.0, 1.0, 0.5),
     )
     shapes = tuple({"cooling_rate": rate, "spread": 0.5} for rate in (0.4, 1.5, 6.0))
-    exposed_by = frozenset({"holds", "rates", "rests", "steps"})
-    separated_by = {"second_relaxation": "sign: relaxation makes the reading rise in holds", "linear_leak": "long_hold"}
+    exposed_by = by("holds", "rates", "rests", "steps")
+    separated_by = {
+        "linear_leak": by("long_hold"),
+        "power_law_creep": by("holds"),
+        "rate_gain": by("holds"),
+        "second_relaxation": by("holds"),
+    }
+    departs_with = frozenset({"time"})
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One heat store for each term of the series."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_evidence import Waveformless
 from smartshoe.models.effects.effect import Effect
+from smartshoe.models.effects.exposure import by
 
 
 class HeldSamples(Waveformless, Effect):
@@ -14,5 +15,8 @@ class HeldSamples(Waveformless, Effect):
 
     name, family, stage, place = "held_samples", "data", "logger", "logger"
     says = "a reading repeats exactly while the load moves"
-    exposed_by = frozenset({"rates"})
-    separated_by = {"quantisation": "rates", "dropouts": "value: a held one is that before"}
+    exposed_by = by("rates")
+    separated_by = {
+        "dropouts": by("rates"),
+        "quantisation": by("rates"),
+    }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_evidence import ONE_SIDED, PRESSURE, Evidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Array, Conditions, Effect
+from smartshoe.models.effects.exposure import by
 
 
 class HeteroscedasticNoise(Waveformless, Effect):
@@ -11,8 +12,10 @@ class HeteroscedasticNoise(Waveformless, Effect):
 
     name, family, stage, place = "heteroscedastic_noise", "noise", "sensor", "sensor"
     says = "the noise grows with the pressure, at rest of the load as on ramps"
-    exposed_by = frozenset({"holds"})
-    separated_by = {"timing_jitter": "holds at several loads"}
+    exposed_by = by("holds")
+    separated_by = {
+        "timing_jitter": by("holds"),
+    }
 
 
 def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:

@@ -10,6 +10,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, Evidence
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect
 MAINS_HZ = (50.0, 60.0)
@@ -47,8 +48,11 @@ class Hum(Effect):
         EffectParameter("frequency", "Hz", "the tone's frequency, before the sampling", None, LOWEST_HZ, 1000.0, 0.01),
     )
     shapes = tuple({"frequency": frequency} for frequency in MAINS_HZ)
-    exposed_by = frozenset({"rests"})
-    separated_by = {"coloured_noise": "another sampling rate", "spikes": "repeats"}
+    exposed_by = by("rests")
+    separated_by = {
+        "coloured_noise": by("idle"),
+        "spikes": by("repeats"),
+    }
     is_physical = False
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

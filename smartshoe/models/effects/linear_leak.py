@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter, Element, Leak
+from smartshoe.models.effects.exposure import by
 
 
 class LinearLeak(CoreEffect):
@@ -16,12 +17,18 @@ class LinearLeak(CoreEffect):
     parameters = (
         EffectParameter("leak_rate", "1/s", "share of the gauge pressure lost a second", 0.0, 0.0, 5.0, 1e-3),
     )
-    exposed_by = frozenset({"holds", "rests"})
+    exposed_by = by("holds", "rests")
     separated_by = {
-        "zero_drift": "idle and long_hold",
-        "orifice_leak": "holds at several loads",
-        "permanent_set": "sign",
+        "gas_heat": by("long_hold"),
+        "orifice_leak": by("holds", "peaks"),
+        "permanent_set": by("rests"),
+        "power_law_creep": by("holds"),
+        "second_relaxation": by("holds"),
+        "warm_up": by("idle"),
+        "zero_drift": by("idle", "long_hold", "temperature"),
     }
+    departs_with = frozenset({"time", "load"})
+    air = "leaves"
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One leak."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class LoadCellTare(Effect):
@@ -16,8 +17,13 @@ class LoadCellTare(Effect):
     name, family, stage, place = "load_cell_tare", "tare", "machine", "machine"
     says = "the load cell's zero is off: the tube bears a load more or less than the log says, the resting one too"
     parameters = (EffectParameter("tare", "FS_load", "acting load less measured load", 0.0, -0.5, 0.5, 0.01),)
-    exposed_by = frozenset({"rests"})
-    separated_by = {"zero_offset": "unload and vent", "dead_band": "low_loads"}
+    exposed_by = by("rests")
+    separated_by = {
+        "dead_band": by("low_loads"),
+        "zero_offset": by("idle", "pressure_reference"),
+    }
+    is_seen_at_rest = True
+    shifts = "load"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The acting load."""

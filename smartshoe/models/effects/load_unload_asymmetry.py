@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class LoadUnloadAsymmetry(Effect):
@@ -21,8 +22,14 @@ class LoadUnloadAsymmetry(Effect):
         EffectParameter("turn", "FS_load", "load over which the sense turns over", None, 0.001, 0.03, 0.005),
     )
     shapes = ({"turn": 0.005},)
-    exposed_by = frozenset({"rates", "peaks", "minor_loops"})
-    separated_by = {"play_hysteresis": "minor_loops", "bouc_wen_hysteresis": "minor_loops", "rate_gain": "rates"}
+    exposed_by = by("rates", "peaks", "minor_loops")
+    separated_by = {
+        "bouc_wen_hysteresis": by("minor_loops"),
+        "gain_drift": by("repeats"),
+        "play_hysteresis": by("minor_loops"),
+        "rate_gain": by("rates"),
+    }
+    departs_with = frozenset({"load", "direction", "memory"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

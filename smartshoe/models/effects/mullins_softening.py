@@ -7,10 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_loop import shared
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, dead_zone
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Arm, Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 NEWTON_STEPS = 3
 
@@ -33,12 +35,13 @@ class MullinsSoftening(Effect):
         ),
     )
     shapes = ({"width": 0.1}, {"width": 0.5})
-    exposed_by = frozenset({"peaks", "repeats"})
+    exposed_by = by("peaks", "repeats")
     separated_by = {
-        "cycle_conditioning": "loads in shuffled order",
-        "play_hysteresis": "repeats",
-        "gain_drift": "pauses",
+        "cycle_conditioning": by("shuffled_loads"),
+        "gain_drift": by("pauses", "shuffled_loads"),
+        "play_hysteresis": by("repeats"),
     }
+    departs_with = frozenset({"memory", "load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without softening would need; ``before["largest_load"]`` counts."""
@@ -61,6 +64,10 @@ class MullinsSoftening(Effect):
 
         spring, arm = shared(static, signal, conditions)
         return static(spring) + arm
+
+    def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
+        """What the arm bears set apart first."""
+        return BesideArm(self.inverse(values, step_s), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u, in closed form; exact for a load without noise."""

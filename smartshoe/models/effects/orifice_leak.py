@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 TURBULENT_PLACES = (0.003, 0.02)
 
@@ -27,12 +28,14 @@ class OrificeLeak(Effect):
         EffectParameter("laminar_below", "FS_reading", "where the flow turns laminar", None, 3e-4, 0.1, 0.01),
     )
     shapes = ({"laminar_below": 0.005},)
-    exposed_by = frozenset({"holds", "rests", "peaks"})
+    exposed_by = by("holds", "rests", "peaks")
     separated_by = {
-        "linear_leak": "holds at several loads",
-        "zero_drift": "idle and long_hold",
-        "permanent_set": "sign",
+        "linear_leak": by("holds", "peaks"),
+        "permanent_set": by("rests"),
+        "zero_drift": by("idle", "long_hold", "temperature"),
     }
+    departs_with = frozenset({"time", "load"})
+    air = "leaves"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """What is left of the pressure."""

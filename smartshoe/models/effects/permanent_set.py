@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class PermanentSet(Effect):
@@ -25,8 +26,15 @@ class PermanentSet(Effect):
         EffectParameter("exponent", "1", "power of the load in the dose", None, 0.7, 3.0, 1.0),
     )
     shapes = ({"exponent": 1.2},)
-    exposed_by = frozenset({"rests", "holds", "pauses"})
-    separated_by = {"linear_leak": "sign", "orifice_leak": "sign", "zero_drift": "pauses", "warm_up": "pauses"}
+    exposed_by = by("rests", "holds", "pauses")
+    separated_by = {
+        "linear_leak": by("rests"),
+        "orifice_leak": by("rests"),
+        "warm_up": by("pauses"),
+        "zero_drift": by("pauses"),
+    }
+    departs_with = frozenset({"time", "load"})
+    is_seen_at_rest = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure with the set so far; ``before["dose"]`` (full scales times s) counts along."""

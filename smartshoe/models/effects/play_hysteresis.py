@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone, dead_zone
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 HALF_WIDTHS = np.geomspace(0.003, 0.5, 20)  # of full scale
 LEAST_LEVELLING = 0.5
@@ -40,13 +41,15 @@ class PlayHysteresis(Effect):
         {"width": 0.15, "spread": 0.5, "levelling": 0.6, "openness": 0.1},
         {"width": 0.05, "spread": 0.8, "levelling": 0.6, "openness": 0.9},
     )
-    exposed_by = frozenset({"rates", "peaks", "minor_loops"})
+    exposed_by = by("rates", "peaks", "minor_loops")
     separated_by = {
-        "bouc_wen_hysteresis": "minor_loops",
-        "load_unload_asymmetry": "minor_loops",
-        "second_relaxation": "rates",
-        "power_law_creep": "rates",
+        "bouc_wen_hysteresis": by("minor_loops"),
+        "load_unload_asymmetry": by("minor_loops"),
+        "mullins_softening": by("repeats"),
+        "power_law_creep": by("rates"),
+        "second_relaxation": by("rates"),
     }
+    departs_with = frozenset({"load", "direction", "memory"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load less friction."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element
+from smartshoe.models.effects.exposure import by
 
 SHORTEST_S, LONGEST_S, ARMS = 0.02, 2000.0, 9
 SPACING = math.log10(LONGEST_S / SHORTEST_S) / (ARMS - 1)  # decades
@@ -22,8 +23,15 @@ class PowerLawCreep(CoreEffect):
         EffectParameter("exponent", "1", "alpha: how much slower times weigh less, per decade", None, 0.02, 0.8, 0.2),
     )
     shapes = ({"exponent": 0.15}, {"exponent": 0.45})
-    exposed_by = frozenset({"holds", "rates", "rests"})
-    separated_by = {"second_relaxation": "step and long_hold", "gas_heat": "sign", "linear_leak": "sign"}
+    exposed_by = by("holds", "rates", "rests")
+    separated_by = {
+        "bouc_wen_hysteresis": by("rates"),
+        "gas_heat": by("holds"),
+        "linear_leak": by("holds"),
+        "play_hysteresis": by("rates"),
+        "second_relaxation": by("steps", "long_hold"),
+    }
+    departs_with = frozenset({"time", "load"})
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """The ladder's arms."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_evidence import Waveformless
 from smartshoe.models.effects.effect import Effect
+from smartshoe.models.effects.exposure import by
 
 
 class Quantisation(Waveformless, Effect):
@@ -14,5 +15,8 @@ class Quantisation(Waveformless, Effect):
 
     name, family, stage, place = "quantisation", "data", "logger", "logger"
     says = "readings sit on a lattice of evenly spaced values"
-    exposed_by = frozenset({"holds"})
-    separated_by = {"coloured_noise": "lattice", "held_samples": "rates"}
+    exposed_by = by("holds")
+    separated_by = {
+        "coloured_noise": by("holds"),
+        "held_samples": by("rates"),
+    }

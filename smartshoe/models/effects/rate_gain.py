@@ -10,6 +10,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 HALF_WINDOW_S = 0.04
 SLOW_PER_S = 0.01  # below this rate the power is rounded off
@@ -27,8 +28,13 @@ class RateGain(Effect):
         EffectParameter("exponent", "1", "power of the rate", None, 0.4, 2.0, 0.5),
     )
     shapes = ({"exponent": 1.0},)
-    exposed_by = frozenset({"rates", "holds"})
-    separated_by = {"sensor_lag": "sign changes with direction", "load_unload_asymmetry": "rates", "gas_heat": "holds"}
+    exposed_by = by("rates", "holds")
+    separated_by = {
+        "gas_heat": by("holds"),
+        "load_unload_asymmetry": by("rates"),
+        "sensor_lag": by("rates"),
+    }
+    departs_with = frozenset({"rate", "load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

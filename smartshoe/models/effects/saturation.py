@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.models.effects.exposure import by
 
 RAIL_KNEE = 5e-4  # of full scale: below a sensor's noise, and yet no kink for derivatives to stumble over
 
@@ -36,8 +37,14 @@ class Saturation(Effect):
         {"level": level, "knee": knee}
         for level, knee in ((0.65, 0.01), (0.8, 0.01), (0.9, 0.01), (0.97, 0.01), (0.9, 0.05))
     )
-    exposed_by = frozenset({"peaks"})
-    separated_by = {"contact_area": "peaks", "sensor_nonlinearity": "peaks", "wall_hardening": "peaks"}
+    exposed_by = by("peaks")
+    separated_by = {
+        "contact_area": by("peaks"),
+        "sensor_nonlinearity": by("peaks"),
+        "wall_hardening": by("peaks"),
+    }
+    departs_with = frozenset({"load"})
+    why_not_undone = "what was clipped is lost"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """What the sensor gives."""

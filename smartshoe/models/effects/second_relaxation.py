@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element
+from smartshoe.models.effects.exposure import by
 
 
 class SecondRelaxation(CoreEffect):
@@ -15,12 +16,16 @@ class SecondRelaxation(CoreEffect):
         EffectParameter("time_constant", "s", "its relaxation time", None, 0.05, 120.0, 5.0),
     )
     shapes = tuple({"time_constant": tau} for tau in (0.3, 1.2, 5.0, 20.0, 60.0))
-    exposed_by = frozenset({"holds", "rates", "rests"})
+    exposed_by = by("holds", "rates", "rests")
     separated_by = {
-        "power_law_creep": "step and long_hold",
-        "gas_heat": "sign: heat makes the reading fall in holds",
-        "linear_leak": "sign: a leak makes the reading fall in holds",
+        "bouc_wen_hysteresis": by("rates"),
+        "gas_heat": by("holds"),
+        "linear_leak": by("holds"),
+        "play_hysteresis": by("rates"),
+        "power_law_creep": by("steps", "long_hold"),
+        "sensor_lag": by("steps"),
     }
+    departs_with = frozenset({"time", "load"})
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One arm."""

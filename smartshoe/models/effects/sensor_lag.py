@@ -8,6 +8,7 @@ import numpy as np
 
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects.effect import Array, Conditions, CStep, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class SensorLag(Effect):
@@ -26,8 +27,15 @@ class SensorLag(Effect):
         EffectParameter("second_pole", "1", "share of that in a second, faster pole", None, 0.0, 0.45, 0.1),
     )
     shapes = ({"second_pole": 0.1}, {"second_pole": 0.4})
-    exposed_by = frozenset({"rates", "steps"})
-    separated_by = {"delay": "step or multisine", "rate_gain": "rates", "second_relaxation": "step"}
+    exposed_by = by("rates", "steps")
+    separated_by = {
+        "clock_drift": by("repeats", "steps"),
+        "delay": by("steps", "multisine"),
+        "rate_gain": by("rates"),
+        "second_relaxation": by("steps"),
+    }
+    departs_with = frozenset({"rate"})
+    is_latency = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The lagged signal."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 SCALES = np.array([4.0, 6.0 * 3.0**0.5, 16.0])  # one over the extremes of c (1 - c) (1 - 2c)^k on 0 ... 1, k = 0, 1, 2
 LEAST_SLOPE = 0.05  # of the straight line's: where it rises less, a reading does not tell its pressure
@@ -51,14 +52,15 @@ class SensorNonlinearity(Effect):
         EffectParameter("wave", "FS_reading", "distance at 21 % of scale, minus that at 79 %", 0.0, -0.08, 0.08, 0.01),
         EffectParameter("shoulders", "FS_reading", "added distance at 15 % and 85 %", 0.0, -0.04, 0.04, 0.01),
     )
-    exposed_by = frozenset({"peaks"})
+    exposed_by = by("peaks")
     separated_by = {
-        "gas_compression": "displacement; pressure applied directly to the sensor",
-        "wall_hardening": "displacement; pressure applied directly to the sensor",
-        "contact_area": "displacement; pressure applied directly to the sensor",
-        "saturation": "peaks",
-        "dead_band": "low_loads",
+        "contact_area": by("displacement", "pressure_reference"),
+        "dead_band": by("low_loads"),
+        "gas_compression": by("displacement", "pressure_reference"),
+        "saturation": by("peaks"),
+        "wall_hardening": by("displacement", "pressure_reference"),
     }
+    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The reading."""

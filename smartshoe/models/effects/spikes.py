@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_evidence import Waveformless
 from smartshoe.models.effects.effect import Effect
+from smartshoe.models.effects.exposure import by
 
 
 class Spikes(Waveformless, Effect):
@@ -14,5 +15,7 @@ class Spikes(Waveformless, Effect):
 
     name, family, stage, place = "spikes", "noise", "logger", "logger"
     says = "single readings far off their neighbours, rarely and at no fixed load"
-    exposed_by = frozenset()
-    separated_by = {"dropouts": "length: a dropout stays, and at one value"}
+    separated_by = {
+        "dropouts": by("holds"),
+        "hum": by("repeats"),
+    }

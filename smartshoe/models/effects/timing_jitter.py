@@ -6,6 +6,7 @@ from math import sqrt
 
 from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, Evidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Array, Conditions, Effect
+from smartshoe.models.effects.exposure import by
 
 
 class TimingJitter(Waveformless, Effect):
@@ -13,8 +14,10 @@ class TimingJitter(Waveformless, Effect):
 
     name, family, stage, place = "timing_jitter", "noise", "logger", "logger"
     says = "the noise grows with the pressure's slope: fast ramps are noisy, holds are not"
-    exposed_by = frozenset({"rates"})
-    separated_by = {"heteroscedastic_noise": "holds at several loads"}
+    exposed_by = by("rates")
+    separated_by = {
+        "heteroscedastic_noise": by("holds"),
+    }
 
 
 def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:

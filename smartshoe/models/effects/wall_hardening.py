@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects._wall_loop import shared
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Arm, Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 NEWTON_STEPS = 5
 
@@ -24,12 +26,14 @@ class WallHardening(Effect):
         EffectParameter("steepness", "1", "s: share of the fifth power, which comes late", None, -0.3, 1.0, 0.3),
     )
     shapes = ({"steepness": 0.1},)
-    exposed_by = frozenset({"peaks", "low_loads"})
+    exposed_by = by("peaks", "low_loads")
     separated_by = {
-        "gas_compression": "sign; displacement",
-        "contact_area": "displacement",
-        "sensor_nonlinearity": "displacement, or pressure applied to the sensor",
+        "contact_area": by("rates", "displacement"),
+        "gas_compression": by("peaks", "displacement"),
+        "saturation": by("peaks"),
+        "sensor_nonlinearity": by("displacement", "pressure_reference"),
     }
+    departs_with = frozenset({"load", "rate"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without hardening would need."""
@@ -50,6 +54,10 @@ class WallHardening(Effect):
 
         spring, arm = shared(static, signal, conditions)
         return static(spring) + arm
+
+    def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
+        """What the arm bears set apart first."""
+        return BesideArm(self.inverse(values, step_s), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u, in closed form."""

@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.models.effects._sensor_clock import running_time_s
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class WarmUp(Effect):
@@ -26,8 +27,16 @@ class WarmUp(Effect):
         EffectParameter("stretch", "1", "exponent of the settling, 1 for a single time constant", None, 0.6, 1.4, 0.2),
     )
     shapes = tuple({"time_constant": tau, "stretch": 1.0} for tau in (10.0, 30.0, 100.0, 250.0))
-    exposed_by = frozenset({"rests", "idle"})
-    separated_by = {"zero_drift": "idle", "linear_leak": "idle", "permanent_set": "pauses", "zero_offset": "idle"}
+    exposed_by = by("rests", "idle")
+    separated_by = {
+        "cycle_conditioning": by("pauses"),
+        "linear_leak": by("idle"),
+        "permanent_set": by("pauses"),
+        "zero_drift": by("idle"),
+        "zero_offset": by("idle"),
+    }
+    departs_with = frozenset({"time"})
+    is_seen_at_rest = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and what the zero has moved."""

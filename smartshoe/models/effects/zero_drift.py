@@ -5,6 +5,7 @@ from __future__ import annotations
 from smartshoe.models.effects._sensor_clock import drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class ZeroDrift(Effect):
@@ -17,14 +18,29 @@ class ZeroDrift(Effect):
     says = "the reading's zero moves steadily with time (with the temperature, where it is logged), loaded or not"
     parameters = (
         EffectParameter("drift_rate", "FS_reading/s", "change of the zero a second", 0.0, -1e-2, 1e-2, 1e-5),
-        EffectParameter("temperature_coefficient", "FS_reading/K", "change of the zero a kelvin", 0.0, -0.1, 0.1, 1e-3),
+        EffectParameter(
+            "temperature_coefficient",
+            "FS_reading/K",
+            "change of the zero a kelvin",
+            0.0,
+            -0.1,
+            0.1,
+            1e-3,
+            channel="temperature",
+        ),
     )
-    exposed_by = frozenset({"rests", "idle", "pauses"})
+    exposed_by = by("rests", "idle", "pauses")
     separated_by = {
-        "linear_leak": "idle; a temperature channel", "orifice_leak": "idle; a temperature channel",
-        "permanent_set": "pauses", "warm_up": "idle",
-        "gain_drift": "peaks",
-    }  # fmt: skip
+        "coloured_noise": by("repeats"),
+        "cross_talk": by("neighbour"),
+        "gain_drift": by("rests", "peaks"),
+        "linear_leak": by("idle", "long_hold", "temperature"),
+        "orifice_leak": by("idle", "long_hold", "temperature"),
+        "permanent_set": by("pauses"),
+        "warm_up": by("idle"),
+    }
+    departs_with = frozenset({"time"})
+    is_seen_at_rest = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the drift since the session's start."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.exposure import by
 
 
 class ZeroOffset(Effect):
@@ -12,8 +13,14 @@ class ZeroOffset(Effect):
     name, family, stage, place = "zero_offset", "zero", "sensor", "sensor"
     says = "the reading is shifted by a constant, with and without load"
     parameters = (EffectParameter("offset", "FS_reading", "shift of the reading", 0.0, -0.5, 0.5, 0.01),)
-    exposed_by = frozenset({"rests"})
-    separated_by = {"load_cell_tare": "idle", "dead_band": "low_loads", "warm_up": "idle"}
+    exposed_by = by("rests")
+    separated_by = {
+        "dead_band": by("low_loads"),
+        "load_cell_tare": by("idle", "pressure_reference"),
+        "warm_up": by("idle"),
+    }
+    is_seen_at_rest = True
+    shifts = "reading"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal, shifted."""

@@ -10,7 +10,8 @@ from pathlib import PurePath
 from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.judgement import Gain
 from smartshoe.diagnosis.result import Cause, Diagnosis, Standing
-from smartshoe.models.effects import catalogue
+from smartshoe.models.effects import catalogue, told_apart_by
+from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import sentence
@@ -195,13 +196,13 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
     found = []
     for name in names:
         other = known.get(name)
-        apart = cause.effect.separated_by.get(name) or (other.separated_by.get(cause.name) if other else None)
+        apart = sorted(SAYS[word] for word in told_apart_by(cause.effect, other)) if other else []
         found.append(
             Neighbour(
                 words(name),
                 other.says if other else "",
                 plain(margins[name], 2) if name in margins else "–",
-                words(apart) if apart else "",
+                "; ".join(apart),
             )
         )
     return found

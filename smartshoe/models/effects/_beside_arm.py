@@ -9,12 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smartshoe.models.effects.effect import CStep, Inverse
+from smartshoe.models.effects.effect import Arm, Array, CStep, Inverse
 from smartshoe.models.first_order import hold_coefficients
-
-Array = NDArray[np.float64]
 
 
 class _Lag:
@@ -64,13 +61,13 @@ class _Lag:
 class BesideArm(Inverse):
     """A block of the wall: the core is given u + kappa (u - q), of which kappa (u - q) is the arm's.
 
-    ``spring`` turns u into phi(u); ``share`` kappa and ``rate_per_s`` a are the baseline's.
+    ``spring`` turns u into phi(u); ``arm`` is the baseline's, of share kappa and rate a.
     """
 
-    def __init__(self, spring: Inverse, share: float, rate_per_s: float, step_s: float) -> None:
+    def __init__(self, spring: Inverse, arm: Arm, step_s: float) -> None:
         self.spring = spring
-        self.part = share / (1.0 + share)
-        self.lag = _Lag(rate_per_s / (1.0 + share), step_s)
+        self.part = arm.share / (1.0 + arm.share)
+        self.lag = _Lag(arm.rate_per_s / (1.0 + arm.share), step_s)
 
     def reset(self) -> None:
         """The next value counts as having lasted for ever."""
@@ -110,11 +107,11 @@ class GasBesideArm(Inverse):
     ``ratio`` g.
     """
 
-    def __init__(self, spring: Inverse, ratio: float, share: float, rate_per_s: float, step_s: float) -> None:
-        self.spring, self.ratio, self.share = spring, ratio, share
-        self.part = share / (1.0 + share)
-        self.arm = _Lag(rate_per_s, step_s)
-        self.core = _Lag(rate_per_s / (1.0 + share), step_s)
+    def __init__(self, spring: Inverse, ratio: float, arm: Arm, step_s: float) -> None:
+        self.spring, self.ratio, self.share = spring, ratio, arm.share
+        self.part = arm.share / (1.0 + arm.share)
+        self.arm = _Lag(arm.rate_per_s, step_s)
+        self.core = _Lag(arm.rate_per_s / (1.0 + arm.share), step_s)
 
     def reset(self) -> None:
         """The next value counts as having lasted for ever."""

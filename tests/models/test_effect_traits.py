@@ -1,0 +1,218 @@
+"""What effects say of themselves and of one another, and effects that other packages bring."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from importlib.metadata import EntryPoint
+from itertools import combinations
+from pathlib import Path
+from types import ModuleType
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from smartshoe.compensation.extended import ExtendedCompensator
+from smartshoe.errors import UsageError
+from smartshoe.models.effects import (
+    Conditions,
+    Effect,
+    EffectParameter,
+    Inverse,
+    Memoryless,
+    blocks,
+    by,
+    catalogue,
+    effect,
+    told_apart_by,
+)  # fmt: skip
+from smartshoe.models.effects.effect import Array
+from smartshoe.models.effects.exposure import CHANNELS, SAYS, WORDS
+from smartshoe.models.extended import ExtendedModel
+
+catalogue_module = import_module("smartshoe.models.effects.catalogue")  # the package has a function of this name
+BASELINE = ExtendedModel(0.9, 0.15, 0.3, 800.0, 180.0, "mbar")
+EVERY = (*catalogue().values(), *(one for family in blocks().values() for one in family))
+ROOT = Path(__file__).resolve().parents[2] / "smartshoe"
+
+
+def typical(one: Effect) -> Array:
+    """Strengths at their typical size."""
+    return np.array([v if p.null is None else p.size for p, v in zip(one.parameters, one.start(), strict=True)])
+
+
+def test_every_word_is_said_and_channels_are_among_them() -> None:
+    assert set(SAYS) == WORDS
+    assert CHANNELS < WORDS
+
+
+@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
+def test_traits_are_words_of_the_one_vocabulary(one: Effect) -> None:
+    assert one.exposed_by | one.needs <= WORDS
+    assert one.needs <= CHANNELS
+    assert all(parameter.channel == "" or parameter.channel in CHANNELS for parameter in one.parameters)
+    assert one.departs_with <= {"load", "direction", "rate", "time", "memory"}
+    assert one.is_flexible or one.separated_by
+    for name, words in one.separated_by.items():
+        assert name in catalogue()
+        assert words
+        assert words <= WORDS
+
+
+def test_neighbours_say_the_same_of_one_another() -> None:
+    for one, other in combinations(catalogue().values(), 2):
+        assert one.separated_by.get(other.name) == other.separated_by.get(one.name), (one.name, other.name)
+        assert told_apart_by(one, other) == told_apart_by(other, one) == one.separated_by.get(other.name, frozenset())
+
+
+def test_noise_and_faults_of_data_are_the_effects_that_are_no_physical_cause() -> None:
+    assert {one.family for one in EVERY if not one.is_physical} == {"noise", "data"}
+    assert not any(one.family in ("noise", "data") for one in EVERY if one.is_physical)
+
+
+def test_a_latency_moves_the_reading_in_time_and_changes_nothing_that_lasts() -> None:
+    time_s = 0.02 * np.arange(4000)
+    hold = np.interp(time_s, [0.0, 10.0, 11.0, 80.0], [0.0, 0.0, 1.0, 1.0])
+    at = Conditions(time_s, hold, 0.02)
+    for one in EVERY:
+        values = np.array(
+            [p.size if p.null is not None else v for p, v in zip(one.parameters, one.start(), strict=True)]
+        )
+        if one.is_latency:
+            out = one.apply(hold, at, values)
+            assert np.max(np.abs(out - hold)) > 1e-4, one.name
+            assert out[[0, 3000]] == pytest.approx(hold[[0, 3000]], abs=1e-6), one.name
+
+
+def test_what_is_seen_at_rest_moves_the_reading_without_load() -> None:
+    time_s = 0.02 * np.arange(4000)
+    load = np.interp(time_s, [0.0, 10.0, 20.0, 30.0, 80.0], [0.0, 0.0, 1.0, 0.0, 0.0])
+    at = Conditions(time_s, load, 0.02)
+    for one in EVERY:
+        if one.is_seen_at_rest:
+            values = np.array(
+                [v if p.null is None else p.size for p, v in zip(one.parameters, one.start(), strict=True)]
+            )
+            out = one.apply(load, at, values)
+            assert abs(out[-1] - load[-1]) > 1e-5, one.name
+
+
+def test_a_shift_adds_its_one_value() -> None:
+    at = Conditions(0.02 * np.arange(3), np.array([0.0, 0.5, 1.0]), 0.02)
+    shifts = {one.name: one for one in EVERY if one.shifts}
+    assert {name: one.shifts for name, one in shifts.items()} == {"zero_offset": "reading", "load_cell_tare": "load"}
+    for one in shifts.values():
+        assert one.apply(at.load, at, np.array([0.125])) == pytest.approx(at.load + 0.125, abs=0)
+
+
+def test_no_other_room_knows_an_effect_by_name() -> None:
+    """In models, compensation, export and store a name stands only where an effect is taken from the catalogue."""
+    named = re.compile(rf"""(?<!effect\()["']({"|".join(one.name for one in EVERY)})["'](?!:)""")
+    known = [
+        f"{path.relative_to(ROOT)}: {line.strip()}"
+        for room in ("models", "compensation", "store")
+        for path in (ROOT / room).rglob("*.py")
+        if path.parent.name != "effects"
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if named.search(line)
+    ]
+    assert not known
+
+
+class Crease(Effect):
+    """An effect as another package writes it: a gain of the sensor below zero."""
+
+    name, family, stage, place = "crease", "static_curve", "sensor", "sensor"
+    says = "readings below zero have another gain"
+    parameters = (EffectParameter("gained", "1", "gain below zero over that above, less one", 0.0, -0.5, 0.5, 0.1),)
+    exposed_by = by("low_loads")
+    separated_by: ClassVar = {"saturation": by("low_loads")}
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        return np.where(signal < 0.0, signal * (1.0 + values[0]), signal)
+
+    def inverse(self, values: Array, step_s: float) -> Inverse:
+        gain = 1.0 + float(values[0])
+        return Memoryless(
+            lambda signal, time_s: np.where(signal < 0.0, signal / gain, signal), f"if (x < 0.0) x /= {gain!r};"
+        )
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    """A module that entry points can name, and the catalogue made anew before and after."""
+    import sys
+
+    module = ModuleType("another_package")
+    monkeypatch.setitem(sys.modules, "another_package", module)
+
+    def forget() -> None:
+        for made in (catalogue_module._found, catalogue_module.catalogue, catalogue_module.blocks):
+            made.cache_clear()
+
+    def offered(group: str) -> tuple[EntryPoint, ...]:
+        return tuple(EntryPoint(name, f"another_package:{name}", group) for name in vars(module) if name[0].isupper())
+
+    monkeypatch.setattr(catalogue_module, "entry_points", offered)
+    forget()
+    yield module
+    monkeypatch.undo()
+    forget()
+
+
+@pytest.mark.parametrize("offer", [Crease, Crease()], ids=["class", "instance"])
+def test_an_effect_of_another_package_is_as_good_as_any(installed: ModuleType, offer: object) -> None:
+    installed.Crease = offer  # type: ignore[attr-defined]
+    one = catalogue()["crease"]
+    assert list(catalogue()) == sorted(catalogue())
+    assert told_apart_by(one, effect("saturation")) == told_apart_by(effect("saturation"), one) == {"low_loads"}
+    model = ExtendedModel.from_dict(BASELINE.with_part(one, np.array([0.3])).to_dict())
+    load = np.array([0.0, 0.5, 1.0, 0.2, -0.3, -0.3, 0.0])
+    at = Conditions(0.02 * np.arange(7), load, 0.02)
+    assert np.any(model.reading(at) != BASELINE.reading(at))
+    assert ExtendedCompensator(model, 50.0).apply(model.reading(at)) / 800.0 == pytest.approx(load, abs=1e-12)
+
+
+def _named(name: str) -> Effect:
+    return type("Named", (Crease,), {"name": name})()
+
+
+def _placed(place: str) -> Effect:
+    return type("Placed", (Crease,), {"place": place})()
+
+
+def _shown(word: str) -> Effect:
+    return type("Shown", (Crease,), {"exposed_by": frozenset({word})})()
+
+
+@pytest.mark.parametrize(
+    ("offer", "said"),
+    [
+        (_named("linear_leak"), "'Wrong' has the name 'linear_leak', which is taken"),
+        (_named("flexible_loop"), "taken"),
+        (_placed("roof"), "has the place 'roof': use one of machine"),
+        (_shown("earthquakes"), "is shown by earthquakes"),
+        (type("Unnamed", (Effect,), {"apply": Crease.apply}), "has no name, no family"),
+        (3.0, "no smartshoe.models.effects.Effect"),
+        (Effect, "cannot be loaded"),
+    ],
+)
+def test_what_cannot_take_part_is_refused_by_name(installed: ModuleType, offer: object, said: str) -> None:
+    installed.Wrong = offer  # type: ignore[attr-defined]
+    with pytest.raises(UsageError, match=said):
+        catalogue()
+
+
+def test_two_packages_cannot_bring_one_name(installed: ModuleType) -> None:
+    installed.First, installed.Second = Crease, _named("crease")  # type: ignore[attr-defined]
+    with pytest.raises(UsageError, match="'Second' has the name 'crease', which is taken"):
+        effect("linear_leak")
+
+
+def test_an_entry_point_to_nowhere_is_refused(installed: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = EntryPoint("gone", "no_such_package:Thing", "smartshoe.effects")
+    monkeypatch.setattr(catalogue_module, "entry_points", lambda group: (gone,))
+    with pytest.raises(UsageError, match="'gone' cannot be loaded"):
+        catalogue()
