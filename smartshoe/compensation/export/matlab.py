@@ -6,7 +6,7 @@ import numpy as np
 
 from smartshoe.compensation.export.model import ExtendedFilterModel, FilterModel
 from smartshoe.compensation.export.rendering import finite_or, render, vector_csv
-from smartshoe.compensation.export.twin import SHIFTS
+from smartshoe.compensation.export.twin import shifts_of
 from smartshoe.errors import UsageError
 
 
@@ -32,15 +32,12 @@ def matlab_files(model: FilterModel) -> dict[str, str]:
 
 def _extended(model: ExtendedFilterModel) -> dict[str, object]:
     filter_ = model.filter
-    shifts = {part.name: part for part in filter_.model.parts if part.effect.shifts is not None}
-    others = [name for name, _ in filter_.blocks if name != "core" and name not in shifts]
+    written = {"core", *(part.name for part in filter_.model.parts if part.effect.shifts is not None)}
+    others = [name for name, _ in filter_.blocks if name not in written]
     if others:
         raise UsageError(
             f"the inverses of {', '.join(others)} are not written in MATLAB: export with --to c, which has every block"
         )
-    shift = {"load": 0.0, "reading": 0.0}
-    for part in shifts.values():
-        shift[str(part.effect.shifts)] += float(part.values[0])
     core = filter_.core
     return {
         "core": {
@@ -52,8 +49,7 @@ def _extended(model: ExtendedFilterModel) -> dict[str, object]:
         },
         "reading_per_share": repr(filter_.reading_per_share),
         "full_scale_load_n": repr(filter_.model.full_scale_load_n),
-        "load_shift": repr(shift["load"]),
-        "reading_shift": repr(shift["reading"]),
+        **{name: repr(value) for name, value in shifts_of(filter_.model).items()},
     }
 
 

@@ -10,9 +10,16 @@ from smartshoe.compensation.calibration import Calibration
 from smartshoe.compensation.export.model import one_safe_line, origin
 from smartshoe.compensation.export.rendering import render
 from smartshoe.errors import UsageError
-from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.extended import ExtendedModel, Part
 
-SHIFTS = ("zero_offset", "load_cell_tare")
+
+def shifts_of(model: ExtendedModel) -> dict[str, float]:
+    """What effects add to load and reading whatever the time, shares of full scale: load_shift and reading_shift."""
+    found = {"load_shift": 0.0, "reading_shift": 0.0}
+    for part in model.parts:
+        if part.effect.shifts is not None:
+            found[f"{part.effect.shifts}_shift"] += float(part.values[0])
+    return found
 
 
 @dataclass(frozen=True)
@@ -27,7 +34,7 @@ class TwinModel:
     def model(self) -> ExtendedModel:
         """What is simulated; raises `UsageError` naming effects that are not written forward."""
         found = self.calibration.model()
-        others = [p.name for p in found.chain if p is not None and p.name not in SHIFTS and not _is_idle(found, p.name)]
+        others = [p.name for p in found.chain if p is not None and p.effect.shifts is None and not _is_idle(p)]
         if others:
             raise UsageError(
                 f"the twin of {self.calibration.unit or 'this unit'} has {', '.join(others)}, which is not written"
@@ -52,7 +59,6 @@ class TwinModel:
         found = self.model
         core = found.core
         transition, before, after = core.recursion(1.0 / self.sample_rate_hz)
-        shifts = {part.name: float(part.values[0]) for part in found.parts if part.name in SHIFTS}
         values: dict[str, Any] = {
             "order": core.drive.size,
             "transition": [[repr(float(value)) for value in row] for row in transition],
@@ -65,11 +71,10 @@ class TwinModel:
             "reading_per_share": repr(found.full_scale_reading * found.gain),
             "unit_symbol": one_safe_line(found.reading_unit),
             "shift": lambda value: f" + {value!r}" if value else "",
-            **{name: shifts.get(name, 0.0) for name in SHIFTS},
+            **shifts_of(found),
         }
         return {f"{self.name}.{end}": render(f"twin.{end}.j2", self, **values) for end in "hc"}
 
 
-def _is_idle(model: ExtendedModel, name: str) -> bool:
-    part = next(part for part in model.parts if part.name == name)
+def _is_idle(part: Part) -> bool:
     return bool(part.effect.parameters) and part.effect.is_null(part.values)
