@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -30,7 +31,13 @@ class Browser:
         )  # fmt: skip
         self._number = 0
         self.errors: list[str] = []
-        self._socket = self._connected()
+        self._sockets = ExitStack()
+        try:
+            self._socket = self._connected()
+        except BaseException:
+            self._process.kill()
+            self._process.wait()
+            raise
         for name in ("Page", "Runtime", "Log"):
             self.call(f"{name}.enable")
         self.size(width, height, mobile)
@@ -41,13 +48,13 @@ class Browser:
             if port.exists() and len(lines := port.read_text().splitlines()) == 2:
                 break
             time.sleep(0.05)
-        browser = connect(f"ws://127.0.0.1:{lines[0]}{lines[1]}", max_size=None)
+        browser = self._sockets.enter_context(connect(f"ws://127.0.0.1:{lines[0]}{lines[1]}", max_size=None))
         self._browser = browser
         browser.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
         while (answer := json.loads(browser.recv(timeout=30))).get("id") != 1:
             pass
         target = next(t["targetId"] for t in answer["result"]["targetInfos"] if t["type"] == "page")
-        return connect(f"ws://127.0.0.1:{lines[0]}/devtools/page/{target}", max_size=None)
+        return self._sockets.enter_context(connect(f"ws://127.0.0.1:{lines[0]}/devtools/page/{target}", max_size=None))
 
     def call(self, method: str, **parameters: Any) -> Any:
         """A call of the protocol and its result."""
@@ -101,14 +108,13 @@ class Browser:
 
     def close(self) -> None:
         """End the browser."""
-        self._socket.close()
         self._browser.send(json.dumps({"id": 2, "method": "Browser.close"}))
-        self._browser.close()
         try:
             self._process.wait(10.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._sockets.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def __enter__(self) -> Self:

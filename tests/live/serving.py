@@ -36,11 +36,13 @@ def walk_table(path: Path, seconds: float = 10.0, sides: tuple[str, ...] = ("lef
 
 
 @contextmanager
-def serving(*urls: str, token: str | None = None, **options: Any) -> Iterator[tuple[LiveServer, LiveSession]]:
+def serving(
+    *urls: str, token: str | None = None, port: int = 0, **options: Any
+) -> Iterator[tuple[LiveServer, LiveSession]]:
     """A server of the shoes at ``urls`` that is ready, ended in the end as the command ends it."""
     shoes = {url: open_shoe(url).open() for url in urls}
     session = LiveSession(shoes, **options)
-    server = LiveServer(session, token=token)
+    server = LiveServer(session, port=port, token=token)
     session.start()
     thread = threading.Thread(target=server.run)
     thread.start()
