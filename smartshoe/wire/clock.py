@@ -11,6 +11,7 @@ the shoe alike, can find it). Skew, and every difference between times of one st
 Delays are gathered in bins of `BIN_S`. A bin gives its least delay, its tenth percentile and its median, groups of
 bins their least; whichever gives the surest straight line is fitted (the least where delays have a
 hard floor, the median where they are like noise), with Tukey's biweight against bins that a stall lifted as a whole.
+The skew is the mean of all of them, each weighted by how sure it is: they err alike in part only.
 Where the choice changes, the line goes on where it was, so that the constant stays one. The line is that of the last
 `KEPT_BINS` bins, since a crystal follows its temperature.
 """

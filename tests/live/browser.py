@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -27,7 +29,7 @@ class Browser:
         self._process = subprocess.Popen(
             [PROGRAM, "--headless=new", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", "--mute-audio",
              "--disable-dev-shm-usage", f"--user-data-dir={self._folder}", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         self._number = 0
         self.errors: list[str] = []
@@ -35,8 +37,7 @@ class Browser:
         try:
             self._socket = self._connected()
         except BaseException:
-            self._process.kill()
-            self._process.wait()
+            self._kill()
             raise
         for name in ("Page", "Runtime", "Log"):
             self.call(f"{name}.enable")
@@ -112,10 +113,13 @@ class Browser:
         try:
             self._process.wait(10.0)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            self._kill()
         self._sockets.close()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _kill(self) -> None:
+        os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
 
     def __enter__(self) -> Self:
         return self

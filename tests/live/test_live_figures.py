@@ -1,0 +1,139 @@
+"""``pytest -m benchmark tests/live/test_live_figures.py -s`` prints docs/live.md's figures."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import PROGRAM, Browser
+from serving import health, page, serving, until, walk_table
+
+from smartshoe.live.client import Client
+from smartshoe.live.server import LiveServer
+from smartshoe.live.session import LiveSession
+
+SECONDS = 30.0
+
+
+def memory_kb() -> int:
+    """Memory of this process that is its own."""
+    fields = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines() if ":" in line)
+    return int(fields["RssAnon"].split()[0])
+
+
+def emulated(folder: Path, side: str) -> tuple[subprocess.Popen[str], str]:
+    """Eight channels at 200 Hz at a pseudo-terminal, served by a process of their own."""
+    table = walk_table(folder / f"{side}.csv", 60.0, (side,))
+    lines = table.read_text().splitlines()
+    more = [",".join([lines[0], *(f"{side}_extra{k}_mbar" for k in range(4))])]
+    table.write_text("\n".join(more + [f"{line},{line.split(',', 1)[1]}" for line in lines[1:]]))
+    words = [sys.executable, "-m", "simulators.emulator", f"replay:{table}", "--link", str(folder / f"shoe_{side}")]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    process.stdout.readline()
+    return process, process.stdout.readline().split("--shoe ")[1].strip()
+
+
+@pytest.mark.benchmark
+@pytest.mark.wire
+def test_from_port_to_pixel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert PROGRAM is not None
+    emulators = [emulated(tmp_path, side) for side in ("left", "right")]
+    arrived: dict[int, float] = {}  # frame: when the oldest sample that is new in it came
+    plain = Client.frame
+
+    def frame(client: Client) -> bytes | None:
+        oldest = [seen.pop("first", None) for seen in new]
+        made = plain(client)
+        found = [at for at in oldest if at is not None]
+        if made is not None and found:
+            arrived[client._number - 1] = min(found) - time.perf_counter() + time.time()
+        return made
+
+    monkeypatch.setattr(Client, "frame", frame)
+    new: list[dict[str, float]] = [{}, {}]
+    try:
+        with serving(*(url for _, url in emulators)) as (server, session):
+            for seen, live in zip(new, session.shoes, strict=True):
+                take = live.take
+
+                def noted(block, session_s, force_n, take=take, seen=seen):  # type: ignore[no-untyped-def]
+                    steps = take(block, session_s, force_n)
+                    seen.setdefault("first", float(block.arrival_s[0]))
+                    return steps
+
+                live.take = noted  # type: ignore[method-assign]
+            server.desk.start()
+            _watched(server, session, arrived)
+            server.desk.close()
+    finally:
+        for process, _ in emulators:
+            process.send_signal(2)
+            process.communicate(timeout=20)
+
+
+def _watched(server: LiveServer, session: LiveSession, arrived: dict[int, float]) -> None:
+    until(lambda: all(live.samples > 500 for live in session.shoes))
+    with Browser() as browser:
+        browser.open(server.url)
+        browser.until("typeof live !== 'undefined' && live.drawn > 20")
+        # The frame after the one that draws: what was drawn is on the screen by then.
+        browser.run(
+            "window.seen = [], (() => { let before = -1; const look = () => { if (live.drawn !== before) {"
+            " const n = before = live.drawn; requestAnimationFrame(() => seen.push([n, Date.now()])); }"
+            " requestAnimationFrame(look); }; look(); })(), 0"
+        )
+        time.sleep(2.0)
+        before, cpu_s, wall_s = memory_kb(), time.process_time(), time.perf_counter()
+        heap = browser.run("performance.memory.usedJSHeapSize")
+        time.sleep(SECONDS)
+        cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
+        seen = browser.run("seen")
+        heap_after = browser.run("performance.memory.usedJSHeapSize")
+        assert browser.errors == []
+    late_ms = np.array([at - 1e3 * arrived[number] for number, at in seen if number in arrived])
+    print(
+        f"\nport to pixel: median {np.median(late_ms):.0f} ms, 95 % {np.quantile(late_ms, 0.95):.0f} ms,"
+        f" {late_ms.size} frames"
+    )
+    print(f"frames drawn a second: {len(seen) / wall_s:.1f}; server's processor time {100 * cpu_s / wall_s:.1f} %")
+    print(f"memory: server {memory_kb() - before} kB in {wall_s:.0f} s, page's heap {(heap_after - heap) / 1e3:.0f} kB")
+    print(f"lost {health(server)['lost']}, clocks {[live.clock_dict() for live in session.shoes]}")
+    slow = []
+    for _ in range(10):
+        raw = socket.create_connection(("127.0.0.1", server.port))
+        raw.sendall(
+            f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+        )
+        slow.append(raw)
+    delays: list[list[float]] = [[], []]
+    end_s = time.perf_counter() + 10.0
+    while time.perf_counter() < end_s:
+        for raw in slow:
+            raw.recv(1)
+        for live, own in zip(session.shoes, delays, strict=True):
+            own.append(time.perf_counter() - live.last_arrival_s)
+        time.sleep(1.0)
+    print(f"ten pages that read a byte a second: lost {health(server)['lost']}, clients {health(server)['clients']}")
+    for raw in slow:
+        raw.close()
+
+
+@pytest.mark.benchmark
+def test_half_an_hour_more_in_no_more_memory(tmp_path: Path) -> None:
+    walk = walk_table(tmp_path / "walk.csv", 2400.0)
+    with serving(f"replay:{walk}", speed=1000.0) as (server, session), page(server) as client:
+        stop = threading.Event()
+        threading.Thread(target=lambda: [client.recv(timeout=60) for _ in iter(stop.is_set, True)], daemon=True).start()
+        until(lambda: session.now_s() > 600.0, 600.0)
+        first = memory_kb()
+        until(lambda: session.shoes[0].state == "over", 1200.0)
+        print(f"\nserver's memory from minute 10 to 40: {memory_kb() - first} kB; samples {session.shoes[0].samples}")
+        stop.set()
