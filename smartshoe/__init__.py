@@ -37,6 +37,7 @@ _HOME = {
     "Diagnosis": "smartshoe.diagnosis",
     "ExtendedModel": "smartshoe.models.extended",
     "sweep": "smartshoe.sweeps",
+    "study": "smartshoe.studies",
     "SmartShoeError": "smartshoe.errors",
 }
 
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
     from smartshoe.store import CalibrationStore
+    from smartshoe.studies import study
     from smartshoe.sweeps import sweep
     from smartshoe.validation import validate
 
@@ -87,6 +89,7 @@ __all__ = [
     "select_order",
     "stack",
     "static_protocol",
+    "study",
     "sweep",
     "validate",
     "write",

@@ -25,6 +25,7 @@ _COMMANDS = {
     "stream": "live readings and forces from a shoe",
     "live": "a page that shows a shoe while it is worn: forces, events, checks; record, mark, zero",
     "gait": "events, phases, strides and forces of a trial",
+    "study": "trials of many subjects under conditions, compared within subjects",
     "export": "a calibration's compensator for firmware (C) or other tools",
     "convert": "convert any readable format to any writable one",
     "check": "a shoe in the field: units that do not answer, zero, drift, body weight",

@@ -69,16 +69,9 @@ def load_calibrations(paths: Sequence[str]) -> list[Calibration]:
     from pathlib import Path
 
     from smartshoe.compensation import Calibration
-    from smartshoe.errors import InputError
+    from smartshoe.compensation.calibration_folder import load_folder
 
     found: list[Calibration] = []
     for path in paths:
-        if not Path(path).is_dir():
-            found.append(Calibration.load(path))
-            continue
-        inside = [Calibration.load(file) for file in sorted(Path(path).glob("*.json"))]
-        if not inside:
-            raise InputError(f"{path} holds no calibration: give a folder with .json files that identify wrote")
-        extended = {each.unit for each in inside if each.extended is not None}
-        found += [each for each in inside if each.extended is not None or each.unit not in extended]
+        found += load_folder(path) if Path(path).is_dir() else [Calibration.load(path)]
     return found
