@@ -76,9 +76,11 @@ def headline(result: StudyResult) -> str:
         return "no subject did two conditions: differences within subjects cannot be told"
     if not clear:
         return "no figure differs clearly between conditions (each interval holds zero, or there is none)"
-    return "; ".join(
-        f"{each.figure} {plain(each.change.mean, 2)} from {each.start} to {each.end}" for each in clear[:3]
-    ) + (f"; {len(clear) - 3} more" if len(clear) > 3 else "")
+    told = []
+    for each in clear[:3]:
+        sign = "+" if each.change.mean > 0 else ""
+        told.append(f"{each.figure} {sign}{plain(each.change.mean, 2)} from {each.start} to {each.end}")
+    return "; ".join(told) + (f"; {len(clear) - 3} more" if len(clear) > 3 else "")
 
 
 def is_clear(mean: Mean) -> bool:
