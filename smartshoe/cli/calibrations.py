@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from smartshoe.cli.output import figures_option
+
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
     from smartshoe.store import CalibrationStore
@@ -186,10 +188,13 @@ def compare_command(
 
 @command.command("drift", epilog="Example: smartshoe calibrations drift S0123 --out out/drift")
 @click.argument("unit")
-@click.option("--out", "out_folder", metavar="DIR", help="Write drift.html, drift.svg and drift.json.")
+@click.option("--out", "out_folder", metavar="DIR", help="Write drift.html and drift.json.")
+@figures_option
 @_store_option
 @_json_option
-def drift_command(unit: str, out_folder: str | None, store_folder: str | None, json_path: str | None) -> None:
+def drift_command(
+    unit: str, out_folder: str | None, store_folder: str | None, json_path: str | None, figures: str | None
+) -> None:
     """How a unit's parameters move over its life: trend, repairs, jumps."""
     from smartshoe.cli.output import emit_json
     from smartshoe.store.drift import drift
@@ -199,7 +204,9 @@ def drift_command(unit: str, out_folder: str | None, store_folder: str | None, j
     _show_faults(store)
     from smartshoe.report.drift import print_drift, write_drift
 
-    written = write_drift(out_folder, found) if out_folder is not None else {}
+    if figures is not None and out_folder is None:
+        raise click.UsageError("--figures writes into --out DIR: give --out as well")
+    written = write_drift(out_folder, found, figures) if out_folder is not None else {}
     if emit_json(found.to_dict(), json_path):
         return
     print_drift(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all
+from smartshoe.cli.inputs import column_options, read_all, warn_of_another_unit
 
 
 @click.command(
@@ -30,6 +30,7 @@ def command(
 
     calibration = Calibration.load(calibration_path)
     (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
+    warn_of_another_unit([recording], calibration)
     result = compensate(recording, calibration)
     for note in result.notes[len(recording.notes) :]:
         click.echo(f"note: {note}", err=True)

@@ -8,6 +8,8 @@ import click
 
 from smartshoe.cli.output import figures_option
 
+LEAST_WEIGHT_N = 150.0  # of a person who walks: below, it is more likely in kg
+
 
 @click.command(
     "gait",
@@ -75,6 +77,12 @@ def command(
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
+    if body_weight_n is not None and 0.0 < body_weight_n < LEAST_WEIGHT_N:
+        click.echo(
+            f"warning: a body weight of {body_weight_n:g} N is {body_weight_n / 9.80665:.1f} kg: if it is in kg, give"
+            f" --body-weight {9.80665 * body_weight_n:.0f}",
+            err=True,
+        )
     streamed = is_streamed(files, stream)
     if streamed:
         refuse_with({"--estimator": estimator, "--reference": reference, "--c3d": c3d_path, "--figures": figures})

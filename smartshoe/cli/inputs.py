@@ -12,6 +12,8 @@ from smartshoe.recording import Recording
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
 
+BEYOND = 1.1  # of the largest load that a calibration has seen
+
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
@@ -59,6 +61,29 @@ def read_all(
     recordings = join_pairs([one(file) for file in files])
     show_notes(recordings)
     return recordings
+
+
+def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:
+    """A warning on stderr for each recording that says it is of another unit, or whose load passes what was seen."""
+    for recording in recordings:
+        if recording.unit and calibration.unit and recording.unit != calibration.unit:
+            click.echo(
+                f"warning: {recording.label} is of unit {recording.unit}, the calibration of {calibration.unit}: its"
+                " forces mean nothing; give that unit's own calibration",
+                err=True,
+            )
+    seen = calibration.load_range_n
+    for recording in recordings:
+        loads = recording.of_role("load")
+        if seen is None or not loads:
+            continue
+        top_n = float(loads[0].si.max())
+        if top_n > BEYOND * seen[1]:
+            click.echo(
+                f"warning: {recording.label} is loaded to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N:"
+                " the rest is extrapolated",
+                err=True,
+            )
 
 
 def load_calibrations(paths: Sequence[str]) -> list[Calibration]:

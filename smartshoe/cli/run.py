@@ -37,7 +37,7 @@ def command(
     from smartshoe.report.tables import print_summary
     from smartshoe.scenario import load, run
     from smartshoe.scenario.keys import parse_assignments
-    from smartshoe.scenario.publish import publish
+    from smartshoe.scenario.publish import judged, publish
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
@@ -53,7 +53,7 @@ def command(
             step("writing the report")
             report = publish(result, folder, json_text(whole), figures)
     if not emit_json(whole, json_path):
-        print_summary(whole["units"])
+        print_summary(whole["units"], *judged(result))
         for unit in result.units:
             if unit.diagnosis is not None:
                 from smartshoe.report.diagnosis.terminal import print_diagnosis

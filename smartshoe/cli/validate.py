@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all
+from smartshoe.cli.inputs import column_options, read_all, warn_of_another_unit
 
 
 @click.command(
@@ -32,6 +32,7 @@ def command(
 
     calibration = Calibration.load(calibration_path)
     recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
+    warn_of_another_unit(recordings, calibration)
     result = validate(recordings, calibration).to_dict()
     if not emit_json(result, json_path):
         print_validation(result)

@@ -1,100 +1,141 @@
-"""A unit's life as a figure and a page: its parameters at each calibration, the trend, repairs and jumps."""
+"""A unit's life as a page: its parameters at each calibration, the trend, repairs and jumps."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
-from matplotlib.figure import Figure
 
 from smartshoe.atomic import json_text, make_folder, write_text
+from smartshoe.report.charts import Chart, Line, Mark, Panel
+from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain, with_sd
-from smartshoe.report.paper.drawing import STYLE, figure_of, svg
 from smartshoe.report.tables import new_console, table_of
+from smartshoe.report.wording import sentence
 from smartshoe.store.dates import iso
 from smartshoe.store.drift import Drift, Trend
-from smartshoe.store.quantities import ZERO
+from smartshoe.store.quantities import STATIC_GAIN, ZERO
 
-POINT, LINE, REPAIR, JUMP = "#2563eb", "#1f2937", "#d97706", "#dc2626"
-COLUMNS = 2
 SHOWN = ("static_gain", "a1", "b0", "b1", "k1", "k2", "zero")
-ROW_INCHES = 2.15
 TITLES = {
     "static_gain": "static gain",
     "a1": "relaxation rate a1",
     "b0": "fast gain b0",
     "zero": "zero (reading at no load)",
 }
+LEAST_SPAN = 0.004  # of a parameter's size: so that a still one looks still
+DAY_S = 86400.0
 
 
-def draw_drift(drift: Drift) -> Figure:
-    """The figure: one panel a quantity; bars are 95 % of each calibration, the line is the trend of all.
-
-    Dashed: a repair. Red: a jump that no repair explains.
-    """
-    names = [name for name in SHOWN if name in drift.trends] + [n for n in drift.trends if n not in SHOWN and n != "c"]
-    rows = -(-len(names) // COLUMNS)
-    with mpl.rc_context({**STYLE, "axes.formatter.useoffset": False}):
-        figure, axes = figure_of(9.6, 0.75 + ROW_INCHES * rows, COLUMNS, rows)
-        height = 0.75 + ROW_INCHES * rows
-        figure.subplots_adjust(top=1 - 0.3 / height, bottom=0.4 / height, hspace=0.55, wspace=0.3, left=0.09)
-        for axis, name in zip(axes, names, strict=False):
-            _panel(axis, drift, drift.trends[name])
-        for axis in axes[len(names) :]:
-            axis.set_visible(False)
-    return figure
+def shown_names(drift: Drift) -> list[str]:
+    """The quantities that are drawn, in their order."""
+    return [name for name in SHOWN if name in drift.trends] + [n for n in drift.trends if n not in SHOWN and n != "c"]
 
 
-def _panel(axis: Any, drift: Drift, trend: Trend) -> None:
-    start = drift.entries[0].date
+def _chart(drift: Drift, trend: Trend) -> Chart:
+    """A quantity against the date; between two levels of the trend a gap, so that no line joins them."""
+    start_s = drift.entries[0].date.timestamp()
+    x: list[float] = []
+    values: list[float] = []
+    sds: list[float] = []
+    fitted: list[float] = []
+    for k, day in enumerate(trend.days):
+        if k and trend.pieces[k] != trend.pieces[k - 1]:
+            x.append(0.5 * (trend.days[k - 1] + day))
+            for row in (values, sds, fitted):
+                row.append(math.nan)
+        x.append(float(day))
+        values.append(float(trend.values[k]))
+        sds.append(1.96 * float(trend.sds[k]) if math.isfinite(trend.sds[k]) else 0.0)
+        fitted.append(float(trend.fitted(np.array([day]), int(trend.pieces[k]))[0]))
+    y, bar, line = np.array(values), np.array(sds), np.array(fitted)
+    marks = [Mark(event.date.timestamp(), event.date.timestamp(), "look", "repaired")
+             for event in drift.events if event.kind == "repaired"]  # fmt: skip
     dates = [entry.date for entry in drift.entries]
-    repairs = [event.date for event in drift.events if event.kind == "repaired"]
-    for piece in np.unique(trend.pieces):
-        own = trend.days[trend.pieces == piece]
-        span = np.array([own.min(), own.max()])
-        axis.plot(
-            [start + timedelta(days=float(day)) for day in span], trend.fitted(span, int(piece)), color=LINE, lw=1
-        )
-    bars = np.where(np.isfinite(trend.sds), 1.96 * trend.sds, 0.0)
-    axis.errorbar(dates, trend.values, yerr=bars, fmt="o", ms=3.5, color=POINT, elinewidth=1, capsize=2)
-    for repair in repairs:
-        axis.axvline(repair, color=REPAIR, ls="--", lw=1)
     for jump in trend.jumps:
         at = dates.index(jump.date)
-        axis.axvspan(dates[at - 1], dates[at], color=JUMP, alpha=0.12, lw=0)
-    axis.set_title(TITLES.get(trend.name, trend.name), loc="left")
-    axis.set_ylabel(trend.unit)
-    locator = AutoDateLocator(minticks=3, maxticks=7)  # type: ignore[no-untyped-call]
-    axis.xaxis.set_major_locator(locator)
-    axis.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
-    low, high = axis.get_ylim()
-    least = 0.004 * float(np.abs(trend.values).mean())  # so that a still parameter looks still
-    if high - low < least:
-        axis.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+        marks.append(Mark(dates[at - 1].timestamp(), dates[at].timestamp(), "bad", "jump"))
+    low, high = float(np.nanmin([y - bar, line])), float(np.nanmax([y + bar, line]))
+    least = LEAST_SPAN * float(np.nanmean(np.abs(y)))
+    margin = max(0.08 * (high - low), 0.5 * (least - (high - low)), 1e-12)
+    lines = [
+        Line("calibration", y, "reading", "points", y - bar, y + bar),
+        Line("trend", line, "load", "dashed"),
+    ]
+    panel = Panel(trend.unit or trend.name, lines, (low - margin, high + margin), 170)
+    return Chart(TITLES.get(trend.name, trend.name), sentence(trend.says), "date",
+                 start_s + DAY_S * np.array(x), [panel], "drift", dates=True, marks=marks)  # fmt: skip
 
 
-def write_drift(folder: Path | str, drift: Drift) -> dict[str, Path]:
-    """Write drift.html (with the figure in it), drift.svg and drift.json; returns their paths by what they are."""
+def newtons_a_year(drift: Drift) -> dict[str, tuple[float, float, float]]:
+    """What gain and zero moved in newtons a year, with the 95 % interval; where the slope is told."""
+    gain = drift.trends.get(STATIC_GAIN)
+    if gain is None:
+        return {}
+    mean = float(np.abs(gain.values).mean())
+    scales = {STATIC_GAIN: drift.top_load_n / mean, ZERO: mean}
+    found = {}
+    for name, scale in scales.items():
+        slope = drift.trends[name].per_year if name in drift.trends else None
+        if slope is not None:
+            low, high = (scale * bound for bound in slope.ci95)
+            found[name] = (scale * slope.value, low, high)
+    return found
+
+
+def headline(drift: Drift) -> tuple[str, str]:
+    """The unit's grade (good, look) and one sentence: what moved most, in newtons."""
+    moved = newtons_a_year(drift)
+    jumps = any(trend.jumps for trend in drift.trends.values())
+    if not moved:
+        return "look", drift.says
+    name, (value, low, high) = max(moved.items(), key=lambda item: abs(item[1][0]))
+    at = f" at {plain(drift.top_load_n)} N" if name == STATIC_GAIN else ""
+    what = TITLES[name].split(" (")[0]
+    interval = f" ({plain(low, 2)} to {plain(high, 2)})" if math.isfinite(low) else ""
+    said = f"the {what} moves most: {plain(value, 2)} N a year{at}{interval}"
+    if jumps:
+        return "look", f"{_jumps(drift)}; apart from that {said}"
+    if drift.trends[name].moves:
+        return "look", said
+    return "good", f"nothing moves beyond its errors; {said}"
+
+
+def _jumps(drift: Drift) -> str:
+    """The jump that is largest for its size, in newtons where it is the gain's or the zero's."""
+    found = [(abs(jump.change.value) / max(float(np.abs(trend.values).mean()), 1e-12), trend, jump)
+             for trend in drift.trends.values() for jump in trend.jumps]  # fmt: skip
+    gains = [(share, trend, jump) for share, trend, jump in found if trend.name == STATIC_GAIN]
+    share, trend, jump = max(gains or found, key=lambda item: item[0])
+    if trend.name == STATIC_GAIN:
+        moved = drift.top_load_n * math.copysign(share, jump.change.value)
+        return f"the static gain jumped by {plain(moved, 2)} N at {plain(drift.top_load_n)} N, which no repair explains"
+    return jump.says
+
+
+def write_drift(folder: Path | str, drift: Drift, figures: str | None = None) -> dict[str, Path]:
+    """Write drift.html and drift.json, and drift.svg (pdf, png) where ``figures`` says; returns paths by what they
+    are."""
     target = make_folder(folder)
-    with mpl.rc_context(STYLE):
-        figure = svg(draw_drift(drift))
-    environment = Environment(
-        loader=PackageLoader("smartshoe.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    environment.filters.update(plain=plain, with_sd=with_sd)
-    # The SVG comes from matplotlib, which escapes the texts it draws.
-    page = environment.get_template("drift.html").render(drift=drift, happened=_happened(drift), figure=Markup(figure))
-    written = {"report": target / "drift.html", "figure": target / "drift.svg", "result": target / "drift.json"}
-    write_text(written["report"], page)
-    write_text(written["figure"], figure)
+    grade, says = headline(drift)
+    written = {"report": target / "drift.html", "result": target / "drift.json"}
+    facts = {
+        "drift": drift,
+        "grade": grade,
+        "headline": says,
+        "charts_of": [_chart(drift, drift.trends[name]) for name in shown_names(drift)],
+        "happened": _happened(drift),
+    }
+    write_document(written["report"], "drift.html", facts)
     write_text(written["result"], json_text(drift.to_dict()))
+    if figures is not None:
+        from smartshoe.report.paper.drawing import save
+        from smartshoe.report.paper.drift import draw_drift
+
+        written["figure"] = save(draw_drift(drift), target / f"drift.{figures}")
     return written
 
 

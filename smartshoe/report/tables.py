@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from smartshoe.report.numbers import plain, with_sd
 
+USUAL, NARROWEST = 80, 40  # characters
+
 
 def new_console() -> Console:
-    """A console that cuts nothing where nobody looks at its width."""
+    """A console as wide as the terminal, or as ``COLUMNS`` says in a pipe: 80 where it says nothing."""
     console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=200)
+    if console.is_terminal:
+        return console
+    told = os.environ.get("COLUMNS", "")
+    return Console(highlight=False, width=int(told) if told.isdigit() and int(told) >= NARROWEST else USUAL)
 
 
 def table_of(title: str, columns: Sequence[str]) -> Table:
     """An empty table with a title on the left, numbers right-aligned."""
-    table = Table(title=title, title_justify="left", header_style="bold")
+    table = Table(
+        title=title, title_justify="left", header_style="bold", box=box.SIMPLE_HEAD, show_edge=False, padding=0
+    )
     for index, column in enumerate(columns):
-        table.add_column(column, min_width=len(column), justify="left" if index == 0 else "right", no_wrap=True)
+        longest = max((len(line) for line in column.splitlines()), default=1)
+        # Folded, never cut: what does not fit the line goes on in the next.
+        table.add_column(column, min_width=longest, justify="left" if index == 0 else "right", overflow="fold")
     return table
 
 
@@ -70,8 +81,8 @@ def print_validation(result: Mapping[str, Any]) -> None:
     """Errors per loading rate."""
     table = table_of(
         f"{result.get('unit') or 'unit'}: errors in N over {plain(result['full_scale_n'])} N; loops in % of it",
-        ["rate (N/s)", "cycles", "raw", "static", "compensated", "P %", "vs static %", "loop raw", "loop comp.",
-         "peak error", "delay (ms)"],
+        ["rate\nN/s", "cycles", "raw", "static", "comp.", "P %", "vs\nstat. %", "loop\nraw", "loop\ncomp.",
+         "peak\nerror", "delay\nms"],
     )  # fmt: skip
     for rate in (*result["rates"], result["overall"]):
         delay = rate["delay_s"]
@@ -97,22 +108,30 @@ def print_validation(result: Mapping[str, Any]) -> None:
     )
 
 
-def print_summary(units: Sequence[Mapping[str, Any]]) -> None:
-    """One row a unit of a scenario's result."""
-    table = table_of(
-        "units: parameters ± sd; errors in N on what was judged",
-        ["unit", "k1", "k2", "c", "fit %", "static", "compensated", "gain %", "loop raw %", "loop comp. %"],
+def print_summary(units: Sequence[Mapping[str, Any]], headline: str, grades: Mapping[str, str]) -> None:
+    """A scenario's result: the verdict, and for each unit its grade (by name), its errors and its parameters."""
+    console = new_console()
+    console.print(headline, style="bold", soft_wrap=True)
+    errors = table_of(
+        "errors in N on what was judged; loops in % of full scale",
+        ["unit", "grade", "static", "comp.", "less %", "loop\nraw", "loop\ncomp."],
     )
+    fits = table_of("parameters ± sd", ["unit", "k1", "k2", "c", "fit %"])
     for unit in units:
         parameters, overall = unit["identification"]["parameters"], unit["validation"]["overall"]
-        table.add_row(
+        errors.add_row(
             unit["unit"],
-            *(with_sd(parameters[name]) for name in ("k1", "k2", "c")),
-            f"{unit['identification']['fit_percent']:.2f}",
+            grades[unit["unit"]],
             plain(overall["rmse_static_n"]),
             plain(overall["rmse_compensated_n"]),
             plain(overall["improvement_over_static_percent"]),
             plain(overall["hysteresis_raw_percent"], 2),
             plain(overall["hysteresis_compensated_percent"], 2),
         )
-    new_console().print(table)
+        fits.add_row(
+            unit["unit"],
+            *(with_sd(parameters[name]).replace(" ± ", "±") for name in ("k1", "k2", "c")),
+            f"{unit['identification']['fit_percent']:.2f}",
+        )
+    console.print(errors)
+    console.print(fits)

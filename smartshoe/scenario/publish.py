@@ -7,7 +7,9 @@ from pathlib import Path
 import smartshoe
 from smartshoe.atomic import make_folder, write_text
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
+from smartshoe.report.calibration.judgement import headline, judge
 from smartshoe.report.trial import TrialSection
+from smartshoe.report.wording import sentence
 from smartshoe.scenario.run import ScenarioResult, UnitResult
 
 
@@ -75,6 +77,12 @@ def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str
 
         write_figures(make_folder(folder / "figures"), units, figures)
     return write_page(folder / "report.html", title, about, facts, units, trial, commands)
+
+
+def judged(result: ScenarioResult) -> tuple[str, dict[str, str]]:
+    """The verdict on all units as one sentence, and each unit's grade by its name."""
+    judgements = [judge(_unit_report(result, unit, None)) for unit in result.units]
+    return sentence(headline(judgements)[1]), {one.unit: one.grade for one in judgements}
 
 
 def _unit_report(result: ScenarioResult, unit: UnitResult, diagnosed: DiagnosisLink | None) -> UnitReport:

@@ -206,7 +206,8 @@ def test_a_drift_needs_two_calibrations(tmp_path: Path, count: int) -> None:
 
 
 def test_the_figure_shows_every_calibration(tmp_path: Path) -> None:
-    from smartshoe.report.drift import draw_drift, write_drift
+    from smartshoe.report.drift import headline, write_drift
+    from smartshoe.report.paper.drift import draw_drift
 
     store = life(tmp_path / "store", np.random.default_rng(12), repaired=150.0, factor=0.97)
     store.repair("S1", day(60), "<new> tube")
@@ -215,6 +216,10 @@ def test_the_figure_shows_every_calibration(tmp_path: Path) -> None:
     page = written["report"].read_text()
     assert "&lt;new&gt; tube" in page
     assert page.count("calibrated at left_toe") == 10
+    assert page.count("data-chart=") == len(found.trends) - ("c" in found.trends)
+    grade, says = headline(found)
+    assert grade == "look"
+    assert says.startswith("the static gain jumped by -24 N at 800 N, which no repair explains")
     axes = [axis for axis in draw_drift(found).axes if axis.get_visible()]
     assert len(axes) == len(found.trends)
     # The jump of the static gain is shaded, each repair dashed.

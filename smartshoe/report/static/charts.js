@@ -100,7 +100,7 @@
       font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", label, labelSize: isX ? 22 : 20, gap: 3,
     };
     if (isX) {
-      made.size = 26; made.space = 70;
+      made.size = 26; made.space = chart.dates ? 95 : 70;
       if (chart.dates) made.values = (u, splits) => splits.map(day);
       else if (chart.logX) {
         if (chart.data.x.length <= 12) made.splits = () => chart.data.x;
@@ -120,7 +120,7 @@
     return {
       label: line.label, stroke: () => colour(line.colour), width: points ? 0 : 1.5,
       dash: line.style === "dashed" ? [6, 4] : undefined, paths: points ? () => null : undefined,
-      points: points ? { show: true, size: 6, fill: () => colour(line.colour) } : { size: 5 },
+      points: points ? { show: true, size: 6, fill: () => colour(line.colour) } : { size: 5, show: line.style === "dashed" ? false : undefined },
       value: (u, v) => short(v),
     };
   }
