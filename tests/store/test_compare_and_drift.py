@@ -219,7 +219,7 @@ def test_the_figure_shows_every_calibration(tmp_path: Path) -> None:
     assert page.count("data-chart=") == len(found.trends) - ("c" in found.trends)
     grade, says = headline(found)
     assert grade == "look"
-    assert says.startswith("the static gain jumped by -24 N at 800 N, which no repair explains")
+    assert says.startswith("the static gain jumped by -25 N at 800 N, which no repair explains")
     axes = [axis for axis in draw_drift(found).axes if axis.get_visible()]
     assert len(axes) == len(found.trends)
     # The jump of the static gain is shaded, each repair dashed.
