@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import re
-import shutil
 import subprocess
 import tempfile
 from pathlib import Path
@@ -180,20 +179,6 @@ def test_matlab_holds_the_compensators_numbers() -> None:
         code = "\n".join(line for line in script.splitlines() if not line.lstrip().startswith("%"))
         assert len(re.findall(r"^\s*(?:function|if)\b", code, re.MULTILINE)) == len(re.findall(r"^\s*end$", code, re.M))
         assert all(code.count(a) == code.count(b) for a, b in ("()", "[]"))
-
-
-@pytest.mark.skipif(shutil.which("octave") is None, reason="no octave on the path")
-def test_octave_passes_the_self_check(tmp_path: Path) -> None:
-    write_files(export_files(LEFT_TOE, "matlab"), tmp_path)
-    done = subprocess.run(
-        ["octave", "--no-gui", "--eval", "smartshoe_filter_test"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("passed")
 
 
 @pytest.mark.parametrize("target", [target for target in TARGETS if target != "fmu"])
