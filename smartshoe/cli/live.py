@@ -60,6 +60,7 @@ def command(
         session = LiveSession(shoes, loaded, record=None if record is None else Path(record), speed=speed, lsl=lsl)
         stack.callback(session.close)
         server = LiveServer(session, host or "127.0.0.1", port or 0, token)
+        stack.callback(server.close)
         session.start()
         server.desk.start()
         stack.callback(server.desk.close)

@@ -40,6 +40,10 @@ class Battery:
         self.checks = checks
         self.weight = self._weighed(recordings)
 
+    def forget(self) -> None:
+        """Nothing is known any more."""
+        self.checks, self.weight = [[] for _ in self._session.shoes], None
+
     def _weighed(self, recordings: list[Recording]) -> dict[str, float] | None:
         calibrations = [c for live in self._session.shoes for c in live.calibrations]
         if not calibrations or not recordings:

@@ -86,4 +86,9 @@ class Desk:
 
     def _check(self) -> None:
         while not self._stop.wait(CHECK_EVERY_S):
-            self.battery.look()
+            try:
+                self.battery.look()
+            except Exception as error:  # a fault of ours must be seen, not leave old checks standing
+                self.battery.forget()
+                self.session.note("failed", f"the checks ended ({type(error).__name__}: {error}); please report this")
+                raise

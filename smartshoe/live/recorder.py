@@ -134,6 +134,7 @@ class Recording:
         except SmartShoeError:
             for file in self._files:
                 file.close()
+                file.path.unlink()
             raise
         self._thread = threading.Thread(target=self._run, name=f"writer of {path}", daemon=True)
         self._thread.start()

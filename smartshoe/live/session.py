@@ -66,14 +66,17 @@ class LiveSession:
         self._sources = [
             Source(live, clock, self._taker(k), self._teller(k), self._failer(k)) for k, live in enumerate(self.shoes)
         ]
-        if record is not None:
-            self._begin_from_start(record)
 
     def start(self) -> None:
-        """Begin to read the shoes; streams without a clock of their own begin together, by their own stamps."""
+        """Begin to record and to read; streams without a clock of their own begin together, by their own stamps.
+
+        Raises `UsageError` where the file is there already or a live shoe is to go at another speed than its own.
+        """
         firsts = [source.first_s() for source in self._sources]
         if self.pace.speed != 1.0 and None in firsts:
             raise UsageError("--speed is for replay: and sim: shoes: a live shoe goes at its own")
+        if self._file is not None:
+            self._begin_from_start(self._file)
         self.pace = Pace(self.pace.clock, self.pace.clock(), self.pace.speed)
         zero_s = min((first for first in firsts if first is not None), default=0.0)
         for source, first in zip(self._sources, firsts, strict=True):

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 LOOK_EVERY_S = 0.2  # at the shoe's events
 JUMP_S = 5.0  # a device's time that is off the host's by more was started anew
 SILENT_S = 1.0
+JOIN_S = 5.0
 
 
 class Source:
@@ -71,7 +72,8 @@ class Source:
         """End reading."""
         self._stop.set()
         self.live.shoe.close()
-        self._thread.join(5.0)
+        if self._thread.ident is not None:
+            self._thread.join(JOIN_S)
 
     def _run(self) -> None:
         try:

@@ -31,7 +31,7 @@ def walk_table(path: Path, seconds: float = 10.0, sides: tuple[str, ...] = ("lef
             phase = (time_s - 0.5 * k - centre + 0.5) % 1.0 - 0.5
             columns.append(2.0 + 40.0 * np.clip(1.0 - (phase / 0.18) ** 2, 0.0, None))
             names.append(f"{side}_{region}_mbar" if side else f"{region}_mbar")
-    np.savetxt(path, np.column_stack(columns), fmt="%.6g", delimiter=",", header=",".join(names), comments="")
+    np.savetxt(path, np.column_stack(columns), fmt="%.9g", delimiter=",", header=",".join(names), comments="")
     return path
 
 

@@ -113,6 +113,18 @@ def test_a_wrong_command_line_is_told(words: list[str], walk: Path, capsys: pyte
     assert capsys.readouterr().err.startswith("error: ")
 
 
+def test_a_refused_command_leaves_no_file(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path / "out.csv")
+    with serving(f"replay:{walk}") as (server, _):
+        words = ["live", "--shoe", f"replay:{walk}", "--record"]
+        assert run_command([*words, out, "--port", str(server.port)]) == 2
+        assert "another --port" in capsys.readouterr().err
+        assert run_command([*words, str(tmp_path / "no" / "out.csv")]) == 2
+        assert run_command([*words, out, "--shoe", f"replay:{walk}?block_samples=10"]) == 2
+        assert "both have a unit" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_command_prints_its_address_first_and_ends_with_a_whole_file(walk: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.csv"
     words = [*COMMAND, "--shoe", f"replay:{walk}", "--record", str(out), "--speed", "3"]
