@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,28 @@ MOST = 16 * LONGEST  # events: a file's parameters hold 128 kB
 DIGITS = 3  # of the rate: beyond, two clocks' rates differ by chance
 
 
+class Signal(NamedTuple):
+    """A column of the forces' table: ``values`` (n,) in ``unit``, NaN where nothing is known."""
+
+    label: str
+    unit: str
+    values: Array
+
+
+def analog_signals(found: GaitResult) -> tuple[Array, list[Signal]]:
+    """The trial's time (n,) in s and its units, feet, total and centre of pressure, as exchange formats name them."""
+    table = found.columns()
+    time_s = table.pop("time_s")
+    symbol = next(iter(found.feet.values())).symbol
+    signals = []
+    for name, values in table.items():
+        label, _, suffix = name.rpartition("_")
+        if suffix != "phase":
+            unit = {"n": "N", "percent": "%"}.get(suffix, symbol)
+            signals.append(Signal(label, unit, np.asarray(values, dtype=float)))
+    return time_s, signals
+
+
 def write_c3d(path: Path | str, found: GaitResult) -> None:
     """Write units, feet, total and centre of pressure as analog channels, events in the group EVENT, whole or not.
 
@@ -41,20 +63,16 @@ def write_c3d(path: Path | str, found: GaitResult) -> None:
         raise UsageError(
             f"{path}: C3D holds {MOST} events at most and the trial has {len(found.events)}: cut it, or use --out"
         )
-    table = found.columns()
-    time_s = table.pop("time_s")
-    names = [name for name in table if not name.endswith("_phase")]
-    first = next(iter(found.feet.values()))
-    rate_hz = float(np.round(first.rate_hz, DIGITS))
+    time_s, signals = analog_signals(found)
+    rate_hz = float(np.round(next(iter(found.feet.values())).rate_hz, DIGITS))
     made: Any = ezc3d.c3d()
     made["parameters"]["POINT"]["RATE"]["value"] = [rate_hz]
     made["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
     analog = made["parameters"]["ANALOG"]
     analog["RATE"]["value"] = [rate_hz]
-    analog["LABELS"]["value"] = [name.rsplit("_", 1)[0] for name in names]
-    analog["UNITS"]["value"] = [{"n": "N", "percent": "%"}.get(name.rsplit("_", 1)[1], first.symbol) for name in names]
-    samples = np.array([np.nan_to_num(np.asarray(table[name], dtype=float), nan=0.0) for name in names])
-    made["data"]["analogs"] = samples[None]
+    analog["LABELS"]["value"] = [signal.label for signal in signals]
+    analog["UNITS"]["value"] = [signal.unit for signal in signals]
+    made["data"]["analogs"] = np.array([np.nan_to_num(signal.values, nan=0.0) for signal in signals])[None]
     made["data"]["points"] = np.zeros((4, 0, time_s.size))
     _add_events(made, found, float(time_s[0]))
     made.add_parameter("TRIAL", "START_S", [float(time_s[0])])
