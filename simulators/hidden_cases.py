@@ -180,7 +180,7 @@ def make(p: Plan) -> BankCase:
     common = merged(subject.options(), logger, *small, _beside(conditioned, small))
     chain = _joined([one.chain for one in hidden])
     whole = merged(common, noisy, *(one.options for one in hidden))
-    made = _cut(p, recorded(whole, protocols, p.seed, chain, subject))
+    made = tuple(_logged_channels(p, r) for r in _cut(p, recorded(whole, protocols, p.seed, chain, subject)))
     return BankCase(
         plan=p, recordings=made[: len(p.fitted)], hold_out=made[len(p.fitted) :], hidden=tuple(hidden),
         nuisances=tuple(effect for _, effect in nuisances.values()), subject=subject, noise_percent_fs=noise,
@@ -221,6 +221,12 @@ def _cut(p: Plan, made: Sequence[Recording]) -> tuple[Recording, ...]:
         return tuple(made)
     kept = [r.between(BEFORE_S, r.time_s[-1] + 1.0) for r in made]
     return tuple(replace(r, time_s=r.time_s - r.time_s[0]) for r in kept)
+
+
+def _logged_channels(p: Plan, recording: Recording) -> Recording:
+    """Crosshead and command are in a share of the files only."""
+    dropped = [] if p.logs_displacement else ["displacement"]
+    return recording.without(*dropped, *([] if p.logs_command else ["command"]))
 
 
 def _joined(chains: Sequence[Chain]) -> Chain:

@@ -92,6 +92,8 @@ class Plan:
     offset_share: float
     late_s: float
     law_seed: int
+    logs_displacement: bool
+    logs_command: bool
 
     @property
     def families(self) -> frozenset[str]:
@@ -145,7 +147,7 @@ def plan(kind: str, index: int) -> Plan:
         float(800.0 * sizes[0] * signs[0]) if tare and "tare" not in near else 0.0,
         float(sizes[1] * signs[1]) if offset and "zero" not in near else 0.0,
         float(sizes[2] * signs[2]) if late and "timing" not in families else 0.0,
-        seeded("law", kind, index),
+        seeded("law", kind, index), rng.random() < (0.5 if "static_curve" in families else 0.3), rng.random() < 0.35,
     )  # fmt: skip
 
 

@@ -7,22 +7,20 @@ from numpy.typing import NDArray
 
 from simulators.effects.memory import follow
 from simulators.hidden_effects.law import Law, Surroundings
-from simulators.hidden_effects.operators import lagged, last_peak
+from simulators.hidden_effects.operators import lagged
 from simulators.hidden_effects.registry import Draws, Hideable, bladder, signed, uniform
 
 Array = NDArray[np.float64]
 
-UNREST = 0.01  # of full scale: smaller turns are none
 
-
-def unloading_power(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """What is unloaded follows peak (f/peak)^(1 + a) from the last turning point."""
-    peak, sense = np.empty(f.size), np.empty(f.size)
-    last_peak(np.ascontiguousarray(f), UNREST, peak)
-    follow(np.diff(f, prepend=0.0), np.full(f.size, draws["turn"]), 1.0, sense)
-    share = np.clip(f / np.maximum(peak, UNREST), 1e-6, 1.0)
-    lost = f * (share ** (draws["sign"] * amount) - 1.0)
-    return np.asarray(f + np.where(f > 0.0, lost, 0.0) * 0.5 * (1.0 - sense))
+def two_contacts(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
+    """Two contacts in a row, one of which turns over ten and more times later than the other (partial slip)."""
+    way = np.diff(f, prepend=0.0)
+    quick, late = np.empty(f.size), np.empty(f.size)
+    follow(way, np.full(f.size, draws["quick"]), 1.0, quick)
+    follow(way, np.full(f.size, draws["late"]), 1.0, late)
+    sense = (1.0 - draws["share"]) * quick + draws["share"] * late
+    return np.asarray(f * (1.0 - 0.5 * draws["sign"] * amount * (1.0 - sense)))
 
 
 def by_velocity(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
@@ -39,8 +37,9 @@ EFFECTS = [
         source="capstan; Mindlin 1949", bends="load",
         catalogue=lambda a, d, s, hz: {"lost_gain": d["sign"] * a},
         laws=(
-            Law("unloading_power", "load", "unloading follows another power of the share of the last peak",
-                "Oliver and Pharr 1992", unloading_power, 0.03, 1.5, signed(uniform(turn=(0.003, 0.012)))),
+            Law("two_contacts", "load", "two contacts in a row, of which one turns over late",
+                "Mindlin and Deresiewicz 1953", two_contacts, 0.03, 0.6,
+                signed(uniform(quick=(0.003, 0.012), late=(0.1, 0.25), share=(0.25, 0.5)))),
             Law("regularised", "load", "friction that turns over with a slow velocity, none in holds",
                 "Coulomb, regularised (Oden and Martins 1985)", by_velocity, 0.03, 0.6,
                 signed(uniform(slow=(0.01, 0.05)))),

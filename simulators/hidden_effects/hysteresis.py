@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 SLIDERS = 16
 
 
-def preisach(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
-    """Relays over two thresholds, the density parabolic in their centre (`simulators.preisach`)."""
+def relays_and_sliders(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
+    """A seat of relays over two thresholds (`simulators.preisach`) on a wall of sliders."""
     from simulators.load_stepping import loop_and_cycles
 
     shape, height = loop_shape(draws["half_width"], draws["spread"], 1.0)
@@ -25,7 +25,10 @@ def preisach(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
     loop_and_cycles(
         np.ascontiguousarray(f), shape, 1.0, np.zeros(MEMORY), np.zeros(MEMORY), np.array([1.0, 0.0, 0.0]), loop, cycles
     )
-    return np.asarray(f + amount / height * loop)
+    rubbed = np.empty(f.size)
+    reach = np.full(1, draws["half_width"])
+    slip(np.ascontiguousarray(f), reach, reach, 1.0 / reach, rubbed)
+    return np.asarray(f + amount * (draws["relays"] / height * loop - (1.0 - draws["relays"]) * rubbed))
 
 
 def unequal_sliders(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
@@ -63,8 +66,9 @@ EFFECTS = [
         says="sliders on the deformation, solved with the balance", source="Iwan 1966", bends="load",
         catalogue=_half_height,
         laws=(
-            Law("preisach", "load", "relays over two thresholds, dense about the middle of the range", "Mayergoyz 2003",
-                preisach, 0.01, 0.3, uniform(half_width=(0.03, 0.09), spread=(0.6, 0.95))),
+            Law("relays", "load", "a seat of relays, dense about the middle of the range, on a wall of sliders",
+                "Mayergoyz 2003", relays_and_sliders, 0.01, 0.3,
+                uniform(half_width=(0.03, 0.09), spread=(0.6, 0.95), relays=(0.25, 0.5))),
             Law("unequal_sliders", "load", "sliders that hold more one way than the other", "Segalman 2005",
                 unequal_sliders, 0.01, 0.3, uniform(reach=(0.06, 0.25), spread=(0.6, 1.4), uneven=(-0.4, 0.4))),
         )),

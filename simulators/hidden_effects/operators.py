@@ -122,23 +122,6 @@ def endochronic(signal: Array, width: float, hardening: float, out: Array) -> No
 
 
 @njit(cache=True)
-def last_peak(signal: Array, zone: float, out: Array) -> None:
-    """Fill ``out`` (n,) with the turning point above: the largest value since the signal last rose by ``zone``."""
-    peak, low, falling = 0.0, 0.0, False
-    for i in range(signal.size):
-        x = signal[i]
-        if falling:
-            low = min(low, x)
-            if x > low + zone:
-                falling, peak = False, x
-        else:
-            peak = max(peak, x)
-            if x < peak - zone:
-                falling, low = True, x
-        out[i] = max(peak, x)
-
-
-@njit(cache=True)
 def cycles_done(signal: Array, begins: float, ends: float, out: Array) -> None:
     """Fill ``out`` (n,) with how many times the signal has come above ``begins`` and gone below ``ends``."""
     inside, done = False, 0.0

@@ -70,7 +70,7 @@ EFFECTS = [
                 "Davidson and Cole 1951", cole_davidson, 0.04, 3.0,
                 both(second_time_constant, uniform(gamma=(0.4, 0.8)))),
             Law("norton", "stress", "an arm whose dashpot flows with a power of its stress", "Norton 1929",
-                power_dashpot, 0.04, 3.0, both(second_time_constant, uniform(power=(1.3, 2.4)))),
+                power_dashpot, 0.04, 3.0, both(second_time_constant, uniform(power=(1.2, 1.7)))),
         )),
     Hideable("power_law_creep", "relaxation", "wall", "stiffness", "N/m", 0.2, 20.0,
         lambda a, d, s: bladder(power_law_creep={"stiffness": a, "exponent": d["exponent"]}),

@@ -61,7 +61,7 @@ EFFECTS = [
             Law("cole_cole", "reading", "a spread of lags about one", "Cole and Cole 1941", cole_cole, 0.03, 1.0,
                 uniform(alpha=(0.85, 0.97))),
             Law("widening", "reading", "a port that the pressure widens", "compliant tube (Fung 1997)", widening,
-                0.05, 1.5, uniform(opening=(0.5, 3.0))),
+                0.05, 1.5, uniform(opening=(0.3, 1.2))),
         )),
     Hideable("delay", "timing", "logger", "delay_s", "s", 0.01, 5.0, lambda a, d, s: reading(delay_s=a),
         law="constant", says="one delay", source="transport",

@@ -78,7 +78,7 @@ def moisture(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
 
 def accelerating(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:
     """A parabola: a line that bends."""
-    share = at.time_s / at.span_s
+    share = at.time_s / 300.0
     return np.asarray(y + draws["sign"] * amount * share * (1.0 + draws["bend"] * share))
 
 
@@ -128,7 +128,7 @@ EFFECTS = [
             Law("moisture", "reading", "the root of time: uptake by diffusion", "Crank 1975, ch. 4", moisture, 0.02,
                 0.5, signed(), bends="time"),
             Law("parabola", "reading", "a line that bends", "thermal runaway of second order", accelerating, 0.03, 0.8,
-                signed(uniform(bend=(-0.45, 1.0))), bends="time"),
+                signed(uniform(bend=(-0.3, 0.6))), bends="time"),
         )),
     Hideable("warm_up", "zero", "sensor", "warm_up", "%", 0.5, 40.0,
         lambda a, d, s: sensor(drift={"warm_up_percent": d["sign"] * a,
@@ -149,7 +149,7 @@ EFFECTS = [
         laws=(
             Law("log_dose", "stress", "with the logarithm of the dose", "Garofalo 1965, logarithmic creep", log_dose,
                 1e-3, 0.1, log_uniform(early_s=(40.0, 300.0))),
-            Law("ratchet", "stress", "by strokes, while the load grows", "Armstrong and Frederick 1966", ratchet, 1e-3,
-                0.2, uniform(power=(0.5, 2.0))),
+            Law("ratchet", "stress", "by strokes, while the load grows", "Armstrong and Frederick 1966", ratchet, 6e-3,
+                0.5, uniform(power=(0.5, 2.0))),
         )),
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The bank: hidden-effect cases drawn from (set, index), diagnosed in a pool of processes, one row each.
+"""Cases of the first laws alone, drawn from (set, index), for the ordinary tests; the bank is `bank_run`.
 
 A case is fixed by its set and its index; nothing else is drawn. Sets and their seeds, none of which the development
 of the diagnosis used (that took 0-50 and 1000-1400):
@@ -20,27 +20,19 @@ docs/simulated_effects.md, and what a unit and protocol cannot reach is halved (
 
 from __future__ import annotations
 
-import json
-import time
-import traceback
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from bank_scoring import Score, score
 
 from simulators.hidden import HiddenCase, hide
 from simulators.hidden_effects import EFFECTS
-from smartshoe.diagnosis import diagnose
 from smartshoe.models.effects import catalogue
 
 GRID_PERCENT = (0.05, 0.1, 0.3, 1.0, 3.0)
 SEEDS = {
     "grid": 500_000, "single": 520_000, "pair": 540_000, "none": 560_000, "outside": 580_000, "calibrate": 900_000,
 }  # fmt: skip
-SETS = ("grid", "single", "pair", "none", "outside")
 MIXTURE = ("single", "grid", "pair", "single", "none", "outside", "single", "pair")
 PLAIN = ("rates_and_holds", "rates", "shuffled")
 HELD = ("rates_and_holds", "static")
@@ -85,33 +77,6 @@ class Drawn:
     def hidden(self) -> HiddenCase:
         """The recordings."""
         return within_reach(self.effects, self.protocol, self.seed)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One case and what became of it. ``reached`` are the strengths the effects have; ``cpu_s`` of the diagnosis."""
-
-    kind: str
-    index: int
-    seed: int
-    protocol: str
-    asked: dict[str, float]
-    reached: dict[str, float]
-    nuisances: dict[str, float]
-    noise_percent_fs: float
-    samples: int
-    verdict: str
-    score: Score | None
-    seconds: float
-    cpu_s: float
-    log: tuple[str, ...]
-    error: str = ""
-
-    @property
-    def label(self) -> str:
-        """What to call it in a report."""
-        hidden = " + ".join(f"{name} {percent:.2g} %" for name, percent in self.reached.items()) or "no effect"
-        return f"{hidden}, {self.protocol}, seed {self.seed}"
 
 
 def drawn(kind: str, index: int) -> Drawn:
@@ -184,50 +149,3 @@ def within_reach(effects: dict[str, float], protocol: str, seed: int, **given: A
         effects = {name: percent / 2 if name in beyond else percent for name, percent in effects.items()}
         case = hide(effects, protocol=protocol, seed=seed, **given)
     return case
-
-
-def run(case: Drawn) -> Row:
-    """Make the case, diagnose it, score it. What goes wrong is the row's ``error``: one case does not end a bank."""
-    log: list[str] = []
-    hidden = case.hidden()
-    reached = {effect.name: effect.strength_percent_fs for effect in hidden.effects}
-    nuisances = {name: effect.strength_percent_fs for name, effect in hidden.nuisances.items()}
-    samples = sum(len(recording) for recording in hidden.recordings + hidden.hold_out)
-    verdict, found, error = "", None, ""
-    began, cpu = time.perf_counter(), time.process_time()
-    try:
-        diagnosis = diagnose(hidden.recordings, hidden.hold_out, progress=log.append)
-        seconds, cpu_s = time.perf_counter() - began, time.process_time() - cpu
-        verdict, found = diagnosis.verdict, score(hidden, diagnosis)
-    except Exception:  # kept in the row, and asserted to be none by the bank
-        seconds, cpu_s = time.perf_counter() - began, time.process_time() - cpu
-        error = traceback.format_exc()
-    return Row(
-        case.kind, case.index, case.seed, case.protocol, case.effects, reached, nuisances, hidden.noise_percent_fs,
-        samples, verdict, found, seconds, cpu_s, tuple(log), error,
-    )  # fmt: skip
-
-
-def run_all(cases: Iterable[Drawn], workers: int) -> Iterator[Row]:
-    """Rows as they come, from ``workers`` processes of one thread each."""
-    from joblib import Parallel, delayed
-
-    pool = Parallel(n_jobs=workers, return_as="generator_unordered", inner_max_num_threads=1, backend="loky")
-    yield from pool(delayed(run)(case) for case in cases)
-
-
-def write(rows: Iterable[Row], path: Path) -> None:
-    """One JSON object a line."""
-    with path.open("w", encoding="utf-8") as file:
-        for row in rows:
-            file.write(json.dumps(asdict(row)) + "\n")
-
-
-def read(path: Path) -> list[Row]:
-    """What `write` wrote."""
-    rows = []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        held = json.loads(line)
-        held["score"] = Score.from_dict(held["score"]) if held["score"] else None
-        rows.append(Row(**{**held, "log": tuple(held["log"])}))
-    return rows

@@ -33,6 +33,7 @@ class Figure:
     floor: float | None = None
     reach: float | None = None
     more_is_better: bool = True
+    key: str = ""
 
     @property
     def met(self) -> bool | None:
@@ -125,7 +126,7 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
     ) -> Figure:
         hits = sum(right(j) for _, j in of)
         value = 100.0 * hits / len(of) if of else float("nan")
-        return Figure(name, value, "%", len(of), wilson(hits, len(of)), *asked.get(key, (None, None)), not down)
+        return Figure(name, value, "%", len(of), wilson(hits, len(of)), *asked.get(key, (None, None)), not down, key)
 
     names = [pair for _, j in cases for pair in j.names]
     explained = [j.explained for _, j in hidden if j.explained is not None]
@@ -133,7 +134,7 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
     cpu = sorted(r["cpu_s"] for r, _ in cases)
 
     def plain(name: str, key: str, value: float, unit: str, count: int, down: bool) -> Figure:
-        return Figure(name, value, unit, count, None, *asked.get(key, (None, None)), not down)
+        return Figure(name, value, unit, count, None, *asked.get(key, (None, None)), not down, key)
 
     return [
         share("one effect >= 0.3 %: exact, or among true equivalents", "exact", one, lambda j: j.exact),
