@@ -13,6 +13,7 @@ TABLE = pytest.StashKey[FigureTable]()
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--markdown", default=None, help="file to which the table of figures is written as well")
+    parser.addoption("--events-page", default=None, help="file to which the comparison of gait events is written")
     parser.addoption(
         "--peers-python", default=sys.executable, help="interpreter in which the extra 'peers' is installed"
     )
