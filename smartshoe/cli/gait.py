@@ -40,6 +40,13 @@ LEAST_WEIGHT_N = 150.0  # of a person who walks: below, it is more likely in kg
     help="Forces with error bars: static, lead, inverse, kalman, smoother or imm; without it the calibrations' filter.",
 )
 @click.option("--time", metavar="COLUMN", help="The time column, by name or 1-based number: '1[ms]'.")
+@click.option(
+    "--sensor",
+    "sensors",
+    multiple=True,
+    metavar="UNIT=COLUMN",
+    help="Which column is which unit, where names do not tell (repeatable): left_heel='L_force'.",
+)
 @click.option("--reference", metavar="FILE", help="A trial whose mean strides are the pattern to compare with.")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 @click.option("--c3d", "c3d_path", metavar="OUT.c3d", help="Write forces and events as C3D (needs ezc3d).")
@@ -66,10 +73,12 @@ def command(
     out_folder: str | None,
     stream: bool | None,
     figures: str | None,
+    sensors: tuple[str, ...],
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
     from smartshoe.atomic import make_folder
     from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
+    from smartshoe.cli.inputs import units_of, with_units
     from smartshoe.cli.output import emit_json, progress, show_notes
     from smartshoe.gait.analysis import analyse
     from smartshoe.gait.coverage import Coverage
@@ -85,10 +94,19 @@ def command(
         )
     streamed = is_streamed(files, stream)
     if streamed:
-        refuse_with({"--estimator": estimator, "--reference": reference, "--c3d": c3d_path, "--figures": figures})
+        refuse_with(
+            {
+                "--estimator": estimator,
+                "--reference": reference,
+                "--c3d": c3d_path,
+                "--figures": figures,
+                "--sensor": sensors[0] if sensors else None,
+            }
+        )
         if stream is None:
             click.echo("note: a large recording goes through as a stream (--whole takes it into memory)", err=True)
-    recordings = [] if streamed else [read(file, time=time) for file in files]
+    chosen = units_of(sensors)
+    recordings = [] if streamed else [with_units(read(file, time=time), chosen) for file in files]
     show_notes(recordings)
     calibrations = []
     if calibration_paths:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from smartshoe.recording import Recording
+from smartshoe.recording import UNITS_OF_A_SHOE, Recording
 
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
 
+MOST_NAMES = 10  # of columns in an error
 BEYOND = 1.1  # of the largest load that a calibration has seen
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -61,6 +63,35 @@ def read_all(
     recordings = join_pairs([one(file) for file in files])
     show_notes(recordings)
     return recordings
+
+
+def units_of(choices: Sequence[str]) -> dict[str, str]:
+    """``UNIT=COLUMN`` choices as columns by unit; raises `UsageError` for a unit that no shoe has."""
+    from smartshoe.errors import UsageError
+
+    found: dict[str, str] = {}
+    for choice in choices:
+        unit, _, column = choice.partition("=")
+        if unit not in UNITS_OF_A_SHOE or not column:
+            raise UsageError(f"--sensor {choice!r} names no unit and column: write it like left_heel='L_force'")
+        found[unit] = column
+    return found
+
+
+def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
+    """The recording with the named columns as the units' readings; raises `MissingChannelError` for one not there."""
+    from smartshoe.errors import MissingChannelError
+
+    for unit, column in columns.items():
+        channel = recording.channels.get(column)
+        if channel is None:
+            names = list(recording.channels)
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            raise MissingChannelError(
+                f"{recording.label} has no column {column!r} for {unit}; it has {', '.join(names[:MOST_NAMES])}{more}"
+            )
+        recording = recording.without(column).with_channel(replace(channel, name=unit, role="sensor"))
+    return recording
 
 
 def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:

@@ -14,7 +14,20 @@ from smartshoe.logs.sheet import Format
 from smartshoe.recording import Recording
 
 # The order in which formats are asked: those with an unmistakable beginning first, any delimited text last.
-_MODULES = ("tdms", "xdf", "labview", "matlab", "hdf5", "parquet", "plain", "bluehill", "foreign")
+_MODULES = (
+    "tdms",
+    "xdf",
+    "labview",
+    "matlab",
+    "hdf5",
+    "parquet",
+    "loadsol",
+    "opengo",
+    "opensim",
+    "plain",
+    "bluehill",
+    "foreign",
+)
 _HEAD_BYTES = 1 << 16
 
 
