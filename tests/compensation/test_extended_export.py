@@ -93,7 +93,7 @@ def test_a_header_says_what_is_in_the_filter_and_what_is_not() -> None:
     assert "caution, linear_leak:" in header
 
 
-LOSES_MORE = {"load_unload_asymmetry", "flexible_loop", "bouc_wen_hysteresis", "dead_band", "gain_drift"}
+LOSES_MORE = {"load_unload_asymmetry", "flexible_loop", "bouc_wen_hysteresis", "dead_band", "rate_gain"}
 """Effects that jump, or that add up many terms: twice as much and more of what a float rounds is left in the force."""
 
 
