@@ -69,6 +69,9 @@ def run_all(jobs: list[Job], workers: int, path: Path | None) -> Iterator[dict[s
     left = [job for job in jobs if job.key not in {(row["world"], row["kind"], row["index"]) for row in done}]
     if not left:
         return
+    if path is not None and path.exists() and not path.read_bytes().endswith(b"\n"):
+        with path.open("a", encoding="utf-8") as file:
+            file.write("\n")  # a row that was cut short ends here
     pool = Parallel(n_jobs=workers, return_as="generator_unordered", inner_max_num_threads=1, backend="loky")
     for row in pool(delayed(run)(job) for job in left):
         if path is not None:
