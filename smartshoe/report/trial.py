@@ -87,6 +87,13 @@ def notes(result: Mapping[str, Any]) -> list[str]:
     """Sentences about order of contact, events and what to be careful with."""
     said: list[str] = []
     against = result["against_truth"]
+    errors = {} if against is None else against["rmse_total_n"] or {}
+    raw, corrected = errors.get("raw"), errors.get("corrected")
+    if raw is not None and corrected is not None and corrected > raw:
+        said.append(
+            f"The correction makes this trial worse: its total is off by {plain(corrected)} N rms, the raw one by"
+            f" {plain(raw)} N."
+        )
     if against is not None and against["order"] is not None:
         order = against["order"]
         said.append(
