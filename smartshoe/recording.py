@@ -183,6 +183,11 @@ class Recording:
             if unit_ is None:
                 raise UnitError(f"column {column!r} ends in no known unit: name it like force_n or pressure_mbar")
             channels[channel_name] = Channel.from_values(channel_name, values, unit_, _role_of(channel_name, unit_))
+        if SENSOR_NAME in channels:  # the unit under test; a shoe's named sensors beside it are its neighbours
+            channels = {
+                key: replace(one, role="auxiliary") if one.role == "sensor" and key != SENSOR_NAME else one
+                for key, one in channels.items()
+            }
         return cls(np.asarray(time_s, dtype=float), channels, name, unit, dict(metadata or {}))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -7,20 +7,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
-
-BINS = 24
-FEWEST = 8  # samples of a bin in one direction
-SMOOTH_S = 0.05
-MOVES = 0.1  # of the usual rate: slower is no direction
-MIDDLE, ENDS = 0.25, 0.5  # of the load's half range
-FLATTENS, STEEPENS = 0.5, 2.0  # slope at the ends over that about the middle
-FOLLOWS = 0.5  # of the reading's variance
+STANDARD = Thresholds()
 
 
-def course_of(recording: Recording) -> str | None:
+def course_of(recording: Recording, thresholds: Thresholds = STANDARD) -> str | None:
     """A sentence on curve and loop of the reading over its load; None where the two hardly go together.
 
     Medians of the reading over bins of the load, loading and unloading apart: their mean is the curve, half of their
@@ -31,30 +25,32 @@ def course_of(recording: Recording) -> str | None:
     load, sensor = recording.load, recording.sensor
     present = load.present & sensor.present
     x, y = load.values[present], sensor.values[present]
-    if x.size < BINS * FEWEST or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+    if x.size < thresholds.least_samples or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return None
-    width = max(1, round(SMOOTH_S / recording.sample_time_s))
+    width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
     rate = np.gradient(np.convolve(x, np.full(width, 1.0 / width), "same"))
-    still = MOVES * float(np.median(np.abs(rate)))
     low, high = (float(value) for value in np.percentile(x, [1, 99]))
-    edges = np.linspace(low, high, BINS + 1)
+    still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
+    # Rice's rule, of each direction's half.
+    bins = 2 * round((0.5 * x.size) ** (1.0 / 3.0))
+    edges = np.linspace(low, high, bins + 1)
     at, ups, downs = [], [], []
     for left, right in pairwise(edges):
         inside = (x >= left) & (x < right)
         up, down = y[inside & (rate > still)], y[inside & (rate < -still)]
-        if up.size >= FEWEST and down.size >= FEWEST:
+        if min(up.size, down.size) > 2:
             at.append(0.5 * (left + right))
             ups.append(float(np.median(up)))
             downs.append(float(np.median(down)))
-    if len(at) < BINS // 2:
+    if len(at) < bins // 2:
         return None
     place, level = np.array(at), 0.5 * (np.array(ups) + np.array(downs))
     half = 0.5 * float(np.median(np.array(ups) - np.array(downs)))
     unit, of_load = sensor.unit.symbol, load.unit.symbol
     moving = np.abs(rate) > still
     either = np.where(rate > 0, np.interp(x, place, np.array(ups)), np.interp(x, place, np.array(downs)))
-    if _explained(y, np.interp(x, place, level)) < FOLLOWS:
-        if _explained(y[moving], either[moving]) < FOLLOWS:
+    if _explained(y, np.interp(x, place, level)) < thresholds.follows:
+        if _explained(y[moving], either[moving]) < thresholds.follows:
             return None
         return (
             f"the {sensor.name} does not follow this load but its direction: while the load rises it lies"
@@ -63,16 +59,16 @@ def course_of(recording: Recording) -> str | None:
             " only"
         )
     u = (place - 0.5 * (low + high)) / (0.5 * (high - low))
-    middle = _slope(place, level, np.abs(u) < MIDDLE)
-    ends = 0.5 * (_slope(place, level, u > ENDS) + _slope(place, level, u < -ENDS))
+    middle = _slope(place, level, np.abs(u) < 0.25)
+    ends = 0.5 * (_slope(place, level, u > 0.5) + _slope(place, level, u < -0.5))
     ratio = ends / middle if middle else np.inf
-    if ratio < FLATTENS:
+    if thresholds.clear * ratio < 1.0:
         shape = "it flattens, as friction does that saturates, and no straight line or linear damping describes it"
-    elif ratio > STEEPENS:
+    elif ratio > thresholds.clear:
         shape = "it steepens towards the ends, and no straight line describes it"
     else:
         shape = "it is nearly straight"
-    apart = 0.5 * float(np.median(np.abs(np.array(ups) - np.array(downs))[np.abs(u) < ENDS]))
+    apart = 0.5 * float(np.median(np.abs(np.array(ups) - np.array(downs))[np.abs(u) < 0.5]))
     return (
         f"over this load the {sensor.name} rises by {middle:.3g} {unit}/{of_load} about the middle and by {ends:.3g}"
         f" {unit}/{of_load} at the ends: {shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"

@@ -13,25 +13,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.integrity.scales import SECOND_DIFFERENCE
+from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
 Course = Literal["exponential", "slower", "faster", "undecided"]
 
-POINTS = 500
-FEWEST_POINTS = 20
-STANDS_STILL = 0.02  # of the load's largest value
-BEYOND_NOISE = 6.0  # standard deviations of a mean over a tenth
-LEAST_LOST = 5e-4
-MONOTONE = 0.8  # of all its movement, smoothed, that a decay goes downwards
-ONSET = 0.02  # of the fall: how much is lost when the decay has begun
-CLEAR = 4.0  # standard deviations of noise, that the onset must be below the first readings
-LATE_ONSET = 0.01  # of the duration: a later onset is told
-TELLING_LOSS = 0.05  # of the reading: with less lost a curve cannot be told from a straight line
-PLATEAU = 0.05  # of the reading
-PLATEAU_EARNED = 0.3  # of the squared error without one
-NOT_ONE = 0.05  # of the order
-NORMAL_95 = 1.96
+STANDARD = Thresholds()
+NORMAL_MEDIAN = 1.482602218505602  # a normal deviate's standard deviation over the median of its absolute value
+NORMAL_95 = 1.959964  # a normal deviate lies within it with a probability of 95 %
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +50,27 @@ class Decay:
     says: str
 
 
-def decay_of(recording: Recording) -> Decay | None:
+def decay_of(recording: Recording, thresholds: Thresholds = STANDARD) -> Decay | None:
     """The decay of the first sensor's reading, or None: the load moves, or the reading does not fall steadily."""
-    standing = _load_stands_still(recording)
+    standing = _load_stands_still(recording, thresholds.standing)
     if standing is None or not recording.sensors:
         return None
     sensor = recording.sensors[0]
     present = sensor.present
-    time_s, reading = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present])
-    if time_s.size < FEWEST_POINTS or not _falls(reading):
+    if present.sum() < thresholds.least_samples:
         return None
+    points = thresholds.bins // 8  # a smooth fall has no detail
+    time_s, reading = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present], points)
+    if not _falls(reading, thresholds):
+        return None
+    slight = thresholds.clear * thresholds.standing
+    largest = largest_of_noise(reading.size, thresholds)
     end = max(time_s.size // 20, 3)
     high, low = float(np.median(reading[:3])), float(np.median(reading[-end:]))
-    begun = np.flatnonzero(reading < high - max(ONSET * (high - low), CLEAR * _noise(reading)))
+    begun = np.flatnonzero(reading < high - max(thresholds.standing * (high - low), largest * _noise(reading)))
     # A decay of which hardly anything is seen is a straight line, without a corner to begin at.
-    first = max(int(begun[0]) - 1, 0) if begun.size and high - low > TELLING_LOSS * high else 0
-    if time_s.size - first < FEWEST_POINTS:
+    first = max(int(begun[0]) - 1, 0) if begun.size and high - low > slight * high else 0
+    if time_s.size - first < thresholds.local // 4:
         return None
     onset_s, t, v = float(time_s[first]), time_s[first:] - time_s[first], reading[first:]
     lost = (high - low) / high
@@ -84,22 +80,24 @@ def decay_of(recording: Recording) -> Decay | None:
     order: float | None = None
     order_ci95: tuple[float, float] | None = None
     course: Course = "undecided"
-    if lost > TELLING_LOSS:
-        ordered = _fit(_of_order, t, v, [high, float(one.at[1]), 1.05])
+    if lost > slight:
         towards = _fit(_to_plateau, t, v, [high - low, guess, low])
-        earned = towards.square < min(PLATEAU_EARNED * one.square, ordered.square)
-        if earned and towards.at[2] > PLATEAU * high:
+        ordered = _fit(_of_order, t, v, [high, float(one.at[1]), 1.05])
+        earned = towards.square < min(one.square / thresholds.clear, ordered.square)
+        if earned and towards.at[2] > slight * high:
             one, plateau = towards, float(towards.at[2])
             ordered = _fit(_of_order, t, v - plateau, [high - plateau, float(one.at[1]), 1.05])
-        order, sd = float(ordered.at[2]), float(ordered.sd[2])
-        order_ci95 = (order - NORMAL_95 * sd, order + NORMAL_95 * sd)
-        apart = abs(order - 1.0) > max(NORMAL_95 * sd, NOT_ONE)
-        course = ("slower" if order > 1.0 else "faster") if apart else "exponential"
+        half = NORMAL_95 * float(ordered.sd[2])
+        if half < thresholds.same:  # else too little of the curve is seen
+            order = float(ordered.at[2])
+            order_ci95 = (order - half, order + half)
+            apart = abs(order - 1.0) > max(half, slight)
+            course = ("slower" if order > 1.0 else "faster") if apart else "exponential"
     tau_s, tau_sd = float(one.at[1]), float(one.sd[1])
     from_start_s = float(_fit(_exponential, time_s, reading, [high, tau_s]).at[1]) if first else tau_s
     ci95_s = (max(tau_s - NORMAL_95 * tau_sd, 0.0), tau_s + NORMAL_95 * tau_sd)
     unit = sensor.unit.symbol
-    begins = f" from {onset_s:.3g} s on" if onset_s > LATE_ONSET * float(time_s[-1]) else ""
+    begins = f" from {onset_s:.3g} s on" if onset_s > thresholds.standing * float(time_s[-1]) else ""
     counted = f" ({_duration(from_start_s)} when counted from the first sample)" if begins and lost > 0.5 else ""
     aim = f" towards {plateau:.3g} {unit}" if plateau else ""
     says = (
@@ -122,18 +120,18 @@ def decay_of(recording: Recording) -> Decay | None:
     )
 
 
-def _load_stands_still(recording: Recording) -> Literal["absent", "still"] | None:
+def _load_stands_still(recording: Recording, standing: float) -> Literal["absent", "still"] | None:
     loads = recording.of_role("load")
     if not loads:
         return "absent"
     values = loads[0].values[loads[0].present]
     low, high = (float(value) for value in np.percentile(values, [1, 99]))
-    return "still" if high - low <= STANDS_STILL * max(abs(low), abs(high)) else None
+    return "still" if high - low <= standing * max(abs(low), abs(high)) else None
 
 
-def _thinned(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Means of both over at most `POINTS` blocks; a negative reading that dies away is turned."""
-    width = -(-values.size // POINTS)
+def _thinned(time_s: Array, values: Array, points: int) -> tuple[Array, Array]:
+    """Means of both over at most ``points`` blocks; a negative reading that dies away is turned."""
+    width = -(-values.size // points)
     count = values.size // max(width, 1)
     if count == 0:
         return time_s, values
@@ -142,22 +140,29 @@ def _thinned(time_s: Array, values: Array) -> tuple[Array, Array]:
     return t, -v if v[: max(count // 20, 1)].mean() < 0 else v
 
 
-def _falls(reading: Array) -> bool:
+def _falls(reading: Array, thresholds: Thresholds) -> bool:
     """Whether it falls from a positive level, by more than its noise, and hardly ever rises."""
     tenth = reading.size // 10
     first, last = reading[:tenth], reading[-tenth:]
     fall = float(np.median(first) - np.median(last))
-    if fall <= max(BEYOND_NOISE * _noise(reading) / np.sqrt(tenth), LEAST_LOST * abs(float(np.median(first)))):
+    if fall <= max(
+        largest_of_noise(reading.size, thresholds) * _noise(reading) / np.sqrt(tenth),
+        thresholds.material * abs(float(np.median(first))),
+    ):
         return False
     means = np.array([float(np.median(part)) for part in np.array_split(reading, 12)])
     steps = np.diff(means)
     moved = float(np.abs(steps).sum())
-    return float(np.median(first)) > 0.0 and moved > 0.0 and float(-steps[steps < 0].sum()) >= MONOTONE * moved
+    return (
+        float(np.median(first)) > 0.0
+        and moved > 0.0
+        and float(-steps[steps < 0].sum()) >= (1.0 - thresholds.same) * moved
+    )
 
 
 def _noise(reading: Array) -> float:
     """White noise's standard deviation, from second differences."""
-    return float(np.median(np.abs(np.diff(reading, 2)))) / (0.6745 * float(np.sqrt(6.0)))
+    return NORMAL_MEDIAN * float(np.median(np.abs(np.diff(reading, 2)))) / SECOND_DIFFERENCE
 
 
 def _guess(t: Array, v: Array) -> float:
@@ -230,3 +235,10 @@ def _course_says(course: Course, order: float | None) -> str:
     if course == "exponential":
         return "as one exponential"
     return f"{course} than exponentially (its rate goes as the reading to the power {order:.2f})"
+
+
+def largest_of_noise(count: int, thresholds: Thresholds) -> float:
+    """What the largest of ``count`` normal deviates exceeds, in standard deviations, by a false alarm only."""
+    from scipy.special import ndtri
+
+    return -float(ndtri(0.5 * thresholds.false_alarm / count))

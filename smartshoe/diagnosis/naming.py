@@ -1,98 +1,89 @@
-"""Which effects of a settled model are named: not what is too small, nor what may be another's error of shape."""
+"""From members of a model to names: how sure each is, what cannot be told from it, and which of them are causes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from smartshoe.diagnosis.fitting import QUICK_STEPS, Evidence, Fit, fit
-from smartshoe.diagnosis.margins import Rival, visible
-from smartshoe.diagnosis.screen import TARE
-from smartshoe.models.effects import effect
-
-MATERIAL = 2e-4  # of the full-scale reading: what an effect must move the reading by to be a cause
-NEIGHBOURING = (
-    frozenset({"hysteresis", "asymmetry", "rate"}),
-    frozenset({"softening", "gain_drift"}),
-    frozenset({"relaxation", "gas_heat", "timing"}),
-    frozenset({"rate", "asymmetry", "hysteresis", "timing"}),
-    frozenset({"leak", "zero"}),
-    frozenset({"static_curve", "dead_band", "saturation"}),
-)
-SHAPE_OF_NEIGHBOUR = 0.1
-LIKE_NO_OTHER = 0.5  # of what an effect takes off: what every other must fall short by
-NAMED_OF_LARGEST = 0.05
+from smartshoe.diagnosis.inference import Alternative, Member
+from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.models.effects import Effect, catalogue
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
-    """A fit of which no part is needless and none is better replaced; the fits without each part, and the rivals.
+class Name:
+    """``kind``: probability of its family; ``confidence`` of the name; ``equivalents`` that nothing tells from it.
 
-    ``sizes``: what the reading moves by without each part, the rest fitted anew.
+    ``kind_only``: its family is what was found; its equation follows no better than others of the family.
     """
 
-    fit: Fit
-    without: dict[str, Fit]
-    sizes: dict[str, float]
-    rivals: dict[str, tuple[Rival, ...]]
+    member: Member
+    effect: Effect
+    kind: float
+    confidence: float
+    equivalents: tuple[str, ...]
+    kind_only: bool = False
 
 
-def named(evidence: Evidence, settled: Settled, material: float) -> dict[str, float]:
-    """The sizes of the effects that are causes; ``settled`` as `with_companions` leaves it."""
-    sizes = settled.sizes
-    # What is known from elsewhere leaves no error of shape behind.
-    fitted = {name: size for name, size in sizes.items() if name not in evidence.kept}
-    least = max(material, NAMED_OF_LARGEST * max(fitted.values(), default=0.0))
-    return {
-        name: size
-        for name, size in sizes.items()
-        if size >= least
-        and (name in evidence.kept or not _is_shape_error(name, fitted) or _is_like_no_other(name, settled))
-    }
+def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> tuple[Name, ...]:
+    """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
-
-def _neighbours(name: str, names: Iterable[str]) -> list[str]:
-    """Those of ``names`` whose equation, a little wrong, leaves behind what looks like the effect ``name``."""
-    family = effect(name).family
-    like = {one for group in NEIGHBOURING if family in group for one in group}
-    return [other for other in names if other != name and effect(other).family in like]
-
-
-def _is_shape_error(name: str, sizes: dict[str, float]) -> bool:
-    """Whether an effect is small beside one whose error of shape it may be."""
-    near = [sizes[other] for other in _neighbours(name, sizes)]
-    return bool(near) and sizes[name] < SHAPE_OF_NEIGHBOUR * max(near)
-
-
-def _is_like_no_other(name: str, settled: Settled) -> bool:
-    """Whether no effect of another family takes off as much as half of what this one does.
-
-    An error of shape is followed by one curve about as well as by another; or by two of one family, one against the
-    other.
+    A flexible block is named by the law of its family that comes nearest.
     """
-    if any(effect(other).family == effect(name).family for other in settled.sizes if other != name):
-        return False
-    fall = settled.without[name].cost - settled.fit.cost
-    others = [one.margin for one in settled.rivals[name] if effect(one.effect).family != effect(name).family]
-    return min(others, default=fall) > LIKE_NO_OTHER * fall
+    largest = max((one.size for one in members), default=0.0)
+    made = [
+        _named(one, probability_of_kind(one, largest, left, thresholds), thresholds)
+        for one in members
+        if one.size >= thresholds.material
+    ]
+    return tuple(one for one in made if one.kind >= thresholds.least_confidence)
 
 
-def with_companions(evidence: Evidence, settled: Settled) -> Settled:
-    """The sizes anew where a small effect is the error of shape of a large one: both are taken out for the large one's.
+def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
+    if not one.effect.is_flexible:
+        law, equivalents = probability_of_law(one, thresholds)
+        return Name(one, one.effect, kind, kind * law, equivalents)
+    family = [e for e in catalogue().values() if e.family == one.effect.family]
+    margins = {a.effect: a.margin for a in one.laws}
+    nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
+    others = tuple(e.name for e in family if e is not nearest)
+    return Name(one, nearest, kind, kind / len(family), others, True)
 
-    With the large one alone taken out, the small one would grow into its place, and hide how large it is. So would
-    an offset in the place of a tare, which only the rests tell from it: there all but the baseline stays as it is.
+
+def probability_of_kind(one: Member, largest: float, left: float, thresholds: Thresholds) -> float:
+    """That an effect of this family is there: a logistic of three ratios, each without a unit.
+
+    What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow); how
+    far its equation is asked to depart; its size over the ``largest`` member's (whose departure it may be).
     """
-    without, sizes, whole = dict(settled.without), dict(settled.sizes), settled.fit
-    if "zero_offset" in sizes and TARE in sizes:
-        without[TARE] = fit(evidence, whole.model.without(TARE), QUICK_STEPS, still=whole.model.names)
-        sizes[TARE] = visible(evidence, without[TARE].model, whole.model)
-    for name in sorted(sizes, key=lambda one: -settled.without[one].cost):
-        for other in _neighbours(name, sizes):
-            if settled.without[other].cost >= settled.without[name].cost:
-                continue
-            less = fit(evidence, settled.without[name].model.without(other), QUICK_STEPS)
-            size = visible(evidence, less.model, whole.model)
-            if settled.sizes[other] < SHAPE_OF_NEIGHBOUR * size and size > sizes[name]:
-                without[name], sizes[name] = less, size
-    return replace(settled, without=without, sizes=sizes)
+    intercept, per_left, per_departed, per_share = thresholds.kind_odds
+    size = one.size + thresholds.material
+    score = (
+        intercept
+        + per_left * math.log((left + thresholds.material) / size)
+        + per_departed * one.departed
+        + per_share * math.log(size / (largest + thresholds.material))
+    )
+    return 1.0 / (1.0 + math.exp(-score))
+
+
+def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
+    """That it is this law of its family, and the laws that this data cannot tell from it.
+
+    No law is exact: another one that explains all but the square of the usual departure, of what this one explains, is
+    as good. So the margin is counted in units of that square, and of one look at noise; of the largest departure that
+    is usual where a law is to be ruled out.
+    """
+
+    def odds(margin: float, departure: float) -> float:
+        unit = 2.0 * (thresholds.evidence_temperature + departure**2 * max(one.fall, 0.0))
+        return math.exp(-max(margin, 0.0) / unit)
+
+    laws = [(a.effect, a.margin) for a in one.laws if a.effect is not None]
+    equivalents = (name for name, margin in laws if odds(margin, thresholds.law_departure) > thresholds.equivalent_odds)
+    rivals = sum(odds(margin, thresholds.departure) for _, margin in laws)
+    return 1.0 / (1.0 + rivals), tuple(equivalents)
+
+
+__all__ = ["Alternative", "Name", "names_of", "probability_of_kind", "probability_of_law"]

@@ -6,17 +6,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smartshoe.diagnosis.confidence import SEPARATED
 from smartshoe.diagnosis.experiments import EXPERIMENTS
-from smartshoe.diagnosis.fitting import Fit
+from smartshoe.diagnosis.inference import Inference
+from smartshoe.diagnosis.likelihood import Fit, fit
 from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.result import Cause, NextExperiment
-from smartshoe.diagnosis.selection import Choice
 from smartshoe.diagnosis.session import Session
+from smartshoe.diagnosis.traits import Traits
 from smartshoe.models.effects import Conditions, effect, told_apart_by
 from smartshoe.protocol import Protocol
 
+SEPARATED = 6.0  # difference of -2 log likelihood under which another effect does as well
 DOUBTFUL = 5.0 * SEPARATED  # margins below this deserve another experiment
+SHOWN_BY = {
+    "rates": "rates",
+    "holds": "long_hold",
+    "rests": "idle",
+    "minor_loops": "minor_loops",
+    "peaks": "shuffled_loads",
+    "pauses": "pauses",
+    "steps": "steps",
+}
 CHANNELS = {
     "displacement": "displacement",
     "temperature": "temperature",
@@ -25,56 +35,65 @@ CHANNELS = {
 }
 
 
-def next_experiment(choice: Choice, causes: Sequence[Cause], sessions: Sequence[Session]) -> NextExperiment | None:
+def next_experiment(
+    found: Inference, causes: Sequence[Cause], sessions: Sequence[Session], traits: Traits, *, open_: bool
+) -> NextExperiment | None:
     """For the most doubtful cause: the protocol with the largest expected margin, or the channel to log.
 
-    None where every cause is told from its rivals with ease.
+    Where no cause is in doubt and something is left (``open_``), what this data never showed; else None.
     """
-    near = {cause.name: [r for r in choice.rivals[cause.name] if r.fit and r.margin < DOUBTFUL] for cause in causes}
-    doubtful = [cause for cause in causes if near[cause.name]]
+    doubtful = [cause for cause in causes if cause.equivalents and cause.name in found.fit.model.names]
     if not doubtful:
-        return None
-    # The largest cause that is in doubt: what matters most comes first.
+        return _unseen(found, causes, traits) if open_ or any(c.equivalents for c in causes) else None
     cause = max(doubtful, key=lambda one: one.size)
-    rivals = near[cause.name]
-    rival, margin, other = rivals[0].effect, rivals[0].margin, rivals[0].fit
-    if other is None:
-        return None
-    peak_n = choice.fit.model.full_scale_load_n
-    found = {
-        name: expected_margin(choice.fit, other, made(peak_n), choice.evidence.noise, sessions[0])
-        for name, made in EXPERIMENTS.items()
+    rival = cause.equivalents[0]
+    other = _in_place_of(found, cause.name, rival)
+    margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
+    peak_n = found.fit.model.full_scale_load_n
+    noise = found.likelihood.noise
+    expected = {
+        name: expected_margin(found.fit, other, made(peak_n), noise, sessions[0]) for name, made in EXPERIMENTS.items()
     }
-    best = max(found, key=lambda name: found[name])
-    names = (cause.name, *(one.effect for one in rivals))
-    told = " and ".join(name.replace("_", " ") for name in names[:2])
+    best = max(expected, key=lambda name: expected[name])
+    names = (cause.name, *cause.equivalents)
+    pair = f"{cause.name} and {rival}".replace("_", " ")
     channel = _channel(cause.name, rival, sessions)
-    if found[best] < DOUBTFUL and channel is not None:
-        return NextExperiment(
-            names,
-            None,
-            channel,
-            f"no load history tells {told} apart well (the best, {best.replace('_', ' ')}, by {found[best]:,.0f}):"
-            f" log the {channel} too",
-            found[best],
-        )
-    if found[best] < SEPARATED:
-        return NextExperiment(
-            names,
-            None,
-            channel,
-            f"no load history that a machine can run tells {told} apart: take either, they predict the same",
-            found[best],
-        )
-    return NextExperiment(
-        names,
-        best,
-        channel,
-        f"run {best.replace('_', ' ')}: it should tell {told} apart by {found[best]:,.0f} of -2 log likelihood,"
-        f" where this data does by {max(margin, 0.0):,.0f}",
-        found[best],
-        EXPERIMENTS[best](peak_n),
+    if expected[best] < DOUBTFUL and channel is not None:
+        says = f"no load history tells {pair} apart well: log the {channel} too"
+        return NextExperiment(names, None, channel, says, expected[best])
+    if expected[best] < SEPARATED:
+        says = f"no load history that a machine can run tells {pair} apart: take either, they predict the same"
+        return NextExperiment(names, None, channel, says, expected[best])
+    says = (
+        f"run {best.replace('_', ' ')}: it should tell {pair} apart by {expected[best]:,.0f} of -2 log likelihood,"
+        f" where this data does by {max(margin, 0.0):,.0f}"
     )
+    return NextExperiment(names, best, channel, says, expected[best], EXPERIMENTS[best](peak_n))
+
+
+def _in_place_of(found: Inference, name: str, rival: str) -> Fit:
+    """The fit with ``rival`` in the place of an effect, of the size that the screen expects of it."""
+    added = effect(rival)
+    sizes = {p.name: p.size for p in added.parameters if p.null is not None}
+    values = added.start()
+    for k, parameter in enumerate(added.parameters):
+        if parameter.name in sizes:
+            values[k] = min(
+                max((parameter.null or 0.0) + 0.1 * sizes[parameter.name], parameter.lower), parameter.upper
+            )
+    return fit(found.likelihood, found.fit.model.without(name).with_part(added, values))
+
+
+def _unseen(found: Inference, causes: Sequence[Cause], traits: Traits) -> NextExperiment:
+    """The first protocol that holds what this data lacks; the same again where it lacks nothing."""
+    peak_n = found.fit.model.full_scale_load_n
+    names = tuple(cause.name for cause in causes)
+    for word, protocol in SHOWN_BY.items():
+        if word not in traits.present:
+            says = f"run {protocol.replace('_', ' ')}: this data holds no {word.replace('_', ' ')}, where kinds differ"
+            return NextExperiment(names, protocol, None, says, None, EXPERIMENTS[protocol](peak_n))
+    says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"
+    return NextExperiment(names, "repeat", None, says)
 
 
 def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise: NoiseModel, like: Session) -> float:

@@ -40,11 +40,16 @@ def white(sd: float) -> NoiseModel:
 
 
 def autoregression(
-    residuals: Sequence[Array], kept: Sequence[Mask], order: int = ORDER, floor: float = 1e-9
+    residuals: Sequence[Array],
+    kept: Sequence[Mask],
+    order: int = ORDER,
+    floor: float = 1e-9,
+    white_share: float = 0.0,
 ) -> NoiseModel:
     """Yule-Walker over all sessions: ``residuals`` (n,) each, where ``kept``.
 
-    Biased autocovariances of the masked signals keep the filter stable.
+    Biased autocovariances of the masked signals keep the filter stable. ``white_share`` of the variance is taken for
+    white noise on top.
     """
     total = np.zeros(order + 1)
     count = 0
@@ -56,7 +61,7 @@ def autoregression(
     covariance = total / max(count, 1)
     if covariance[0] <= floor**2:
         return white(floor)
-    covariance[0] = covariance[0] * (1 + 1e-6) + floor**2
+    covariance[0] = covariance[0] * (1 + 1e-6 + white_share) + floor**2
     coefficients = solve_toeplitz(covariance[:-1], covariance[1:])
     variance = float(covariance[0] - coefficients @ covariance[1:])
     return NoiseModel(coefficients, float(np.sqrt(max(variance, floor**2))))

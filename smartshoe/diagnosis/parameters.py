@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.diagnosis.fitting import Fit
+from smartshoe.diagnosis.likelihood import Fit
 from smartshoe.diagnosis.session import Scale
 from smartshoe.models.parameter import Parameter
 
@@ -19,7 +19,7 @@ def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
         if owner != name:
             continue
         factor, unit = _scaled(parameter.unit, scale, fit.model.gain)
-        sd = fit.sd(k)
+        sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
         low = max(theta[k] - NORMAL_95 * sd, parameter.lower)
         high = min(theta[k] + NORMAL_95 * sd, parameter.upper)
         found[parameter.name] = Parameter(
@@ -47,7 +47,7 @@ def _scaled(unit: str, scale: Scale, gain: float) -> tuple[float, str]:
     """Factor and unit in which a share of full scale is told; the chain's shares come out ``gain`` times as large."""
     factor = 1.0
     if "FS_reading" in unit:
-        factor, unit = factor * gain * scale.reading, unit.replace("FS_reading", scale.unit.symbol)
+        factor, unit = factor * gain * abs(scale.reading), unit.replace("FS_reading", scale.unit.symbol)
     if "FS_load" in unit:
         inverse = "/FS_load" in unit
         factor = factor / scale.load_n if inverse else factor * scale.load_n

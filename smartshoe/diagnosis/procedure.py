@@ -1,46 +1,42 @@
-"""From recordings to a diagnosis: integrity, baseline, selection, what is left, what it is worth."""
+"""From recordings to a diagnosis: integrity, baseline, inference, what is left, what it is worth on held-out data."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
-from smartshoe.diagnosis.aligned import common_delay_s, common_drift, drift_rates, on_one_clock, put_right
-from smartshoe.diagnosis.baseline import Timing, shared_timing, start_of
-from smartshoe.diagnosis.confidence import SEPARATED, confidence, inseparable
+from smartshoe.diagnosis.aligned import aligned
+from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.course import course_of
 from smartshoe.diagnosis.decay import decay_of
-from smartshoe.diagnosis.force import force_rmse_n
+from smartshoe.diagnosis.denoise import noise_sd
+from smartshoe.diagnosis.held_out import Errors, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis.inference import Inference, Progress, infer
 from smartshoe.diagnosis.integrity import Integrity, examine
-from smartshoe.diagnosis.judgement import Errors, errors, gain
 from smartshoe.diagnosis.leftover import Leftover, leftover_of
-from smartshoe.diagnosis.margins import penalty
-from smartshoe.diagnosis.naming import MATERIAL
+from smartshoe.diagnosis.naming import Name, names_of
 from smartshoe.diagnosis.next_experiment import next_experiment
 from smartshoe.diagnosis.noise_kinds import noise_kinds
 from smartshoe.diagnosis.parameters import joint_parameters, parameters_of
 from smartshoe.diagnosis.ranges import ranges_of
 from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
-from smartshoe.diagnosis.selection import Choice, Progress, choose
-from smartshoe.diagnosis.session import REST_SHARE, Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.diagnosis.traits import Traits, traits_of
+from smartshoe.diagnosis.zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.errors import UsageError
-from smartshoe.models.effects import effect
+from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
 
-REST_SD = 3e-4  # of full scale: how well an unloaded machine is trusted to read zero
-COMMANDED_REST_SD = 1.2e-4  # the same where the machine was told to be at zero
-PLAIN_GAIN_PERCENT = 5.0  # a gain that needs no interval to be seen
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
-FIT_PERCENT_NEEDED = ((15.0, 35.0, 45.0), (97.0, 88.0, 70.0))  # of the best model, by the baseline's own fit
-NAMED_OVER_LEFT = 3.0  # times what is left over: what a cause must move the reading by to keep its name
-LEFT_OF_EXPLAINED = 0.12  # of the structure that was there: less than this left over is a matter of equations' shape
 
 
 def _silent(_: str) -> None:
@@ -51,27 +47,43 @@ def diagnose(
     recordings: Sequence[Recording] | Recording,
     hold_out: Sequence[Recording] = (),
     *,
-    material: float = MATERIAL,
+    material: float | None = None,
+    thresholds: Thresholds | None = None,
     progress: Progress = _silent,
 ) -> Diagnosis:
     """What the baseline simulation of ``recordings`` gets wrong, why, and what mending it gains.
 
-    Each recording is a session of its own: the unit rested and zeroed before, unless its metadata ``continues`` names
-    another. ``hold_out`` recordings are judged on and never fitted; without them every third load cycle is kept for
-    that. ``material`` is the share of the full-scale reading below which nothing counts.
+    Parameters
+    ----------
+    recordings
+        Load and reading of one unit, each a session of its own unless its metadata ``continues`` names another.
+    hold_out
+        Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is kept.
+    material
+        Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given.
+    thresholds
+        Every number that decides.
+    progress
+        Called with a few words at each step.
 
-    Raises `MissingChannelError` without a load or reading; a diagnosis that the data cannot support comes back with
-    the verdict "refused" and the reason in ``limits``.
+    Raises
+    ------
+    UsageError
+        Where no recording is given. A diagnosis that the data cannot support comes back with the verdict "refused" and
+        the reason in ``limits``.
     """
     fitted = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
+    decided = thresholds or Thresholds()
+    if material is not None:
+        decided = replace(decided, material=material)
     everything = [*fitted, *hold_out]
     integrity = examine(everything)
     refusals = integrity.refusals or _outside(everything)
     if refusals:
-        return _refused(everything, integrity, refusals)
-    return _diagnosed(everything, len(fitted), integrity, material, progress)
+        return _refused(everything, integrity, refusals, decided)
+    return _diagnosed(everything, len(fitted), integrity, decided, progress)
 
 
 def _outside(recordings: Sequence[Recording]) -> tuple[str, ...]:
@@ -87,7 +99,9 @@ def _outside(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return ()
 
 
-def _refused(recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str]) -> Diagnosis:
+def _refused(
+    recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str], thresholds: Thresholds
+) -> Diagnosis:
     sensors = recordings[0].sensors
     unit = sensors[0].unit.symbol if sensors else ""
     return Diagnosis(
@@ -98,11 +112,8 @@ def _refused(recordings: Sequence[Recording], integrity: Integrity, refusals: Se
         0.0,
         data_faults=integrity.faults,
         limits=(*refusals, *(said for said in map(_seen, recordings) if said is not None)),
+        thresholds=thresholds,
     )
-
-
-def _courses(recordings: Sequence[Recording]) -> list[str]:
-    return [f"{one.label}: {said}" for one in recordings if (said := course_of(one)) is not None]
 
 
 def _seen(recording: Recording) -> str | None:
@@ -111,126 +122,146 @@ def _seen(recording: Recording) -> str | None:
     return decay.says if decay is not None else course_of(recording)
 
 
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    sessions: list[Session]
+    fine: list[Session]
+    scale: Scale
+    limits: list[str]
+    start: ExtendedModel
+    traits: Traits
+    is_trap: bool
+
+
+def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
+    clocks = aligned(recordings, integrity)
+    scale = full_scale(clocks.recordings[:count], clocks.usable[:count])
+    held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
+    sessions = prepare(clocks.recordings, clocks.usable, held, scale, thinning(clocks.recordings, scale))
+    start = baseline_of(sessions, scale)
+    for added, values in clocks.parts:
+        start = start.with_part(added, values)
+    traits, ranges = traits_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
+    limits = [*clocks.says, *ranges.says, *traits.limits()]
+    fine = at_full_rate(sessions, clocks.usable, scale)
+    return _Prepared(sessions, fine, scale, limits, start, traits, ranges.is_trap)
+
+
 @on_one_thread
 def _diagnosed(
-    recordings: Sequence[Recording], count: int, integrity: Integrity, material: float, progress: Progress
+    recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds, progress: Progress
 ) -> Diagnosis:
-    drift = common_drift(integrity, recordings)
-    delay_s = 0.0 if drift else common_delay_s(integrity)
-    known: Timing | None = ("clock_drift", (drift,)) if drift else ("delay", (delay_s,)) if delay_s else None
-    given = recordings
-    recordings, usable, put = put_right(given, integrity)
-    scale = full_scale(recordings[:count], usable[:count])
-    held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
-    sessions = prepare(recordings, usable, held, scale, thinning(recordings, scale))
-    moved = known is None and (any(integrity.clock_offset_s) or any(integrity.clock_rate))
-    if moved:
-        as_given, usable_as_given, put_as_given = put_right(given, on_one_clock(integrity))
-        unmoved = prepare(as_given, usable_as_given, held, scale, thinning(as_given, scale))
-        known = shared_timing(unmoved, sessions, scale, drift_rates(integrity, given))
-        if known is not None:
-            recordings, usable, put, sessions, moved = as_given, usable_as_given, put_as_given, unmoved, False
-        if known is not None and known[0] == "sensor_lag":  # of a sensor or a wall: left to the search for effects
-            integrity, known = on_one_clock(integrity), None
-    traits, ranges = traits_of(sessions), ranges_of(sessions, scale)
-    start = start_of(sessions, scale, known)
-    kept = frozenset(start.names if known else ())
-    choice = choose(start, sessions, rest_loads(sessions), kept, material, progress)
-    before = leftover_of(sessions, choice.evidence.residuals(choice.baseline.model))
-    after = leftover_of(sessions, choice.evidence.residuals(choice.fit.model))
+    given = _prepared(recordings, count, integrity, thresholds)
+    sessions, fine, scale = given.sessions, given.fine, given.scale
+    found = infer(given.start, sessions, thresholds, progress)
     progress("judging on held-out data")
-    fine = at_full_rate(sessions, usable, scale)
-    baseline, best = errors(fine, choice.baseline.model), errors(fine, choice.fit.model)
-    causes = [_cause(name, choice, fine, best, scale, traits) for name in choice.causes]
-    # What is left of a delay after the clocks were put right is an error of the putting right.
-    causes = [one for one in causes if _stands(one) and not (moved and one.effect.family == "timing")]
-    causes, verdict = _judged(causes, before, after, material)
-    # The less the baseline follows, the better must be what follows.
-    needed = np.interp(baseline.fit_percent, *FIT_PERCENT_NEEDED)
-    # Strong noise keeps every model from a good fit, and speaks against none.
-    follows = best.fit_percent >= needed or after.is_noise
-    if not follows or (ranges.is_trap and causes):
-        causes, verdict = [], "unexplained"
-    # What the best model leaves is noise but for the structure in it.
-    noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
-    # Without a name nothing is added: the baseline stays.
-    fitted, left, extended_errors = choice.fit, after, best
-    if verdict == "unexplained":
-        fitted, left, extended_errors = choice.baseline, before, baseline
-    extended = fitted.model
-    wrong = float(np.sqrt(max(baseline.rmse**2 - noise_variance, 0.0)))
-    # Structure that no effect explains would be taken for coloured noise.
+    extended = found.fit.model
+    before = leftover_of(sessions, [residual_of(one, found.baseline.model) for one in sessions])
+    after = leftover_of(sessions, [residual_of(one, extended) for one in sessions])
+    left = after.rms if after.significant else 0.0
+    everything = max(left, _unexplained(sessions, extended))
+    silent = given.is_trap or not found.can_validate
+    names = () if silent else names_of(found.members, everything, thresholds)
+    names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings, thresholds))
+    remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
+    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds)
+    zeros = tuple(one for one in zeros if one.size >= thresholds.material)
+    baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
+    causes = [_cause(name, found, fine, best, given) for name in names]
+    causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
+    causes.sort(key=lambda one: -one.size)
+    verdict = _verdict(causes, before, after, thresholds)
+    with_zero = _with_offset(extended, zeros, sessions, scale)
+    noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
-    noise = noise_kinds(fine, extended, integrity.faults, explained, material)
-    named = [cause.name for cause in causes]
-    parameters, covariance = joint_parameters(fitted, scale)
+    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material)
+    named = {cause.name for cause in causes}
+    parameters, covariance = joint_parameters(found.fit, scale)
+    force = force_rmse_n(fine, extended)
     return Diagnosis(
         verdict,
-        _sentence(verdict, causes, wrong, left.rms),
+        _sentence(verdict, causes, baseline, best, left, thresholds),
         scale.unit.symbol,
         scale.load_n,
-        scale.reading,
+        abs(scale.reading),
         causes=tuple(causes),
-        minor=tuple(name for name in extended.names if name not in named),
+        minor=tuple(part.name for part in extended.parts if part.name not in named),
         data_faults=(*integrity.faults, *noise),
-        baseline=_standing(baseline, choice.baseline.model, before, fine, scale),
-        extended=_standing(extended_errors, extended, left, fine, scale),
-        gain=gain(baseline, extended_errors, scale),
+        baseline=_standing(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
+        extended=_standing(best, force, after, scale),
+        gain=gain(baseline, best, scale),
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
-        explained_percent=_percent_less(extended_errors.rmse**2, baseline.rmse**2),
-        rivals=causes[0].rivals if causes else _candidates(choice),
-        next_experiment=next_experiment(choice, causes, sessions),
-        limits=(
-            *put,
-            *ranges.says,
-            *traits.limits(),
-            *([] if follows else [_does_not_follow(baseline, best), *_courses(recordings)]),
-        ),
-        leftover=left.says if verdict in ("unexplained", "partly_explained") else None,
-        screening=tuple((one.candidate.effect.name, float(one.fall)) for one in choice.screening.ranked),
-        likeness=choice.screening.likeness,
-        model=extended,
-        baseline_model=choice.baseline.model,
+        explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
+        rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
+        next_experiment=next_experiment(found, causes, sessions, given.traits, open_=bool(left > thresholds.material)),
+        limits=(*given.limits, *_refused_members(found)),
+        leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
+        screening=found.screening,
+        model=with_zero,
+        baseline_model=found.baseline.model,
         parameters=parameters,
         covariance=covariance,
-        traces=tuple(_trace(session, choice.baseline.model, extended, scale) for session in fine),
+        traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),
+        thresholds=thresholds,
     )
 
 
-def rest_loads(sessions: Sequence[Session]) -> tuple[Array, float]:
-    """Mean measured load of each session's rests, shares of full scale, and how well it should be zero."""
-    means = []
-    commanded = all(session.recording.command_n is not None for session in sessions)
+def _unexplained(sessions: Sequence[Session], model: ExtendedModel) -> float:
+    """Rms of what the model leaves of the fitted samples beyond white noise, whether it repeats or not."""
+    square, white, count = 0.0, 0.0, 0
     for session in sessions:
-        command, load = session.recording.command_n, session.conditions.load
-        resting = session.resting & ~session.held_out
-        if command is not None:
-            # Told by the command alone: a large tare lifts the load out of what looks like a rest.
-            full = float(np.max(np.abs(command))) or 1.0
-            nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
-            resting = nothing & (np.abs(load - np.quantile(load, 0.02)) < REST_SHARE) & ~session.held_out
-        if resting.sum() > 10:
-            means.append(float(np.mean(load[resting])))
-    return np.array(means), COMMANDED_REST_SD if commanded else REST_SD
+        if session.fitted.any():
+            residual = residual_of(session, model)[session.fitted]
+            square += float(residual @ residual)
+            white += noise_sd(residual) ** 2 * residual.size
+            count += residual.size
+    return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
 
 
-def _stands(cause: Cause) -> bool:
-    """Whether a cause gains on data it has not seen, and its strength is told from nothing."""
-    won = cause.held_out
-    if won.gain_percent <= 0 or (won.ci95[0] <= 0 and won.gain_percent < PLAIN_GAIN_PERCENT):
+def _is_within_a_sample(
+    name: Name, model: ExtendedModel, recordings: Sequence[Recording], thresholds: Thresholds
+) -> bool:
+    """Whether a latency is too short to be one: a time stamp does not say where within its interval a sample lies."""
+    if not (name.effect.is_latency and name.effect.parameters[0].unit == "s"):
         return False
-    strengths = [p for p in cause.effect.parameters if p.null is not None]
-    intervals = [cause.parameters[p.name].ci95 for p in strengths]
-    nulls = [p.null or 0.0 for p in strengths]
-    return any(not low <= null <= high for null, (low, high) in zip(nulls, intervals, strict=True))
+    values = next(part.values for part in model.parts if part.name == name.member.name)
+    step_s = max(recording.sample_time_s for recording in recordings)
+    return abs(float(values[0])) < thresholds.timing_resolution * step_s
 
 
-def _does_not_follow(baseline: Errors, best: Errors) -> str:
-    return (
-        f"the model of a pressed unit follows this reading by {max(baseline.fit_percent, 0.0):.0f} % only, and by"
-        f" {max(best.fit_percent, 0.0):.0f} % at best: it is of another kind, or its columns are mistaken, and no cause"
-        " can be named by it"
-    )
+def _verdict(causes: Sequence[Cause], before: Leftover, after: Leftover, thresholds: Thresholds) -> Verdict:
+    left = after.rms if after.significant else 0.0
+    if causes:
+        wrong = before.rms if before.significant else 0.0
+        least = max(thresholds.material, thresholds.tolerable, thresholds.departure * wrong)
+        return "partly_explained" if left > least else "explained"
+    return "unexplained" if left > max(thresholds.material, thresholds.tolerable) else "adequate"
+
+
+def _sentence(
+    verdict: Verdict, causes: Sequence[Cause], baseline: Errors, best: Errors, left: float, thresholds: Thresholds
+) -> str:
+    names = [cause.name.replace("_", " ") for cause in causes]
+    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
+    rest = f"{100 * left:.2g} % repeats and is not explained"
+    if verdict == "adequate":
+        return good if left <= thresholds.material else f"{good}; {rest}"
+    if verdict == "unexplained":
+        return f"{good}; {rest}, and no effect of the catalogue accounts for it"
+    said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
+    return said if verdict == "explained" else f"{said}; {rest}"
+
+
+def _refused_members(found: Inference) -> list[str]:
+    if not found.can_validate:
+        return [
+            "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
+        ]
+    if not found.refused:
+        return []
+    names = ", ".join(dict.fromkeys(name.replace("_", " ") for name in found.refused))
+    return [f"fitted well but made recordings left out worse, and so were taken out again: {names}"]
 
 
 def _percent_less(after: float, before: float) -> float:
@@ -238,59 +269,56 @@ def _percent_less(after: float, before: float) -> float:
     return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
 
 
-def _judged(causes: list[Cause], before: Leftover, after: Leftover, material: float) -> tuple[list[Cause], Verdict]:
-    """The causes that keep their names, and the verdict.
-
-    A name that explains little more than what is left over is withdrawn: the truth may be another thing altogether.
-    """
-    left = after.rms if after.significant and after.rms > material else 0.0
-    if left <= LEFT_OF_EXPLAINED * before.rms:
-        left = 0.0
-    kept = [cause for cause in causes if cause.size >= NAMED_OVER_LEFT * left]
-    if kept:
-        return kept, "partly_explained" if left else "explained"
-    if left or (before.significant and before.rms > material):
-        return [], "unexplained"
-    return [], "adequate"
-
-
-def _sentence(verdict: Verdict, causes: Sequence[Cause], wrong: float, left: float) -> str:
-    names = [cause.name.replace("_", " ") for cause in causes]
-    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-    verb = "account" if len(names) > 1 else "accounts"
-    wrong_by = f"the baseline simulation is wrong by {100 * wrong:.2g} % of full scale"
-    if verdict == "adequate":
-        return "the baseline simulation leaves nothing that repeats and matters"
-    if verdict == "explained":
-        return f"{wrong_by}: {named} {verb} for it"
-    if verdict == "partly_explained":
-        return f"{wrong_by}: {named} {verb} for part of it, and {100 * left:.2g} % of full scale is still unexplained"
-    return f"{wrong_by}, and no effect of the catalogue accounts for it"
-
-
-def _candidates(choice: Choice) -> tuple[Rival, ...]:
-    ranked = choice.screening.ranked[:4]
-    return tuple(Rival(one.candidate.effect.name, float(ranked[0].fall - one.fall)) for one in ranked)
-
-
-def _cause(name: str, choice: Choice, fine: Sequence[Session], best: Errors, scale: Scale, traits: Traits) -> Cause:
-    less = choice.without[name]
-    won = gain(errors(fine, less.model), best, scale)
-    rivals = tuple(Rival(one.effect, one.margin) for one in choice.rivals[name])
-    one = effect(name)
-    fall, size = choice.fall(name), choice.sizes[name]
+def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared) -> Cause:
+    member = name.member
+    won = gain(errors(fine, member.without.model), best, given.scale)
+    near = {a.effect: a.margin for a in (*member.alternatives, *member.laws) if a.effect is not None}
+    rivals = tuple(Rival(effect, margin) for effect, margin in sorted(near.items(), key=lambda one: one[1]))
+    nothing = next((a.margin for a in member.alternatives if a.effect is None), 0.0)
     evidence = [
         Statement(
-            "fall of -2 log likelihood",
-            fall,
-            penalty(name),
-            f"without it, and all else fitted anew, the fit is worse by {fall:,.0f} where {penalty(name):.0f} would do",
+            "fall of -2 log evidence",
+            nothing,
+            0.0,
+            f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log",
         ),
+        *_held_out_evidence(member.size, won),
+    ]
+    if rivals:
+        evidence.append(
+            Statement(
+                "margin to the nearest rival",
+                rivals[0].margin,
+                0.0,
+                f"{rivals[0].effect.replace('_', ' ')} in its place is worse by {rivals[0].margin:,.0f}",
+            )
+        )
+    if name.kind_only:
+        evidence.append(
+            Statement(
+                "kind", 1.0, 1.0, "the kind is sure, the law is not: no equation of it follows better than others"
+            )
+        )
+    lacking = name.effect.exposed_by - given.traits.present
+    if lacking:
+        said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
+        evidence.append(
+            Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")
+        )
+    values = parameters_of(found.fit, member.name, given.scale)
+    return Cause(name.effect, name.confidence, name.equivalents, values, tuple(evidence), won, member.size, rivals)
+
+
+def _held_out_evidence(size: float, won: object) -> list[Statement]:
+    from smartshoe.diagnosis.held_out import Gain
+
+    assert isinstance(won, Gain)
+    return [
         Statement(
             "size in percent of full scale",
             100 * size,
-            100 * MATERIAL,
-            f"it moves the reading by {100 * size:.3g} % of full scale (rms)",
+            0.0,
+            f"it moves the reading by {100 * size:.3g} % of full scale",
         ),
         Statement(
             "gain on held-out data in percent",
@@ -299,57 +327,77 @@ def _cause(name: str, choice: Choice, fine: Sequence[Session], best: Errors, sca
             f"on data not fitted the error falls from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
         ),
     ]
-    if rivals:
-        nearest = rivals[0]
-        evidence.append(
-            Statement(
-                "margin to the nearest rival",
-                nearest.margin,
-                SEPARATED,
-                f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:,.0f}",
-            )
-        )
-    lacking = one.exposed_by - traits.present
-    if lacking:
-        evidence.append(
-            Statement(
-                "what would show it best is missing",
-                float(len(lacking)),
-                0.0,
-                f"the data holds no {', no '.join(sorted(word.replace('_', ' ') for word in lacking))}",
-            )
-        )
+
+
+def _zero_cause(
+    zero: Zero, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared, thresholds: Thresholds
+) -> Cause:
+    """An offset or tare: removed, every reading is off by it."""
+    scale = given.scale
+    worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
+    won = gain(worse, best, scale)
+    parameter = zero.effect.parameters[0]
+    factor = scale.load_n if "FS_load" in parameter.unit else abs(scale.reading)
+    unit = "N" if "FS_load" in parameter.unit else scale.unit.symbol
+    low, high = zero.value - 1.96 * zero.sd, zero.value + 1.96 * zero.sd
+    values = {parameter.name: Parameter(zero.value * factor, zero.sd * factor, (low * factor, high * factor), unit)}
+    deviations = abs(zero.value) / zero.sd
+    seen = Statement(
+        "deviations from nothing",
+        deviations,
+        thresholds.zero_deviations,
+        f"it is {deviations:.3g} standard deviations from nothing",
+    )
+    sure = 1.0 / (1.0 + len(zero.alternatives)) if zero.alternatives else thresholds.seen_confidence
     return Cause(
-        one,
-        confidence(rivals, fall),
-        inseparable(rivals),
-        parameters_of(choice.fit, name, scale),
-        tuple(evidence),
-        won,
-        size,
-        rivals,
+        zero.effect, sure, zero.alternatives, values, (seen, *_held_out_evidence(zero.size, won)), won, zero.size
     )
 
 
-def _standing(found: Errors, model: ExtendedModel, left: Leftover, fine: Sequence[Session], scale: Scale) -> Standing:
+def _with_offset(
+    model: ExtendedModel, zeros: Sequence[Zero], sessions: Sequence[Session], scale: Scale
+) -> ExtendedModel:
+    """``model`` with the recordings' mean offset, so that it gives readings as they are logged."""
+    for zero in zeros:
+        model = model.with_part(zero.effect, np.array([zero.value]))
+    if not any(zero.effect.shifts == "reading" for zero in zeros):
+        rest = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
+        if rest != 0.0:
+            model = model.with_part(shift_of("reading"), np.array([rest / model.gain]))
+    return model
+
+
+def _standing(found: Errors, force_n: float, left: Leftover, scale: Scale) -> Standing:
+    span = abs(scale.reading)
     return Standing(
-        found.rmse * scale.reading,
+        found.rmse * span,
         scale.unit.symbol,
         found.fit_percent,
-        force_rmse_n(fine, model),
-        left.rms * scale.reading,
+        force_n,
+        left.rms * span,
+        found.variance_explained_percent,
     )
 
 
 def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, scale: Scale) -> Trace:
+    def told(shares: Array) -> Array:
+        return np.asarray(scale.zero + shares * scale.reading)
+
+    def simulated(model: ExtendedModel) -> Array:
+        plain = model.simulate(session.conditions)
+        return told(plain + own_of(session, model, session.reading - plain)[1])
+
     return Trace(
         session.recording.name,
         session.conditions.time_s + session.recording.time_s[0],
         session.conditions.load * scale.load_n,
-        session.reading * scale.reading,
-        baseline.simulate(session.conditions) * scale.reading,
-        extended.simulate(session.conditions) * scale.reading,
+        told(session.reading),
+        simulated(baseline),
+        simulated(extended),
         session.usable,
         session.held_out,
         session.cycle,
     )
+
+
+__all__ = ["diagnose"]

@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.session import Scale, Session
+from smartshoe.diagnosis.thresholds import Thresholds
 
 Array = NDArray[np.float64]
 
-NARROW = 0.6  # of the largest load: a lowest load above it leaves a narrow range
-FAR_FROM_ZERO = 2.0  # times that the gain within a narrow range and reading over load differ: a line far past zero
-GAINS_DIFFER = 1.3  # times
-APART = 0.2  # of the largest load, between the means of two files, for a gain between files
-FOLLOWS = 0.5  # correlation within a file, below which it has no gain of its own
+STANDARD = Thresholds()
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +24,7 @@ class Ranges:
     is_trap: bool = False
 
 
-def ranges_of(sessions: Sequence[Session], scale: Scale) -> Ranges:
+def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds = STANDARD) -> Ranges:
     """A sentence for each thing that the loads' range does not allow to be said."""
     said: list[str] = []
     kept = [(s.conditions.load[s.usable], s.reading[s.usable]) for s in sessions if s.usable.sum() > 10]
@@ -36,14 +33,16 @@ def ranges_of(sessions: Sequence[Session], scale: Scale) -> Ranges:
     trap = False
     unit = scale.unit.symbol
     to_physical = scale.reading / scale.load_n
-    within = [_gain(load, reading) for load, reading in kept]
-    narrow = [k for k, (load, _) in enumerate(kept) if float(np.quantile(load, 0.01)) > NARROW * float(load.max())]
+    within = [_gain(load, reading, thresholds.follows) for load, reading in kept]
+    narrow = [
+        k for k, (load, _) in enumerate(kept) if thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max())
+    ]
     if len(narrow) == len(kept) and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
         load, reading = kept[narrow[0]]
         through_zero = float(reading.mean() / load.mean())
         low, high = np.quantile(load, [0.01, 0.99]) * scale.load_n
-        trap = not 1.0 / FAR_FROM_ZERO < gain / through_zero < FAR_FROM_ZERO
+        trap = not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
             f" {sessions[narrow[0]].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
@@ -56,10 +55,10 @@ def ranges_of(sessions: Sequence[Session], scale: Scale) -> Ranges:
                 else ": what lies below is extrapolated"
             )
         )
-    between = _between(kept)
+    between = _between(kept, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
-        if not 1.0 / GAINS_DIFFER < abs(gain / between) < GAINS_DIFFER:
+        if not 1.0 < abs(gain / between) * (1.0 + thresholds.same) < (1.0 + thresholds.same) ** 2:
             trap = trap or len(narrow) == len(kept)
             said.append(
                 f"within a file the reading moves by {gain * to_physical:.3g} {unit}/N, between the files by"
@@ -69,20 +68,20 @@ def ranges_of(sessions: Sequence[Session], scale: Scale) -> Ranges:
     return Ranges(tuple(said), trap)
 
 
-def _gain(load: Array, reading: Array) -> float | None:
-    """Slope of reading on load within a file, None where they hardly correlate."""
+def _gain(load: Array, reading: Array, follows: float) -> float | None:
+    """Slope of reading on load within a file, None where load explains less of its variance than ``follows``."""
     a, b = load - load.mean(), reading - reading.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b / (a @ a)) if size > 0 and abs(float(a @ b)) > FOLLOWS * size else None
+    return float(a @ b / (a @ a)) if size > 0 and float(a @ b) ** 2 > follows * size**2 else None
 
 
-def _between(kept: Sequence[tuple[Array, Array]]) -> float | None:
-    """Slope of the files' mean readings on their mean loads, None where they are not far apart."""
+def _between(kept: Sequence[tuple[Array, Array]], apart: float) -> float | None:
+    """Slope of the files' mean readings on their mean loads, None where these are not ``apart`` (full scales)."""
     if len(kept) < 2:
         return None
     loads = np.array([load.mean() for load, _ in kept])
     readings = np.array([reading.mean() for _, reading in kept])
-    if np.ptp(loads) < APART:
+    if np.ptp(loads) < apart:
         return None
     a = loads - loads.mean()
     return float(a @ readings / (a @ a)) or None

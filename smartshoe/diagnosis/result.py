@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.integrity import DataFault
-from smartshoe.diagnosis.judgement import Gain
+from smartshoe.diagnosis.thresholds import Thresholds, described
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
@@ -97,6 +98,7 @@ class Standing:
     fit_percent: float
     force_rmse_n: float
     structure_rms: float
+    variance_explained_percent: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """The contract's ``baseline`` and ``extended``."""
@@ -105,6 +107,7 @@ class Standing:
             "fit_percent": self.fit_percent,
             "force_rmse_n": finite_or_none(self.force_rmse_n),
             "structure_rms": {"value": self.structure_rms, "unit": self.unit},
+            "variance_explained_percent": self.variance_explained_percent,
         }
 
 
@@ -180,6 +183,7 @@ class Diagnosis:
     traces: tuple[Trace, ...] = field(default=())
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     covariance: tuple[tuple[float, ...], ...] = ()
+    thresholds: Thresholds = field(default_factory=Thresholds)
 
     def calibration(self, *, unit: str = "", sample_rate_hz: float = 100.0, created: str = "") -> Calibration:
         """The extended model as a calibration, for `compensate`, `export` and a twin.
@@ -220,5 +224,6 @@ class Diagnosis:
             "limits": list(self.limits),
             "leftover": self.leftover,
             "screening": [{"effect": name, "fall": fall} for name, fall in self.screening],
+            "thresholds": described(self.thresholds),
             "model": self.model.to_dict() if self.model else None,
         }

@@ -28,26 +28,34 @@ Mask = NDArray[np.bool_]
 
 SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
-MOST_SAMPLES = 25_000
-MOST_COARSENED = 2.0  # times: for the sake of speed
+MOST_SAMPLES = 12_000
+MOST_COARSENED = 6.0  # times: for the sake of speed
 # Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
 CYCLE_SHARE = 0.08
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
 REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
 LOWEST_SHARE = 0.02
-FEWEST_AT_REST = 10
 FEWEST_FOR_NOISE = 200  # samples: the noise is then known to 5 %
 REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What the shares are of: the largest load in N and the largest reading in ``unit``, over all that is fitted."""
+    """What the shares are of, over all that is fitted: the largest load in N and the span of the reading in ``unit``.
+
+    ``reading`` is negative where the reading falls as the load grows. ``zero`` is what is taken off every reading
+    before it is made a share: a convention of numbers that decides nothing, since each recording's offset is free.
+    """
 
     load_n: float
     reading: float
     unit: Unit
+    zero: float = 0.0
+
+    def share(self, values: Array) -> Array:
+        """Readings (n,) in ``unit`` as shares."""
+        return (values - self.zero) / self.reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,36 +93,34 @@ class Session:
 
 
 def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask]) -> Scale:
-    """The largest load and reading (their 99.9th percentile, so that a spike does not count)."""
+    """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
+
+    Raises `NotIdentifiableError` where load or reading never changes.
+    """
     unit = recordings[0].sensor.unit
-    load = max(float(np.percentile(np.abs(r.force_n), 99.9)) for r in recordings)
-    spans = []
-    for recording, mask in zip(recordings, usable, strict=True):
-        values = recording.sensor.in_unit(unit)[mask]
-        if values.size:
-            rest = resting_reading(values, recording.force_n[mask])
-            spans.append(float(np.percentile(np.abs(values - rest), 99.9)))
+    pairs = [
+        (recording.force_n[mask], recording.sensor.in_unit(unit)[mask])
+        for recording, mask in zip(recordings, usable, strict=True)
+        if mask.any()
+    ]
+    load = max((float(np.percentile(np.abs(force), 99.9)) for force, _ in pairs), default=0.0)
+    # The span of each recording by itself: their zeros may differ by more than the load moves the reading.
+    spans = [float(np.ptp(np.percentile(values, [0.1, 99.9]))) for _, values in pairs]
     if load <= 0 or not spans or max(spans) <= 0:
         raise NotIdentifiableError(
             f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
         )
-    return Scale(load, max(spans), unit)
+    slope = sum(float(np.dot(force - force.mean(), values - values.mean())) for force, values in pairs)
+    zero = 0.0
+    if unit.quantity != "pressure":
+        zero = float(np.median(np.concatenate([values[lowest(force)] for force, values in pairs])))
+    return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
 
 
 def lowest(load_n: Array) -> Mask:
     """(n,) samples at the lowest load, within a fiftieth of its span."""
     low, high = float(np.percentile(load_n, 0.1)), float(np.percentile(load_n, 99.9))
     return np.asarray(load_n <= low + LOWEST_SHARE * (high - low))
-
-
-def resting_reading(values: Array, load_n: Array) -> float:
-    """The reading (n,) before the unit is first loaded; where that was not recorded, its median at the lowest load.
-
-    A unit that relaxes slowly goes on reading pressure for minutes after it was unloaded.
-    """
-    low = lowest(load_n)
-    before = int(np.argmin(low)) if not low.all() else low.size
-    return float(np.median(values[:before] if before >= FEWEST_AT_REST else values[low]))
 
 
 def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
@@ -191,7 +197,7 @@ def _session(
         extra["temperature_k"] = temperature.si - temperature.si[0]
     neighbour = _neighbour(recording)
     if neighbour is not None:
-        extra["neighbour"] = neighbour.in_unit(scale.unit) / scale.reading
+        extra["neighbour"] = neighbour.in_unit(scale.unit) / abs(scale.reading)
     crosshead = _named(recording, "displacement")
     displacement = crosshead.si if crosshead is not None else None
     if not recording.is_uniform:
@@ -207,7 +213,7 @@ def _session(
     raw = load_n / scale.load_n
     raw_noise = noise_sd(raw)
     load, noise = without_noise(raw, step_s, raw_noise)
-    load = as_sampled(load, reading / scale.reading, step_s)
+    load = as_sampled(load, scale.share(reading), step_s)
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)
     conditions = Conditions(
@@ -234,7 +240,7 @@ def _session(
         recording,
         index,
         conditions,
-        smoothed(reading / scale.reading, weights, factor),
+        smoothed(scale.share(reading), weights, factor),
         kept,
         held_out,
         cycle,

@@ -10,19 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
+from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.loading import turning_points
 from smartshoe.masks import runs_of
 
 Array = NDArray[np.float64]
 
-SAME_RATE = 0.25
-SINGLE_RATE = 0.8  # of the ramps
-SAME_PEAK = 0.10
-SAMPLES_OF_A_RATE = 4
-STEP_S = 0.15  # a ramp within this time is a step
-IDLE_S = 60.0
-FLAT_PER_S = 0.004  # of full scale: slower is a hold
-HOLD_S = 3.0
+STANDARD = Thresholds()
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +32,7 @@ class Traits:
     longest_rest_s: float
     repeats: int
     present: frozenset[str]
+    thresholds: Thresholds = STANDARD
 
     def limits(self) -> list[str]:
         """A sentence for each thing of which this data says nothing."""
@@ -49,7 +44,8 @@ class Traits:
             )
         if "holds" not in self.present:
             said.append(
-                f"no hold longer than {HOLD_S:g} s under load: little can be said of a leak, and nothing of slow creep"
+                f"no hold longer than {self.thresholds.hold_s:g} s under load: little can be said of a leak, and"
+                " nothing of slow creep"
             )
         if "rests" not in self.present:
             said.append("the unit is never seen unloaded: zero, tare and what lies near zero load cannot be judged")
@@ -60,7 +56,7 @@ class Traits:
         return said
 
 
-def traits_of(sessions: Sequence[Session]) -> Traits:
+def traits_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) -> Traits:
     """What all sessions together hold."""
     rates: list[tuple[float, int]] = []
     peaks: list[float] = []
@@ -68,6 +64,7 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
     pauses: list[float] = []
     minor = False
     kinds: dict[tuple[int, int], int] = {}
+    alike = float(np.log1p(thresholds.same))
     for session in sessions:
         load, step_s = session.conditions.load, session.conditions.step_s
         span = min(1.0, max(float(np.ptp(load)), 1e-9))
@@ -78,46 +75,48 @@ def traits_of(sessions: Sequence[Session]) -> Traits:
             if abs(rise) < 3.0 * CYCLE_SHARE * span:
                 continue
             part = (load[first : last + 1] - load[first]) / rise
-            begin, end = int(np.argmax(part >= 0.2)), int(np.argmax(part >= 0.8))
-            if end - begin < SAMPLES_OF_A_RATE and session.thinned == 1:
-                continue  # too short to have a rate
-            rate = 0.6 * rise / max((end - begin) * step_s, 0.5 * step_s)
+            begin, end = int(np.argmax(part >= 0.25)), int(np.argmax(part >= 0.75))
+            if (end - begin) * thresholds.same < 1.0 and session.thinned == 1:
+                continue  # a sample more or less makes another rate of it
+            rate = 0.5 * rise / max((end - begin) * step_s, 0.5 * step_s)
             if rise > 0:
                 rates.append((rate, end - begin))
                 peaks.append(float(load[last]))
-                kind = (round(10 * np.log2(rate)), round(20 * peaks[-1]))
+                kind = (round(np.log(rate) / alike), round(np.log(peaks[-1]) / alike))
                 kinds[kind] = kinds.get(kind, 0) + 1
-                if load[first] > lowest + 0.15 * span:
+                if load[first] > lowest + thresholds.clear * CYCLE_SHARE * span:
                     minor = True
-        flat = np.abs(session.conditions.rate_per_s) < FLAT_PER_S
-        hold_s = max(hold_s, _longest(flat & ~session.resting & (load > 0.1)) * step_s)
+        flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
+        hold_s = max(hold_s, _longest(flat & ~session.resting & (load > CYCLE_SHARE)) * step_s)
         lengths = _runs(session.resting)
         rest_s = max([rest_s, *(n * step_s for n in lengths)])
         pauses += [n * step_s for n in lengths[1:-1]]
     present = set()
-    few_rates, few_peaks = _distinct_rates(rates), _distinct(peaks, SAME_PEAK)
+    few_rates, few_peaks = _distinct_rates(rates, thresholds.same), _distinct(peaks, thresholds.same)
     if len(few_rates) > 1:
         present.add("rates")
     if len(few_peaks) > 1:
         present.add("peaks")
-    if any(rate * STEP_S > CYCLE_SHARE * 4 for rate, _ in rates):
+    if any(rate * thresholds.echo_s > thresholds.same for rate, _ in rates):
         present.add("steps")
-    if hold_s >= HOLD_S:
+    if hold_s >= thresholds.hold_s:
         present.add("holds")
-    if rest_s >= 1.0:
+    # A reading has come to its zero when any sensor's lag is over.
+    settled_s = thresholds.clear * thresholds.sensor_lag_s
+    if rest_s >= settled_s:
         present.add("rests")
-    if rest_s >= IDLE_S:
+    if rest_s >= thresholds.idle_s:
         present.add("idle")
-    if pauses and max(pauses) > 3 * max(min(pauses), 0.5):
+    if pauses and max(pauses) > thresholds.clear * max(min(pauses), settled_s):
         present.add("pauses")
     if kinds and max(kinds.values()) >= 2:
         present.add("repeats")
     if minor:
         present.add("minor_loops")
-    if few_peaks and min(few_peaks) < 0.2:
+    if few_peaks and min(few_peaks) < thresholds.same:
         present.add("low_loads")
     repeats = max(kinds.values(), default=0)
-    return Traits(tuple(few_rates), tuple(few_peaks), hold_s, rest_s, repeats, frozenset(present))
+    return Traits(tuple(few_rates), tuple(few_peaks), hold_s, rest_s, repeats, frozenset(present), thresholds)
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[int]:
@@ -137,8 +136,8 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
     return found
 
 
-def _distinct_rates(rates: Sequence[tuple[float, int]]) -> list[float]:
-    """Rates that differ by more than `SAME_RATE`, and by more than ramps of so few samples tell.
+def _distinct_rates(rates: Sequence[tuple[float, int]], same: float) -> list[float]:
+    """Rates that differ by more than ``same``, and by more than ramps of so few samples tell.
 
     Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2. A
     stray ramp beside a single rate, a first one say, makes no second rate.
@@ -148,10 +147,10 @@ def _distinct_rates(rates: Sequence[tuple[float, int]]) -> list[float]:
     reach = 0.0
     for rate, samples in sorted(rates):
         n = max(samples, 1)
-        if not found or (rate > found[-1] * (1.0 + SAME_RATE) and rate * n / (n + 2.0) > reach):
+        if not found or (rate > found[-1] * (1.0 + same) and rate * n / (n + 2.0) > reach):
             found.append(rate)
             ramps.append(0)
             reach = rate * n / max(n - 2.0, 0.1)
         ramps[-1] += 1
     most = int(np.argmax(ramps)) if ramps else 0
-    return [found[most]] if ramps and ramps[most] >= SINGLE_RATE * sum(ramps) else found
+    return [found[most]] if ramps and ramps[most] >= (1.0 - same) * sum(ramps) else found

@@ -38,7 +38,8 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
     """The roles that channels have by name and unit alone (the plain table's names first).
 
     A single channel in a unit of force is the load; names like ``command`` in a unit of force are commands. Named
-    sensors (``pressure``, ``left_toe``) are the sensors; where there is none, every channel in a unit of pressure.
+    sensors (``pressure``, ``left_toe``) are the sensors, but for neighbours of a ``pressure``; where there is none,
+    every channel in a unit of pressure.
     """
     roles: list[Role] = ["auxiliary"] * len(names)
     forces: list[int] = []
@@ -49,6 +50,11 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
             roles[index] = "command"
         elif unit_ is not None and unit_.quantity == "force" and not _ESTIMATE.search(name):
             forces.append(index)
+    if SENSOR_NAME in names:  # the unit under test; a shoe's named sensors beside it are its neighbours
+        roles = [
+            "auxiliary" if role == "sensor" and name != SENSOR_NAME else role
+            for name, role in zip(names, roles, strict=True)
+        ]
     load = [index for index in forces if names[index] == LOAD_NAME] or forces
     if len(load) == 1:
         roles[load[0]] = "load"

@@ -18,10 +18,9 @@ Array = NDArray[np.float64]
 
 BASELINE = (
     EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),
-    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, 1e-5, 5.0, 0.1),
+    EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, -0.9, 5.0, 0.1),
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
-TAKEN_BY_WALL = ("static_curve", "leak")
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 
@@ -147,22 +146,16 @@ class ExtendedModel:
         core = self.chain.index(None)
         load = kept[core]
         for k, part in enumerate(self.chain):
-            if part is not None and part.effect.family in TAKEN_BY_WALL and part.effect.place == "gas":
+            if part is not None and part.effect.air is not None and k > core:
                 pressure = kept[k]
-                share = self.wall_ratio - (1.0 if part.effect.family == "leak" else 0.0)
+                share = self.wall_ratio - (1.0 if part.effect.air == "leaves" else 0.0)
                 load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / share
         return self.core.deformation(load, conditions.step_s)
 
-    def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:
-        """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
-
-        The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
-        """
-        kept: list[Array] = []
-        reading = self._run(conditions.load, conditions, 0, kept)
-        theta = self.theta
-        out = np.empty((reading.size, theta.size), order="F")
-        out[:, 0] = reading / self.gain
+    @cached_property
+    def _varied(self) -> tuple[tuple[float, ExtendedModel, int], ...]:
+        """For each parameter but the gain: its step, the model with it taken, the first block that it moves."""
+        theta, made = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
         core = self.chain.index(None)
         for j, (owner, parameter) in enumerate(self.parameters):
@@ -175,6 +168,19 @@ class ExtendedModel:
             trial = self.at(moved)
             if first != core and owner != "baseline":
                 trial.__dict__["core"] = self.core  # not touched by this parameter
+            made.append((step, trial, first))
+        return tuple(made)
+
+    def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:
+        """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
+
+        The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
+        """
+        kept: list[Array] = []
+        reading = self._run(conditions.load, conditions, 0, kept)
+        out = np.empty((reading.size, 1 + len(self._varied)), order="F")
+        out[:, 0] = reading / self.gain
+        for j, (step, trial, first) in enumerate(self._varied, start=1):
             out[:, j] = (trial._run(kept[first], conditions, first) - reading) / step
         return reading, out
 
@@ -184,23 +190,27 @@ class ExtendedModel:
         reading = self._run(conditions.load, conditions, 0, kept)
         return reading, [*kept, reading / self.gain]
 
-    def column_of(self, added: Effect, start: Array, conditions: Conditions, trace: tuple[Array, list[Array]]) -> Array:
-        """Derivatives (n, k) of the reading with respect to the k strengths of an effect that is not in the model.
-
-        ``start`` holds null strengths and a shape; ``trace`` is this model's own.
-        """
-        reading, kept = trace
-        strengths = [j for j, parameter in enumerate(added.parameters) if parameter.null is not None]
-        out = np.empty((reading.size, len(strengths)), order="F")
-        for column, j in enumerate(strengths):
-            step = derivative_step(added.parameters[j], start[j])
+    def extended_by(self, added: Effect, start: Array) -> Extensions:
+        """A small step of each strength of an effect that is not in it yet; ``start``: null strengths and a shape."""
+        made = []
+        for j, parameter in enumerate(added.parameters):
+            if parameter.null is None:
+                continue
+            step = derivative_step(parameter, start[j])
             moved = start.copy()
             moved[j] += step
             trial = self.with_part(added, moved)
             if not isinstance(added, CoreEffect):
                 trial.__dict__["core"] = self.core
             names = [None if part is None else part.name for part in trial.chain]
-            first = names.index(None if isinstance(added, CoreEffect) else added.name)
+            made.append((step, trial, names.index(None if isinstance(added, CoreEffect) else added.name)))
+        return tuple(made)
+
+    def column_of(self, by: Extensions, conditions: Conditions, trace: tuple[Array, list[Array]]) -> Array:
+        """Derivatives (n, k) of the reading with respect to the k strengths of ``by``; ``trace`` is the model's own."""
+        reading, kept = trace
+        out = np.empty((reading.size, len(by)), order="F")
+        for column, (step, trial, first) in enumerate(by):
             out[:, column] = (trial._run(kept[first], conditions, first) - reading) / step
         return out
 
@@ -239,3 +249,6 @@ def derivative_step(parameter: EffectParameter, value: float) -> float:
     else:
         step = DERIVATIVE_STEP * max(parameter.size, abs(value - parameter.null))
     return -step if value + step > parameter.upper else step
+
+
+Extensions = tuple[tuple[float, ExtendedModel, int], ...]

@@ -15,9 +15,9 @@ import pytest
 from balance import Balance
 from hypothesis import given
 from hypothesis import strategies as st
+from smartshoe.diagnosis.judgement import Gain
 
 from smartshoe.diagnosis.integrity import DataFault
-from smartshoe.diagnosis.judgement import Gain
 from smartshoe.diagnosis.result import Cause, Diagnosis, NextExperiment, Rival, Standing, Statement, Trace
 from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.extended import ExtendedModel

@@ -20,6 +20,7 @@ class ContactArea(Effect):
     """
 
     name, family, stage, place = "contact_area", "static_curve", "contact", "contact"
+    is_memoryless = True
     says = "the contact grows with the load: the reading against load is bent, steepest at low loads"
     parameters = (
         EffectParameter("bow", "FS_load", "above the straight line at half of full scale", 0.0, 0.0, 0.26, 0.01),

@@ -129,7 +129,10 @@ class Effect(ABC):
     ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
     ``air``: "stiffens" or "leaves" where the effect is of the air in the tube, so that the wall bears another load.
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
-    ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause.
+    ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause;
+    ``is_refinement`` where it follows members of other families too, and so tells no kind.
+    ``is_memoryless``: True where the reading is a function of the present load alone.
+    ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
     """
 
     name: ClassVar[str]
@@ -150,6 +153,9 @@ class Effect(ABC):
     air: ClassVar[Literal["stiffens", "leaves"] | None] = None
     why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False
+    is_memoryless: ClassVar[bool] = False
+    imitates: ClassVar[str] = ""
+    is_refinement: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
@@ -174,6 +180,14 @@ class Effect(ABC):
         if missing:
             raise UsageError(f"effect {self.name}: shape parameter {missing[0]} has no value")
         return np.array([at[p.name] if p.null is None else p.null for p in self.parameters], dtype=float)
+
+    def begun(self, shape: Mapping[str, float] | None = None) -> Array:
+        """As `start`, with each strength half its typical size away from null, on the side that physics allows."""
+        values = self.start(shape)
+        for k, p in enumerate(self.parameters):
+            if p.null is not None:
+                values[k] = min(max(p.null + (0.5 if p.upper > p.null else -0.5) * p.size, p.lower), p.upper)
+        return values
 
     def is_null(self, values: Array) -> bool:
         """Whether every strength is at its null value."""

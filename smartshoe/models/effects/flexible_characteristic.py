@@ -11,6 +11,7 @@ class FlexibleCharacteristic(Effect):
     """s(p), as `flexible_curve`, of the pressure: the relaxation comes before it."""
 
     name, family, stage, place = "flexible_characteristic", "static_curve", "sensor", "sensor"
+    is_memoryless = True
     says = "the reading bends away from the straight line between zero and full scale, at every rate alike"
     parameters = slope_weights("pressure")
     exposed_by = by("peaks", "low_loads")

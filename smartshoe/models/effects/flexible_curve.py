@@ -15,6 +15,7 @@ class FlexibleCurve(Effect):
     """
 
     name, family, stage, place = "flexible_curve", "static_curve", "wall", "wall"
+    is_memoryless = True
     says = "the reading against load is bent, in a way that relaxes with the wall"
     parameters = slope_weights("load")
     exposed_by = by("peaks", "low_loads")

@@ -51,6 +51,7 @@ class FlexibleLoop(Effect):
     )
     exposed_by = by("rates", "peaks", "minor_loops")
     is_flexible = True
+    is_refinement = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load less friction."""

@@ -31,6 +31,7 @@ class FlexibleRelaxation(CoreEffect):
     )  # fmt: skip
     exposed_by = by("holds", "rates", "rests")
     is_flexible = True
+    is_refinement = True
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """Six arms or heats."""

@@ -26,6 +26,8 @@ class Saturation(Effect):
     """
 
     name, family, stage, place = "saturation", "saturation", "sensor", "logger"
+    is_memoryless = True
+    imitates = "static_curve"  # without ties at a rail it is a curve among curves
     says = "readings flatten near the largest one (or at zero) however the load goes on"
     parameters = (
         EffectParameter("slope_lost", "1", "share of the slope lost above the level", 0.0, 0.0, 1.0, 0.1),

@@ -46,6 +46,7 @@ class SensorNonlinearity(Effect):
     """
 
     name, family, stage, place = "sensor_nonlinearity", "static_curve", "sensor", "sensor"
+    is_memoryless = True
     says = "the reading bends away from the straight line between zero and full scale, at every rate alike"
     parameters = (
         EffectParameter("bow", "FS_reading", "distance from the line at half scale", 0.0, -0.2, 0.2, 0.01),

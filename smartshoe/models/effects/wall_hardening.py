@@ -18,6 +18,7 @@ class WallHardening(Effect):
     """
 
     name, family, stage, place = "wall_hardening", "static_curve", "wall", "wall"
+    is_memoryless = True
     says = (
         "the wall stiffens with deformation: the reading against load is straight at first and flattens at high loads"
     )

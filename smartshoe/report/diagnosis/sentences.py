@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.integrity import DataFault
-from smartshoe.diagnosis.judgement import Gain
 from smartshoe.diagnosis.result import Cause, Diagnosis, Standing
 from smartshoe.models.effects import catalogue, told_apart_by
 from smartshoe.models.effects.exposure import SAYS

@@ -1,0 +1,354 @@
+"""Which effects the data holds: search over a linearised model and fits of the real one, in turn.
+
+What is held out for judging is not looked at here. Validation is within the fitted recordings: each is left out in turn
+(or blocks of its cycles, where there is one), and an effect that makes any of them worse is taken out again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
+from smartshoe.diagnosis.held_out import residual_of
+from smartshoe.diagnosis.likelihood import Fit, Likelihood, fit
+from smartshoe.diagnosis.noise import NoiseModel, white
+from smartshoe.diagnosis.search import additions, allowed, search, step
+from smartshoe.diagnosis.sensitivity import Candidate, Linearised, available, linearised
+from smartshoe.diagnosis.session import CYCLE_SHARE, Session
+from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.loading import turning_points
+from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.effects.effect import CoreEffect
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+ROUNDS = 6
+STEPS_A_ROUND = 6
+STEPS_WITHOUT = 4
+STEPS_A_RATE = 4
+FITTED_RIVALS = 2
+RATES_PER_S = (0.05, 0.3, 2.0)
+CERTAIN = 0.8  # standard errors of a gain over what is left out, by which it must lie above zero
+SHARE = 0.08  # that relaxes, of the units of the paper's Table 1
+FEWEST_INDEPENDENT = 2  # of recordings or cycles: within one, nothing validates anything
+FIRST_NOISE = 1e-3  # of full scale, white, until the columns have told the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another explanation of what one member explains: ``effect``, None for nothing at all.
+
+    ``margin`` is by how much -2 log of its evidence is worse.
+    """
+
+    effect: str | None
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """An effect that was found.
+
+    ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
+    ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
+    ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
+    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
+    """
+
+    effect: Effect
+    size: float
+    departed: float
+    alternatives: tuple[Alternative, ...]
+    without: Fit
+    laws: tuple[Alternative, ...]
+    fall: float
+
+    @property
+    def name(self) -> str:
+        """The effect's identifier."""
+        return self.effect.name
+
+
+@dataclass(frozen=True, eq=False)
+class Inference:
+    """``baseline`` and ``fit``: the plain and the extended model; ``likelihood`` they were fitted by.
+
+    ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score.
+    """
+
+    baseline: Fit
+    fit: Fit
+    likelihood: Likelihood
+    members: tuple[Member, ...]
+    screening: tuple[tuple[str, float], ...]
+    refused: tuple[str, ...] = ()
+    can_validate: bool = True
+
+
+def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> Inference:
+    """The effects in the fitted part of ``sessions``, beside the baseline ``start``."""
+    progress("fitting the baseline")
+    plain = fit(Likelihood(sessions, white(FIRST_NOISE), start, thresholds), start)
+    given, evidence, best = _searched(plain.model, sessions, thresholds)
+    screening = _screening(evidence)
+    state = _settled(_State(given, evidence, best, plain), sessions, thresholds, progress)
+    if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
+        progress("trying other relaxation rates of the baseline")
+        again = _settled(_with_another_pole(state, sessions, thresholds), sessions, thresholds, progress)
+        noise = state.evidence.noise
+        state = min(state, again, key=lambda one: one.total(Likelihood(sessions, noise, plain.model, thresholds)))
+    state = _with_laws(state, sessions, thresholds)
+    given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
+    refused: list[str] = []
+    can_validate = independent(sessions) >= FEWEST_INDEPENDENT
+    if not can_validate:
+        best = evidence.posterior(())
+    while (worst := _worse(evidence, best)) is not None:
+        refused.append(given.candidates[worst].name)
+        best = search(evidence, tuple(m for m in best.members if m != worst), refused)
+    chosen = tuple(sorted(given.candidates[m].name for m in best.members))
+    likelihood = Likelihood(sessions, evidence.noise, extended.model, thresholds)
+    if chosen != tuple(sorted(extended.model.names)):
+        extended = fit(likelihood, _with(given, best, extended.model), STEPS_A_ROUND)
+    baseline = fit(likelihood, plain.model, STEPS_A_ROUND)
+    progress("weighing alternatives")
+    members = _members(evidence, best, refused, likelihood, extended)
+    return Inference(baseline, extended, likelihood, members, screening, tuple(refused), can_validate)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A linearisation about ``fit``, and the best set in it."""
+
+    given: Linearised
+    evidence: Evidence
+    best: Posterior
+    fit: Fit
+
+    @property
+    def improved(self) -> float:
+        """By how much the best set has more evidence than that of the fit."""
+        return self.evidence.posterior(self.start).score - self.best.score
+
+    @property
+    def start(self) -> Members:
+        """The set of the fit."""
+        return tuple(k for k, one in enumerate(self.given.candidates) if one.name in self.fit.model.names)
+
+    @property
+    def bends(self) -> bool:
+        """Whether a new effect is so large that it bends the linearisation."""
+        new = [size for m, size in zip(self.best.members, self.best.sizes, strict=True) if m not in self.start]
+        return max(new, default=0.0) > self.given.thresholds.linear
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """The candidates of the best set."""
+        return tuple(self.given.candidates[m] for m in self.best.members)
+
+    def total(self, likelihood: Likelihood) -> float:
+        """-2 log likelihood of the fit, and of the odds against its members."""
+        return likelihood.cost(self.fit.model) + self.evidence.odds * len(self.fit.model.parts)
+
+
+def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> _State:
+    """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back."""
+    seen: set[tuple[str, ...]] = set()
+    for _ in range(ROUNDS):
+        chosen = tuple(sorted(one.name for one in state.chosen))
+        if chosen in seen or state.improved < state.evidence.odds:
+            break
+        seen.add(chosen)
+        progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
+        likelihood = Likelihood(sessions, state.evidence.noise, state.fit.model, thresholds)
+        found = min(
+            (fit(likelihood, _with(state.given, one, state.fit.model), STEPS_A_ROUND) for one in _promising(state)),
+            key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
+        )
+        state = _State(*_searched(found.model, sessions, thresholds), found)
+    return state
+
+
+def _promising(state: _State) -> list[Posterior]:
+    """The best set; beside it others with one more effect, where the best one is too large for one linearisation.
+
+    A large effect bends the model that its rivals were linearised about, so that fits of the best few decide.
+    """
+    if not state.bends:
+        return [state.best]
+    start = state.start
+    taken = {state.given.candidates[m].slot for m in start}
+    flexible = [
+        k
+        for k, one in enumerate(state.given.candidates)
+        if one.effect.is_flexible and one.effect.is_memoryless and one.slot not in taken
+    ]
+    tried = {*additions(state.evidence, start, FITTED_RIVALS), *flexible}
+    return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
+
+
+def _strengths(model: ExtendedModel) -> int:
+    """How many strengths a model's effects have: parameters that are null where the effect is not there."""
+    return sum(parameter.null is not None for part in model.parts for parameter in part.effect.parameters)
+
+
+def _with_laws(state: _State, sessions: Sequence[Session], thresholds: Thresholds) -> _State:
+    """``state`` with a law in the place of a flexible curve, where one follows nearly as well.
+
+    No law is exact: one that leaves less than the square of the usual departure, of what the flexible curve explains,
+    is the law. A block is bent before a law is, so that only fits of the whole model compare them fairly.
+    """
+    for block in state.chosen:
+        if not (block.effect.is_flexible and block.effect.is_memoryless):
+            continue
+        likelihood = Likelihood(sessions, state.evidence.noise, state.fit.model, thresholds)
+        bare = state.fit.model.without(block.name)
+        for part in bare.parts:
+            if part.effect.is_memoryless:
+                bare = bare.without(part.name)
+        nothing = fit(likelihood, bare, STEPS_A_RATE)
+        flexible = likelihood.cost(state.fit.model)
+        laws = [e for e in catalogue().values() if e.is_memoryless]
+        fits = [fit(likelihood, nothing.model.with_part(law, law.begun(law.shapes[0])), STEPS_A_RATE) for law in laws]
+        best = min(fits, key=lambda one: one.cost)
+        if best.cost - flexible < thresholds.law_departure**2 * max(nothing.cost - flexible, 0.0):
+            state = _State(*_searched(best.model, sessions, thresholds), best)
+    return state
+
+
+def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: Thresholds) -> _State:
+    """The best of fits from several relaxation rates without the effects that add arms to the baseline's.
+
+    An effect that bent the baseline's rate at first leaves the true rate to be found as a second arm.
+    """
+    likelihood = Likelihood(sessions, state.evidence.noise, state.fit.model, thresholds)
+    bare = state.fit.model
+    for part in bare.parts:
+        if isinstance(part.effect, CoreEffect):
+            bare = bare.without(part.name)
+    starts = [replace(bare, relaxation_rate_per_s=rate, relaxing_share=SHARE) for rate in RATES_PER_S]
+    best = min((fit(likelihood, one, STEPS_A_RATE) for one in starts), key=lambda one: one.cost)
+    return _State(*_searched(best.model, sessions, thresholds), best)
+
+
+def independent(sessions: Sequence[Session]) -> int:
+    """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
+    fitted = [session for session in sessions if session.fitted.any()]
+    if len(fitted) > 1:
+        return len(fitted)
+    load = fitted[0].conditions.load
+    points = turning_points(load, CYCLE_SHARE * max(float(np.ptp(load)), 1e-9))
+    return sum(load[b] > load[a] for a, b in pairwise(points))
+
+
+def _searched(
+    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
+) -> tuple[Linearised, Evidence, Posterior]:
+    """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
+    given = linearised(model, sessions, thresholds)
+    evidence = Evidence(given, given.noise())
+    start = tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)
+    first = step(evidence, start)
+    new = [size for m, size in zip(first.members, first.sizes, strict=True) if m not in start]
+    if max(new, default=0.0) > thresholds.linear:
+        return given, evidence, first
+    return given, evidence, search(evidence, first.members)
+
+
+def _screening(evidence: Evidence) -> tuple[tuple[str, float], ...]:
+    nothing = evidence.posterior(()).score
+    found = [
+        (evidence.given.candidates[k].name, nothing - evidence.posterior((k,)).score)
+        for k in additions(evidence, (), breadth=10)
+    ]
+    return tuple(sorted(found, key=lambda one: -one[1]))
+
+
+def _with(given: Linearised, found: Posterior, model: ExtendedModel) -> ExtendedModel:
+    """``model`` with exactly the effects that were found; new ones at their linear estimates."""
+    names = {given.candidates[m].name for m in found.members}
+    for part in model.parts:
+        if part.name not in names:
+            model = model.without(part.name)
+    for member, strengths in zip(found.members, found.strengths, strict=True):
+        one = given.candidates[member]
+        if one.name not in model.names:
+            model = model.with_part(one.effect, one.start(strengths / given.scales[list(one.columns)]))
+    return model
+
+
+def _worse(evidence: Evidence, best: Posterior) -> int | None:
+    """The member without which data that is left out is followed better; None where there is none.
+
+    Each recording in turn (each block of a single one) is predicted from the others, with and without the member; its
+    gain over them must lie above zero by most of a standard error.
+    """
+    whole = evidence.left_out_errors(best.members)
+    worst: tuple[float, int] | None = None
+    for member in best.members:
+        gains = evidence.left_out_errors(tuple(m for m in best.members if m != member)) - whole
+        sure = float(gains.mean()) - CERTAIN * float(np.std(gains, ddof=1)) / np.sqrt(gains.size)
+        if sure < 0.0 and (worst is None or sure < worst[0]):
+            worst = sure, member
+    return worst[1] if worst else None
+
+
+def _members(
+    evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
+) -> tuple[Member, ...]:
+    made = []
+    for member, departed in zip(best.members, best.departed, strict=True):
+        one = evidence.given.candidates[member]
+        less = fit(likelihood, extended.model.without(one.name), STEPS_WITHOUT)
+        size = apart(likelihood.sessions, less.model, extended.model)
+        others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
+        near = alternatives(evidence, best, member, refused)
+        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
+    return tuple(sorted(made, key=lambda one: -one.size))
+
+
+def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:
+    """The other laws of a member's family, each fitted in its place, nearest first."""
+    channels = {e.name for e in available(likelihood.sessions)}
+    found = []
+    for law in catalogue().values():
+        if law.family != one.effect.family or law.name == one.name or law.name not in channels:
+            continue
+        starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
+        best = min(starts, key=likelihood.cost)
+        found.append(Alternative(law.name, fit(likelihood, best, STEPS_WITHOUT).cost - extended.cost))
+    return tuple(sorted(found, key=lambda a: a.margin))
+
+
+def apart(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
+    """Rms of the difference of two models' readings over what is fitted, each recording's own offset aside."""
+    square, count = 0.0, 0
+    for session in sessions:
+        difference = (residual_of(session, first) - residual_of(session, second))[session.fitted]
+        square += float(difference @ difference)
+        count += difference.size
+    return float(np.sqrt(square / max(count, 1)))
+
+
+def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:
+    """What could stand in a member's place: every other effect at its best shape, and nothing."""
+    less = tuple(m for m in best.members if m != member)
+    found = [Alternative(None, evidence.posterior(less).score - best.score)]
+    for k in additions(evidence, less, 10, refused):
+        one = evidence.given.candidates[k]
+        if one.name == evidence.given.candidates[member].name or one.effect.is_flexible:
+            continue
+        other = evidence.posterior((*less, k))
+        if allowed(evidence, other):
+            found.append(Alternative(one.name, other.score - best.score))
+    return tuple(sorted(found, key=lambda one: one.margin))
+
+
+__all__ = ["Alternative", "Candidate", "Inference", "Member", "NoiseModel", "infer"]

@@ -1,0 +1,113 @@
+"""Every number that a diagnosis decides by, in one record: unit, meaning and origin beside each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+
+def threshold(value: Any, unit: str, meaning: str, origin: str) -> Any:
+    """A field of `Thresholds` with its documentation."""
+    return field(default=value, metadata={"unit": unit, "meaning": meaning, "origin": origin})
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """What a diagnosis decides by. Carried in the result and printed in the page; `described` lists it."""
+
+    material: float = threshold(
+        2e-4, "share of full scale", "what moves the reading by less counts for nothing", "contract, section 4"
+    )
+    departure: float = threshold(
+        0.25,
+        "share of an effect's size",
+        "standard deviation by which a real law departs from an equation of its kind",
+        "second laboratory and own truths: 0.05 to 0.4",
+    )
+    strength_sd: float = threshold(
+        0.03, "share of full scale", "prior standard deviation of an effect that is there", "effects.md: 0.1 to 10 %"
+    )
+    false_name: float = threshold(0.02, "probability", "of an effect where there is none", "issue: floor of 2 %")
+    structure_as_noise: float = threshold(
+        0.1, "share of variance", "of what no column reaches, taken for white", "diagnosis.md, first lesson"
+    )
+    unknown_past: float = threshold(
+        0.05, "share of full scale", "load that an arm may remember at the start of a recording", "judgement"
+    )
+    foreign_zero: float = threshold(
+        0.3,
+        "share of full scale",
+        "a reading at no load beyond it is a convention of the sensor's, no offset",
+        "judgement",
+    )
+    zero_sd: float = threshold(
+        4e-4, "share of full scale", "how well a recording's rest is known to be zero", "load cells: 0.02 % of rating"
+    )
+    zero_deviations: float = threshold(4.0, "standard deviations", "from which an offset is named", "one in 16,000")
+    linear: float = threshold(
+        0.01, "share of full scale", "an effect up to which one linearisation serves for all", "squares: 1e-4"
+    )
+    timing_resolution: float = threshold(
+        0.25, "sample intervals", "a latency shorter than this lies within what a time stamp says", "uniform: sd 0.29"
+    )
+    tolerable: float = threshold(
+        1e-3,
+        "share of full scale",
+        "structure that small imperfections of a good unit add up to",
+        "effects below 0.1 %",
+    )
+    law_departure: float = threshold(
+        0.4, "share of an effect's size", "a departure from which on the law is unsure", "effects.md: 5 to 40 %"
+    )
+    evidence_temperature: float = threshold(
+        4.0, "1", "by which evidence at a high sampling rate is overstated", "fitted on the bank"
+    )
+    equivalent_odds: float = threshold(
+        0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
+    )
+    kind_odds: tuple[float, ...] = threshold(
+        (2.14, -0.82, -0.46, 0.25),
+        "log odds",
+        "of a kind: intercept; per log of what is left over its size, of departure, of log of its part in the largest",
+        "logistic regression on the bank",
+    )
+    least_confidence: float = threshold(
+        0.7, "probability", "of the kind; below it no cause is named", "twice as likely right as wrong"
+    )
+    seen_confidence: float = threshold(0.97, "probability", "of a zero or tare seen at rest", "bank")
+    still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
+    memory_s: tuple[float, ...] = threshold(
+        (0.3, 3.0, 30.0), "s", "time constants by which a law may follow otherwise", "one a decade of the protocols"
+    )
+    # What an experiment can show at all.
+    false_alarm: float = threshold(
+        1e-4,
+        "probability",
+        "that one test finds a fault in a sound recording",
+        "ten tests, a thousand recordings",
+    )
+    faulty_share: float = threshold(
+        0.05, "share of samples", "more of them are how a logger works and no fault", "5 %, as convention has it"
+    )
+    least_samples: int = threshold(100, "samples", "fewer tell nothing", "quantiles of 5 % rest on five samples")
+    follows: float = threshold(
+        0.3, "share of variance", "of a reading that its load must explain", "measured sensors: 0.33 and more"
+    )
+    clear: float = threshold(2.0, "ratio", "between two sizes that differ for certain", "judgement")
+    same: float = threshold(0.25, "share", "by which two rates, peaks or gains of one kind may differ", "judgement")
+    standing: float = threshold(
+        0.02, "share of the span", "within which a load, or a reading that is lost, stands still", "judgement"
+    )
+    echo_s: float = threshold(0.1, "s", "within which a reading answers a corner of its load", "slowest sensor known")
+    sensor_lag_s: float = threshold(
+        0.2, "s", "a shorter lag may be the sensor's own, a longer one is of two clocks", "twice the echo"
+    )
+    local: int = threshold(64, "samples", "over which a local scale is taken", "a median to 15 %")
+    bins: int = threshold(4000, "bins", "to which long recordings are thinned where lags are looked for", "speed")
+    hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
+    idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
+
+
+def described(given: Thresholds) -> list[dict[str, Any]]:
+    """Name, value, unit, meaning and origin of each."""
+    return [{"name": f.name, "value": getattr(given, f.name), **f.metadata} for f in fields(given)]

@@ -1,0 +1,189 @@
+"""The evidence for a set of effects, its slow twin, and what a diagnosis must not depend on."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from smartshoe import Recording, diagnose, dynamic_protocol
+from smartshoe.diagnosis import Diagnosis, Thresholds
+from smartshoe.diagnosis.baseline import baseline_of
+from smartshoe.diagnosis.evidence import OWN_SD, Evidence
+from smartshoe.diagnosis.noise import white
+from smartshoe.diagnosis.sensitivity import Linearised, linearised, nuisance_precision, nuisances
+from smartshoe.diagnosis.session import full_scale, prepare
+from smartshoe.diagnosis.thresholds import described
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+RATE_HZ = 25.0
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
+
+
+def recording(
+    model: ExtendedModel = MODEL, seed: int = 0, noise: float = 0.001, repeats: int = 2, unit: str = "mbar"
+) -> Recording:
+    """What a model itself would read under triangles at three rates; for arithmetic, not for hidden effects."""
+    protocol = dynamic_protocol((100, 300, 800), repeats=repeats, rest_s=4.0)
+    time_s = np.arange(0.0, protocol.duration_s, 1 / RATE_HZ)
+    load_n = protocol.load_at(time_s)
+    conditions = Conditions(time_s, load_n / model.full_scale_load_n, 1 / RATE_HZ)
+    share = model.simulate(conditions) + noise * np.random.default_rng(seed).standard_normal(time_s.size)
+    return Recording.from_arrays(
+        time_s=time_s, force_n=load_n, **{f"pressure_{unit}": share * model.full_scale_reading}, name=f"run_{seed}"
+    )
+
+
+def with_reading(given: Recording, change: float = 1.0, offset: float = 0.0) -> Recording:
+    return Recording.from_arrays(
+        time_s=given.time_s, force_n=given.force_n, pressure_v=change * given.sensor.values + offset, name=given.name
+    )
+
+
+@pytest.fixture(scope="module")
+def small() -> Linearised:
+    pair = [recording(MODEL.with_part(effect("gas_compression"), np.array([0.05])), seed) for seed in range(2)]
+    usable = [one.sensor.present for one in pair]
+    scale = full_scale(pair, usable)
+    sessions = prepare(pair, usable, [False, False], scale, 8)
+    return linearised(baseline_of(sessions, scale), sessions, Thresholds())
+
+
+# -- evidence -------------------------------------------------------------------------------------------------
+def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float:
+    """-2 log density of the target under the explicit covariance, and the odds: the slow twin, equations exact."""
+    limits = given.thresholds
+    blocks, targets = [], []
+    offset_sd = 1e3
+    for k, (session, rows) in enumerate(zip(given.sessions, given.rows, strict=True)):
+        past = np.zeros((rows.shape[0], 2 * len(given.sessions)))
+        own = nuisances(session, given.model.relaxation_rate_per_s)
+        precision = nuisance_precision(session, given.model, limits)
+        past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
+        prior = np.full(rows.shape[1] - 1, limits.material)
+        prior[: given.own] = OWN_SD
+        for member in members:
+            prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
+        kept = white(sd).counted(session.fitted)
+        blocks.append(np.column_stack([rows[:, 1:] * prior, past])[kept])
+        targets.append(rows[kept, 0])
+    z, y = np.concatenate(blocks), np.concatenate(targets)
+    covariance = z @ z.T + sd**2 * np.eye(y.size)
+    _, log_determinant = np.linalg.slogdet(covariance)
+    return float(y @ np.linalg.solve(covariance, y) + log_determinant)
+
+
+def test_the_evidence_is_the_gaussian_density_of_the_explicit_covariance(small: Linearised) -> None:
+    sd = 0.002
+    evidence = Evidence(small, white(sd))
+    sets = [(k,) for k in (0, 5, 11, 30)]
+    slow = [plain_score(small, sd, members) for members in [(), *sets]]
+    fast = [evidence.exact(members).score - evidence.odds_of(members) for members in [(), *sets]]
+    # Both are known up to one constant.
+    assert_allclose(np.diff(fast), np.diff(slow), rtol=1e-4, atol=0.05)
+
+
+def test_every_extension_is_the_score_of_the_extended_set(small: Linearised) -> None:
+    evidence = Evidence(small, white(0.002))
+    for score, k, strengths in evidence.extensions(()):
+        exact = evidence.exact((k,))
+        assert score == pytest.approx(exact.score, abs=1e-3)
+        assert_allclose(strengths, exact.strengths[0], rtol=1e-3, atol=1e-9)
+
+
+def test_a_departure_never_makes_the_right_law_much_less_likely(small: Linearised) -> None:
+    evidence = Evidence(small, white(0.002))
+    (right,) = (k for k, one in enumerate(small.candidates) if one.name == "gas_compression")
+    others = [k for k, one in enumerate(small.candidates) if one.effect.family != "static_curve"]
+    best = evidence.posterior((right,)).score
+    assert all(evidence.posterior((k,)).score > best for k in others[::9])
+
+
+# -- what a diagnosis must not depend on ------------------------------------------------------------------------
+STRONG = MODEL.with_part(effect("gas_compression"), np.array([0.12]))
+
+
+def told(found: Diagnosis) -> list[tuple[str, float]]:
+    return [(one.name, round(one.confidence, 2)) for one in found.causes]
+
+
+@pytest.fixture(scope="module")
+def plain() -> tuple[list[Recording], Diagnosis]:
+    runs = [recording(STRONG, seed) for seed in range(3)]
+    runs = [with_reading(one) for one in runs]
+    return runs, diagnose(runs[:2], hold_out=[runs[2]])
+
+
+def test_a_curve_is_found_and_gains_on_data_not_fitted(plain: tuple[list[Recording], Diagnosis]) -> None:
+    _, found = plain
+    assert found.causes
+    assert found.causes[0].effect.family == "static_curve"
+    assert found.causes[0].held_out.ci95[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "offsets"), [(1.0, (3.0, -40.0, 500.0)), (-1.0, (0.0, 0.0, 0.0)), (1e-3, (0.0, 0.0, 0.0))]
+)
+def test_offset_sign_and_unit_of_a_reading_change_no_cause(
+    plain: tuple[list[Recording], Diagnosis], change: float, offsets: tuple[float, float, float]
+) -> None:
+    runs, found = plain
+    other = [with_reading(one, change, offset) for one, offset in zip(runs, offsets, strict=True)]
+    again = diagnose(other[:2], hold_out=[other[2]])
+    assert [one.name for one in again.causes] == [one.name for one in found.causes]
+    assert again.causes[0].held_out.gain_percent == pytest.approx(found.causes[0].held_out.gain_percent, abs=2.0)
+
+
+def test_what_is_held_out_selects_nothing(plain: tuple[list[Recording], Diagnosis]) -> None:
+    runs, found = plain
+    nonsense = with_reading(runs[2], 0.5, 7.0)
+    again = diagnose(runs[:2], hold_out=[nonsense])
+    assert found.model is not None
+    assert again.model is not None
+    assert_allclose(again.model.theta, found.model.theta, rtol=1e-9, atol=1e-12)
+    assert [one.name for one in again.causes] == [one.name for one in found.causes]
+    assert again.causes[0].held_out.rmse_after != found.causes[0].held_out.rmse_after
+
+
+def test_nothing_is_named_where_nothing_is_wrong() -> None:
+    runs = [recording(MODEL, seed) for seed in range(3)]
+    found = diagnose(runs[:2], hold_out=[runs[2]])
+    assert not found.causes
+    assert found.verdict == "adequate"
+
+
+def test_one_load_cycle_claims_nothing_and_says_so() -> None:
+    protocol = dynamic_protocol((100,), repeats=1, rest_s=4.0)
+    time_s = np.arange(0.0, protocol.duration_s, 1 / 50.0)
+    load_n = protocol.load_at(time_s)
+    reading = STRONG.simulate(Conditions(time_s, load_n / 800.0, 1 / 50.0)) * 140.0
+    reading += 0.1 * np.random.default_rng(0).standard_normal(time_s.size)
+    one = Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name="once")
+    found = diagnose([one], hold_out=[recording(STRONG, 1)])
+    assert not found.causes
+    assert any("one load cycle" in said for said in found.limits)
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------
+def test_every_number_says_its_unit_its_meaning_and_its_origin() -> None:
+    listed = described(Thresholds())
+    assert len(listed) == len(fields(Thresholds)) < 40
+    for one in listed:
+        assert one["unit"]
+        assert one["meaning"]
+        assert one["origin"]
+
+
+@given(st.floats(1e-5, 1e-2))
+@settings(max_examples=3, deadline=None)
+def test_material_reaches_the_result(material: float) -> None:
+    found = diagnose([recording()], material=material)
+    assert found.thresholds == replace(Thresholds(), material=material)
