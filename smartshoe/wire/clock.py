@@ -38,6 +38,7 @@ BIN_S = 0.25
 KEPT_BINS = 2400  # ten minutes
 FEW_BINS = 8
 CRYSTALS_SD = 100e-6  # what skews are before anything is known
+NORMAL_95 = 1.96
 TUKEY = 4.685  # Huber 1981: 95 % of least squares' efficiency under normal noise
 SWITCH_GAIN = 0.7
 ALIKE = 0.5  # how the levels' errors correlate: 0.1 to 0.8 under the laws of tests/wire
@@ -245,4 +246,7 @@ def _line(time_s: Array, delay_s: Array) -> _Line:
     rest = delay_s - offset - slope * (time_s - about)
     inside = np.abs(rest) < TUKEY * scatter
     scatter = max(scatter, float(np.sqrt(np.mean(rest[inside] ** 2))) if inside.any() else 0.0)
+    # Few bins tell their own scatter badly: Student's quantile over the normal one, to first order (95 %).
+    free = max(total - 2.0, 1.0)
+    scatter *= math.sqrt(max(total, 1.0) / free) * (1.0 + (NORMAL_95**2 + 1.0) / (4.0 * free))
     return _Line(about, offset, scatter / math.sqrt(max(total, 1.0)), slope, scatter / math.sqrt(spread))
