@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     "diagnose",
     epilog="Example: smartshoe diagnose left_toe_1.csv left_toe_2.csv --hold-out left_toe_3.csv --out out/left_toe",
 )
-@click.argument("files", nargs=-1, required=True)
+@click.argument("files", nargs=-1)
 @click.option(
     "--hold-out",
     "held_out",
@@ -34,6 +34,12 @@ if TYPE_CHECKING:
     show_default=True,
     metavar="PERCENT",
     help="Of full scale: what is smaller does not count.",
+)
+@click.option(
+    "--design",
+    "design_path",
+    metavar="SCENARIO.toml",
+    help="Before measuring: which effects the scenario's protocols show and tell apart (no FILE).",
 )
 @click.option("--json", "json_path", metavar="PATH", help="Write the diagnosis as JSON (- for stdout).")
 @click.option("--out", "out_folder", metavar="DIR", help="Write diagnosis.html, diagnosis.json and the next protocol.")
@@ -51,6 +57,7 @@ def command(
     json_path: str | None,
     out_folder: str | None,
     calibration_path: str | None,
+    design_path: str | None,
     unit: str | None,
     **columns: Any,
 ) -> None:
@@ -58,8 +65,15 @@ def command(
     from smartshoe.atomic import make_folder
     from smartshoe.cli.output import emit_json, progress
     from smartshoe.diagnosis import diagnose
-    from smartshoe.errors import NotIdentifiableError
+    from smartshoe.errors import NotIdentifiableError, UsageError
 
+    if design_path is not None:
+        if files or held_out:
+            raise UsageError("--design asks about protocols, before anything is measured: name no FILE beside it")
+        _design(design_path, json_path)
+        return
+    if not files:
+        raise UsageError("diagnose needs a FILE: name one experiment at least, or ask --design SCENARIO.toml")
     _check(files, held_out, material)
     recordings = read_all(files, unit=unit, **columns)
     others = read_all(held_out, unit=unit, **columns) if held_out else []
@@ -90,6 +104,17 @@ def command(
         click.echo(f"{name}: {path}")
     if calibration_path is not None:
         click.echo(f"calibration: {calibration_path}")
+
+
+def _design(path: str, json_path: str | None) -> None:
+    from smartshoe.cli.output import emit_json
+    from smartshoe.diagnosis.design import design
+    from smartshoe.report.diagnosis.terminal import print_design
+    from smartshoe.scenario import load, protocols_of
+
+    found = design(tuple(protocols_of(*load(path)).values()))
+    if not emit_json(found.to_dict(), json_path):
+        print_design(found)
 
 
 def _check(files: tuple[str, ...], held_out: tuple[str, ...], material: float) -> None:

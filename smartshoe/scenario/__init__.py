@@ -1,6 +1,14 @@
 """Scenarios: a TOML file that says which devices, protocols and steps; read, checked and run."""
 
-from smartshoe.scenario.run import ScenarioResult, UnitResult, check_simulated, run, simulate, simulate_trial
+from smartshoe.scenario.run import (
+    ScenarioResult,
+    UnitResult,
+    check_simulated,
+    protocols_of,
+    run,
+    simulate,
+    simulate_trial,
+)
 from smartshoe.scenario.schema import Scenario, checked, load, read_tables
 
 __all__ = [
@@ -10,6 +18,7 @@ __all__ = [
     "check_simulated",
     "checked",
     "load",
+    "protocols_of",
     "read_tables",
     "run",
     "simulate",

@@ -97,7 +97,8 @@ def _seed_of(scenario: Scenario, name: str) -> int:
     return int(np.random.SeedSequence([scenario.seed, zlib.crc32(name.encode())]).generate_state(1)[0])
 
 
-def _protocols(scenario: Scenario, source: Source) -> dict[str, Protocol]:
+def protocols_of(scenario: Scenario, source: Source) -> dict[str, Protocol]:
+    """The scenario's protocols by name; raises `ScenarioError` for one that exceeds its limits."""
     built: dict[str, Protocol] = {}
     for name, table in scenario.protocol.items():
         try:
@@ -161,7 +162,7 @@ def check_simulated(scenario: Scenario, source: Source) -> None:
     So a misspelt option is told before the first experiment. Devices that are not simulated are left alone. Raises
     `ScenarioError`, which points into the scenario.
     """
-    protocols = _protocols(scenario, source)
+    protocols = protocols_of(scenario, source)
     if scenario.machine.backend.startswith("sim:"):
         for index, unit in enumerate(scenario.unit):
             if not unit.recordings:
@@ -182,7 +183,7 @@ def _beside(source: Source, options: dict[str, Any]) -> dict[str, Any]:
 
 def simulate(scenario: Scenario, source: Source, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:
     """Only the devices: recordings by unit and experiment."""
-    protocols = _protocols(scenario, source)
+    protocols = protocols_of(scenario, source)
     return {
         unit.name: _record(scenario, source, index, protocols, progress) for index, unit in enumerate(scenario.unit)
     }

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from smartshoe.diagnosis.design import Design
 from smartshoe.diagnosis.result import Cause, Diagnosis
 from smartshoe.report.diagnosis.sentences import (
     HEADINGS,
@@ -58,6 +60,19 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     _several(console, "limits of this data", diagnosis.limits)
     if diagnosis.next_experiment is not None:
         _several(console, "what to do next", [diagnosis.next_experiment.says])
+
+
+def print_design(design: Design) -> None:
+    """Which effects protocols show and tell apart, before anything is measured."""
+    console = new_console()
+    table = _wrapping(
+        f"what these protocols tell of an effect of {100 * design.strength:g} % of full scale",
+        ["effect", "shows from (% of full scale)", "cannot be told from"],
+    )
+    for name, least in zip(design.names, design.least, strict=True):
+        shows = f"{100 * least:.2g}" if math.isfinite(least) else "never"
+        table.add_row(words(name), shows, listed(design.cannot_be_told(name)) or "–")
+    console.print(table)
 
 
 def _causes(console: Console, diagnosis: Diagnosis) -> None:

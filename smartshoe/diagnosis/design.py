@@ -1,0 +1,168 @@
+"""What a protocol can tell, before anything is measured: which effects it shows, and which it tells apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.blas import on_one_thread
+from smartshoe.diagnosis.noise import white
+from smartshoe.diagnosis.sensitivity import Linearised, linearised
+from smartshoe.diagnosis.session import Scale, prepare, thinning
+from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.errors import UsageError
+from smartshoe.models.effects import Conditions
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.protocol import Protocol
+from smartshoe.recording import Recording
+from smartshoe.units import MILLIBAR
+
+Array = NDArray[np.float64]
+
+UNIT = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four (Table 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What a protocol can tell.
+
+    ``least`` (n,): size from which on each of the effects ``names`` shows, rms share of full scale of all it does to
+    the reading, infinite where the baseline follows it whole. ``unlike`` (n, n): the share of an effect's evidence that
+    another one in its place cannot follow. ``evidence``: -2 log of an effect that leaves ``strength`` (rms share of
+    full scale) beyond what the baseline follows, for which `cannot_be_told` answers.
+    """
+
+    names: tuple[str, ...]
+    least: Array
+    unlike: Array
+    strength: float
+    evidence: float
+    thresholds: Thresholds
+
+    def cannot_be_told(self, name: str) -> tuple[str, ...]:
+        """The effects that this protocol would not tell from ``name``, most alike first.
+
+        Another law that lacks a share u of an effect's evidence is as good as it where u is within the square of a
+        law's usual departure, or the evidence within one look at noise.
+        """
+        k = self.names.index(name)
+        limits = self.thresholds
+        unit = 2.0 * (limits.evidence_temperature + limits.law_departure**2 * self.evidence)
+        alike = np.exp(-self.unlike[k] * self.evidence / unit)
+        order = np.argsort(-alike, kind="stable")
+        return tuple(self.names[j] for j in order if j != k and alike[j] > limits.equivalent_odds)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema ``smartshoe.design/1``."""
+        return {
+            "schema": "smartshoe.design/1",
+            "strength_percent_of_full_scale": 100.0 * self.strength,
+            "effects": [
+                {
+                    "effect": name,
+                    "least_percent_of_full_scale": 100.0 * float(least) if np.isfinite(least) else None,
+                    "cannot_be_told_from": list(self.cannot_be_told(name)),
+                }
+                for name, least in zip(self.names, self.least, strict=True)
+            ],
+            "pairs": [
+                {"effects": [a, b], "unlike": float(self.unlike[i, j])}
+                for i, a in enumerate(self.names)
+                for j, b in enumerate(self.names)
+                if i != j
+            ],
+        }
+
+
+@on_one_thread
+def design(
+    protocols: Sequence[Protocol],
+    *,
+    noise_percent: float = 0.1,
+    strength_percent: float = 0.3,
+    sample_rate_hz: float = 100.0,
+    unit: ExtendedModel = UNIT,
+    thresholds: Thresholds | None = None,
+) -> Design:
+    """Which effects the protocols, run once each, would show and tell apart.
+
+    Parameters
+    ----------
+    protocols
+        What the machine would run; each is a recording of its own.
+    noise_percent
+        Standard deviation of the reading's white noise, percent of full scale.
+    strength_percent
+        The strength that is asked about: rms percent of full scale beyond what the baseline follows.
+    sample_rate_hz
+        Of the log.
+    unit
+        A unit like the one to be measured.
+
+    Raises
+    ------
+    UsageError
+        Without a protocol, and for numbers that are not positive.
+    """
+    if not protocols:
+        raise UsageError("a design needs a protocol: give one at least")
+    given = {"noise_percent": noise_percent, "strength_percent": strength_percent, "sample_rate_hz": sample_rate_hz}
+    for name, value in given.items():
+        if not (np.isfinite(value) and value > 0):
+            raise UsageError(f"{name} is {value:g}: give a positive number")
+    limits = thresholds or Thresholds()
+    peak_n = max(protocol.peak_load_n for protocol in protocols)
+    recordings = [_commanded(protocol, unit, peak_n, sample_rate_hz) for protocol in protocols]
+    scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
+    usable = [np.ones(len(one), dtype=bool) for one in recordings]
+    factor = thinning(recordings, scale)
+    sessions = prepare(recordings, usable, [False] * len(recordings), scale, factor)
+    columns = linearised(unit, sessions, limits)
+    # The mean of neighbours that thinning takes has less noise than a sample.
+    sd = 0.01 * noise_percent / math.sqrt(max(factor, 1))
+    return _compared(columns, sd, 0.01 * strength_percent, limits)
+
+
+def _commanded(protocol: Protocol, unit: ExtendedModel, peak_n: float, sample_rate_hz: float) -> Recording:
+    time_s = np.arange(0.0, protocol.duration_s, 1.0 / sample_rate_hz)
+    load_n = protocol.load_at(time_s)
+    reading = unit.reading(Conditions(time_s, load_n / peak_n, 1.0 / sample_rate_hz))
+    return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name=protocol.name)
+
+
+def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:
+    gram = columns.gram(white(sd)).whole[1:, 1:]
+    own = np.arange(columns.own)
+    left = gram - gram[:, own] @ np.linalg.pinv(gram[np.ix_(own, own)], rcond=1e-10, hermitian=True) @ gram[own]
+    laws = [one for one in columns.candidates if not one.effect.is_flexible]
+    names = tuple(dict.fromkeys(one.name for one in laws))
+    count = sum(int(session.fitted.sum()) for session in columns.sessions)
+    shown = 2.0 * math.log(len(names) / limits.false_name)  # the prior odds against an effect
+    least, unlike = np.full(len(names), np.inf), np.ones((len(names), len(names)))
+    of = {name: [[c - 1 for c in one.columns] for one in laws if one.name == name] for name in names}
+    for i, name in enumerate(names):
+        at = max(of[name], key=lambda shape: left[shape[0], shape[0]])
+        x = left[at[0], at[0]]
+        if x <= 1e-9 * gram[at[0], at[0]]:
+            unlike[i] = 0.0
+            continue
+        # Of what the baseline does not follow it must also be material.
+        least[i] = max(math.sqrt(shown / x), limits.material / (sd * math.sqrt(x / count)))
+        for j, other in enumerate(names):
+            if j == i:
+                unlike[i, j] = 0.0
+                continue
+            unlike[i, j] = min(_not_followed(left, at[0], shape, x) for shape in of[other])
+    return Design(names, least, unlike, strength, count * (strength / sd) ** 2, limits)
+
+
+def _not_followed(left: Array, target: int, shape: Sequence[int], power: float) -> float:
+    """Share of a column's square that the columns ``shape`` leave."""
+    inner = left[np.ix_(shape, shape)]
+    found = np.linalg.pinv(inner, rcond=1e-9, hermitian=True) @ left[shape, target]
+    return float(np.clip(1.0 - found @ left[shape, target] / power, 0.0, 1.0))
