@@ -7,6 +7,7 @@ sentence (`smartshoe.errors`).
 from smartshoe.gate.files import read_bytes, read_text, require_regular_file
 from smartshoe.gate.limits import Limits, limits, raise_limits
 from smartshoe.gate.names import inside, require_file_name
+from smartshoe.gate.objects import parsed_json
 from smartshoe.gate.readers import foreign_code, require_columns, require_values
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "foreign_code",
     "inside",
     "limits",
+    "parsed_json",
     "raise_limits",
     "read_bytes",
     "read_text",

@@ -33,7 +33,7 @@ class Limits:
     segments: int = 100_000
 
 
-FREELY_UNPACKED = 64 << 20
+FREELY_UNPACKED = 32 << 20
 _raised: list[str] = []
 
 

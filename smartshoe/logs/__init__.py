@@ -2,38 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import importlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from smartshoe.atomic import replacing
 from smartshoe.errors import FormatError, InputError, UsageError
-from smartshoe.gate import require_regular_file
-from smartshoe.logs.sheet import Format
+from smartshoe.gate import foreign_code, require_regular_file
+from smartshoe.logs.formats import formats
+from smartshoe.logs.sheet import Column, Format, Sheet, require_sound
 from smartshoe.recording import Recording
 
-# The order in which formats are asked: those with an unmistakable beginning first, any delimited text last.
-_MODULES = (
-    "tdms",
-    "xdf",
-    "labview",
-    "matlab",
-    "hdf5",
-    "parquet",
-    "loadsol",
-    "opengo",
-    "opensim",
-    "plain",
-    "bluehill",
-    "foreign",
-)
 _HEAD_BYTES = 1 << 16
-
-
-def _formats() -> Iterator[Format]:
-    for module in _MODULES:
-        yield importlib.import_module(f"smartshoe.logs.{module}").FORMAT
 
 
 def _head(path: Path) -> bytes:
@@ -53,21 +32,29 @@ def detect(path: Path | str) -> Format:
     format fits."""
     path = Path(path)
     head = _head(path)
-    for format_ in _formats():
+    for format_ in formats():
         if format_.sniff(path, head):
             return format_
-    for format_ in _formats():
+    for format_ in formats():
         # A text suffix on a file that is no text says nothing; others give a reader that can name the fault.
-        if path.suffix.casefold() in format_.suffixes and format_.name not in (
-            "plain",
-            "bluehill",
-            "foreign",
-        ):
+        if path.suffix.casefold() in format_.suffixes and not format_.is_text:
             return format_
     raise FormatError(
-        f"{path} is binary and in no known format: give a plain table, Bluehill CSV, LabVIEW .lvm, NI .tdms,"
-        " MATLAB .mat, HDF5, Parquet or delimited text file"
+        f"{path} is binary and in no known format: give a {', '.join(format_.title for format_ in formats())}"
     )
+
+
+def read_sheet(path: Path | str) -> Sheet:
+    """The columns of any readable file as they stand in it; raises `InputError` and its kin.
+
+    The one place where a format's reader runs, ours or another's: whatever goes wrong in it is told in one sentence.
+    """
+    path = Path(path)
+    format_ = detect(path)
+    with foreign_code(path, format_.title, "export it again"):
+        sheet = format_.read(path)
+    require_sound(sheet)
+    return sheet
 
 
 def read(
@@ -91,11 +78,7 @@ def read(
     """
     from smartshoe.logs.columns import recording_from
 
-    path = Path(path)
-    try:
-        sheet = detect(path).read(path)
-    except csv.Error as error:
-        raise FormatError(f"{path} is no table of numbers ({error}): export it again") from error
+    sheet = read_sheet(path)
     chosen = (sensors,) if isinstance(sensors, str) else tuple(sensors)
     return recording_from(sheet, time=time, force=force, sensors=chosen, unit=unit, name=name, partly=partly)
 
@@ -106,19 +89,14 @@ def write(recording: Recording, path: Path | str) -> None:
     ``.csv`` and ``.txt`` are the plain table. Raises `UsageError` for a suffix that no writable format has.
     """
     path = Path(path)
-    suffixes: list[str] = []
-    for module in ("plain", *(name for name in _MODULES if name != "plain")):
-        format_: Format = importlib.import_module(f"smartshoe.logs.{module}").FORMAT
-        if format_.write is None:
-            continue
-        suffixes += format_.suffixes
-        if path.suffix.casefold() in format_.suffixes:
+    writable = [format_ for format_ in formats() if format_.write is not None]
+    for format_ in writable:
+        if format_.write is not None and path.suffix.casefold() in format_.suffixes:
             with replacing(path) as temporary:
                 format_.write(recording, temporary)
             return
-    raise UsageError(
-        f"{path} has no suffix of a writable format: end it in one of {', '.join(dict.fromkeys(suffixes))}"
-    )
+    suffixes = [suffix for format_ in writable for suffix in format_.suffixes]
+    raise UsageError(f"{path} has no suffix of a writable format: end it in one of {', '.join(suffixes)}")
 
 
-__all__ = ["detect", "read", "write"]
+__all__ = ["Column", "Format", "Sheet", "detect", "read", "read_sheet", "write"]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from smartshoe.errors import FormatError, InputError
 from smartshoe.logs import detect, read
-from smartshoe.logs import plain as table
 from smartshoe.logs.columns import recording_from
+from smartshoe.logs.formats import plain as table
 from smartshoe.logs.numbers import numbers_of
 from smartshoe.logs.picks import unit_in_file
 from smartshoe.logs.sheet import Column, Sheet

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +128,97 @@ def _channel(sheet: Sheet, name: str, column: Column, unit_: Unit, role: Role, n
     return channel
 
 
+@dataclass(eq=False)
+class _Assignment:
+    """Which column is what: ``units`` and ``roles`` by column, ``chosen`` those that the user named."""
+
+    sheet: Sheet
+    units: list[Unit | None]
+    roles: list[Role | None]
+    notes: list[str]
+    chosen: set[int] = field(default_factory=set)
+
+    def choose_load(self, force: str) -> None:
+        """The reference load is the column that the user names."""
+        found = pick(self.sheet, force, "--force")
+        in_unit = need_unit(self.sheet, found, "--force", "N")
+        if in_unit.quantity == "pressure":
+            name = self.sheet.columns[found.index].name
+            self.notes.append(f"Column {name} is a pressure: as the load it is taken for the force on 1 cm².")
+            found = Pick(found.index, on_one_cm2(in_unit))
+        self.units[found.index] = need_quantity(self.sheet, found, "--force", "force", "N")
+        self._take(found.index, "load")
+
+    def choose_sensors(self, sensors: Sequence[str], at_time: int | None) -> None:
+        """The readings are the columns that the user names, and no others."""
+        self.roles = [None if role == "sensor" else role for role in self.roles]
+        for choice in sensors:
+            found = pick(self.sheet, choice, "--sensor")
+            if found.index in self.chosen or found.index == at_time:
+                name = self.sheet.columns[found.index].name
+                raise InputError(f"{self.sheet.path}: column {name!r} is chosen twice: choose another for --sensor")
+            self.units[found.index] = need_unit(self.sheet, found, "--sensor", "mbar")
+            self.roles[found.index] = "sensor"
+            self.chosen.add(found.index)
+
+    def _take(self, index: int, role: Role) -> None:
+        self.roles = [None if each == role else each for each in self.roles]
+        self.roles[index] = role
+        self.chosen.add(index)
+
+    def tell_the_rest(self, columns: Sequence[int], *, sensors_chosen: bool) -> None:
+        """Roles of the columns that nobody named, by their own names and units."""
+        free = [index for index in columns if index not in self.chosen]
+        guessed = roles_of([self.sheet.columns[i].name for i in free], [self.units[i] for i in free])
+        for index, role in zip(free, guessed, strict=True):
+            taken = (role == "load" and "load" in self.roles) or (role == "sensor" and sensors_chosen)
+            self.roles[index] = self.roles[index] or ("auxiliary" if taken else role)
+
+    def names(self, columns: Sequence[int]) -> list[str]:
+        """The channels' names: the plain table's for load, command and reading, unless the file's own hold."""
+        sheet = self.sheet
+        names = [sheet.columns[index].name for index in columns]
+        units = [self.units[index] or declared("") for index in columns]
+        roles: list[Role] = [self.roles[index] or "auxiliary" for index in columns]
+        if sheet.format == "bluehill":
+            lengths = [at for at, unit_ in enumerate(units) if unit_.quantity == "length"]
+            if lengths and roles[lengths[0]] == "auxiliary" and "displacement" not in names:
+                names[lengths[0]] = "displacement"
+        # A plain table's names are the user's own, and so are those in a file that stores roles.
+        told = [
+            index not in self.chosen and (sheet.format == "plain" or sheet.columns[index].role is not None)
+            for index in columns
+        ]
+        _rename(names, roles, units, told, sheet.has_header)
+        return _unique(names)
+
+    def channels(self, columns: Sequence[int], names: Sequence[str]) -> dict[str, Channel]:
+        """The channels by name; a load that a machine logged negative is turned."""
+        channels: dict[str, Channel] = {}
+        for index, name in zip(columns, names, strict=True):
+            column = self.sheet.columns[index]
+            unit_, role = self.units[index] or declared(""), self.roles[index] or "auxiliary"
+            channel = _channel(self.sheet, name, column, unit_, role, self.notes)
+            if channel is None:
+                continue
+            if channel.role == "load" and column.role is None and self.sheet.format in _MACHINE_LOGS:
+                turned = _compression_positive(channel)
+                if turned is not channel:
+                    self.notes.append(f"Column {column.name} logs compression as negative load; its sign was turned.")
+                    channel = turned
+            channels[channel.name] = channel
+        return channels
+
+
+def _without_first_row(sheet: Sheet) -> Sheet:
+    return replace(
+        sheet,
+        columns=[replace(column, values=column.values[1:]) for column in sheet.columns],
+        first_line=None if sheet.first_line is None else sheet.first_line + 1,
+        lines=None if sheet.lines is None else sheet.lines[1:],
+    )
+
+
 def recording_from(
     sheet: Sheet,
     *,
@@ -145,81 +236,27 @@ def recording_from(
     """
     if not sheet.columns or sheet.columns[0].values.size == 0:
         raise InputError(f"{sheet.path} holds no samples below its header: give a file with data rows")
-    units: list[Unit | None] = [unit_in_file(column) for column in sheet.columns]
-    roles: list[Role | None] = [column.role for column in sheet.columns]
-    notes = list(sheet.notes)
-
-    if time is not None and partly and not names_a_column(sheet, time):
-        time = None
+    sensors_chosen = bool(sensors)
+    if partly:
+        time, force = (choice if choice and names_a_column(sheet, choice) else None for choice in (time, force))
+        sensors = [choice for choice in sensors if names_a_column(sheet, choice)]
+    units = [unit_in_file(column) for column in sheet.columns]
     at_time, time_s = time_of(sheet, units, time)
 
-    chosen: set[int] = set()
-    if force is not None and not (partly and not names_a_column(sheet, force)):
-        found = pick(sheet, force, "--force")
-        in_unit = need_unit(sheet, found, "--force", "N")
-        if in_unit.quantity == "pressure":
-            name_ = sheet.columns[found.index].name
-            notes.append(f"Column {name_} is a pressure: as the load it is taken for the force on 1 cm².")
-            found = Pick(found.index, on_one_cm2(in_unit))
-        units[found.index] = need_quantity(sheet, found, "--force", "force", "N")
-        roles = [None if role == "load" else role for role in roles]
-        roles[found.index] = "load"
-        chosen.add(found.index)
-    named = [choice for choice in sensors if not (partly and not names_a_column(sheet, choice))]
-    if named:
-        roles = [None if role == "sensor" else role for role in roles]
-    for choice in named:
-        found = pick(sheet, choice, "--sensor")
-        if found.index in chosen or found.index == at_time:
-            name_ = sheet.columns[found.index].name
-            raise InputError(f"{sheet.path}: column {name_!r} is chosen twice: choose another for --sensor")
-        units[found.index], roles[found.index] = need_unit(sheet, found, "--sensor", "mbar"), "sensor"
-        chosen.add(found.index)
-
-    columns = [i for i in range(len(sheet.columns)) if i != at_time]
-    free = [i for i in columns if i not in chosen]
-    guessed = roles_of([sheet.columns[i].name for i in free], [units[i] for i in free])
-    for index, role in zip(free, guessed, strict=True):
-        taken = (role == "load" and "load" in roles) or (role == "sensor" and bool(sensors))
-        roles[index] = roles[index] or ("auxiliary" if taken else role)
-
-    names = [sheet.columns[i].name for i in columns]
-    final_units = [units[i] or declared("") for i in columns]
-    final_roles: list[Role] = [roles[i] or "auxiliary" for i in columns]
-    if sheet.format == "bluehill":
-        lengths = [i for i, u in enumerate(final_units) if u.quantity == "length"]
-        if lengths and final_roles[lengths[0]] == "auxiliary" and "displacement" not in names:
-            names[lengths[0]] = "displacement"
-    # A plain table's names are the user's own, and so are those in a file that stores roles.
-    told = [i not in chosen and (sheet.format == "plain" or sheet.columns[i].role is not None) for i in columns]
-    _rename(names, final_roles, final_units, told, sheet.has_header)
-    _unique(names)
-
-    keep = slice(None)
+    notes = list(sheet.notes)
     if sheet.format == "bluehill" and time_s.size > 2 and time_s[0] == time_s[1]:
         notes.append(f"The first row, a second one at t = {time_s[0]:g} s, was dropped.")
-        keep = slice(1, None)
-        sheet = replace(
-            sheet,
-            first_line=None if sheet.first_line is None else sheet.first_line + 1,
-            lines=None if sheet.lines is None else sheet.lines[1:],
-        )
-    time_s = time_s[keep]
+        sheet, time_s = _without_first_row(sheet), time_s[1:]
     check_increasing(sheet, time_s)
 
-    channels: dict[str, Channel] = {}
-    for position, index in enumerate(columns):
-        column = sheet.columns[index]
-        column = replace(column, values=column.values[keep])
-        channel = _channel(sheet, names[position], column, final_units[position], final_roles[position], notes)
-        if channel is None:
-            continue
-        if channel.role == "load" and column.role is None and sheet.format in _MACHINE_LOGS:
-            turned = _compression_positive(channel)
-            if turned is not channel:
-                notes.append(f"Column {column.name} logs compression as negative load; its sign was turned.")
-                channel = turned
-        channels[channel.name] = channel
+    assigned = _Assignment(sheet, units, [column.role for column in sheet.columns], notes)
+    if force is not None:
+        assigned.choose_load(force)
+    if sensors:
+        assigned.choose_sensors(sensors, at_time)
+    columns = [index for index in range(len(sheet.columns)) if index != at_time]
+    assigned.tell_the_rest(columns, sensors_chosen=sensors_chosen)
+    channels = assigned.channels(columns, assigned.names(columns))
     return Recording(
         time_s,
         channels,

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.errors import FormatError, InputError
+from smartshoe.gate import require_columns, require_values
 from smartshoe.recording import Recording, Role
 
 Array = NDArray[np.float64]
+
+LARGEST = 1e30  # in any unit: beyond it are broken files, and numbers that overflow when they are squared twice
 
 
 @dataclass(eq=False)
@@ -63,12 +68,50 @@ class Sheet:
 class Format:
     """A file format: how it is recognised, read and written.
 
-    ``sniff(path, head)`` says whether the first bytes ``head`` are of this format; ``read`` raises `FormatError`
-    or `InputError` with file and line; ``write`` is None where the format is read only.
+    ``title`` is what a person calls it ("NI TDMS file"). ``sniff(path, head)`` says whether the first bytes ``head``
+    are of this format; ``read`` gives the `Sheet`, and whatever it raises is told in one sentence (`FormatError` and
+    `InputError` in its own words); ``write`` is None where the format is read only. Formats are ``asked`` in that
+    order: 0 has an unmistakable beginning, 9 takes any text. ``is_text`` says that a binary file is none of it.
     """
 
     name: str
+    title: str
     suffixes: tuple[str, ...]
     sniff: Callable[[Path, bytes], bool]
     read: Callable[[Path], Sheet]
     write: Callable[[Recording, Path], None] | None = None
+    asked: int = 0
+    is_text: bool = False
+
+
+def require_sound(sheet: Sheet) -> None:
+    """Raise `FormatError` or `InputError` where a reader's sheet is not what `Sheet` promises.
+
+    A file may store anything where names, units, roles and numbers belong, and a reader may come from elsewhere.
+    """
+    require_columns(sheet.path, len(sheet.columns))
+    require_values(sheet.path, sum(np.size(column.values) for column in sheet.columns))
+    texts: list[Any] = [*sheet.metadata, *sheet.metadata.values(), *sheet.notes]
+    texts += [text for text in (sheet.recording_name, sheet.unit_name) if text is not None]
+    for column in sheet.columns:
+        texts += [column.name, column.unit, column.label]
+        values: Any = column.values
+        if not isinstance(values, np.ndarray) or values.dtype != np.float64 or values.ndim != 1:
+            raise FormatError(f"{sheet.path}: column {column.name!r} is no row of numbers: write the file again")
+        if values.size != sheet.columns[0].values.size:
+            raise FormatError(
+                f"{sheet.path}: column {column.name!r} has {values.size} samples, the first one"
+                f" {sheet.columns[0].values.size}: write the file again"
+            )
+        if column.role is not None and column.role not in get_args(Role):
+            raise FormatError(f"{sheet.path}: column {column.name!r} has the role {column.role!r}: write it again")
+        impossible = np.abs(values) > LARGEST
+        if impossible.any() and np.isfinite(values[impossible]).any():
+            row = int(np.argmax(impossible & np.isfinite(values)))
+            raise InputError(
+                f"{sheet.place(row)}: {values[row]:g} in column {column.name!r} is no measurement: correct the cell,"
+                " or leave it empty where the sample is missing"
+            )
+    if not all(isinstance(text, str) for text in texts):
+        wrong = next(text for text in texts if not isinstance(text, str))
+        raise FormatError(f"{sheet.path} holds {wrong!r} where a text belongs: write the file again")

@@ -14,7 +14,7 @@ from smartshoe.devices.checks import DeviceContractError, check_machine, check_s
 from smartshoe.devices.replay import ReplayedShoe
 from smartshoe.errors import DeviceError, LimitError, UsageError
 from smartshoe.logs import write
-from smartshoe.logs.bluehill import write_bluehill
+from smartshoe.logs.formats.bluehill import write_bluehill
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Recording
 

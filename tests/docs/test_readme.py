@@ -53,7 +53,7 @@ def test_the_tour_on_a_real_file(tour: list[str], measured: Path) -> None:
 def test_the_tour_on_a_pair_of_logs(tour: list[str]) -> None:
     from smartshoe.devices import open_machine
     from smartshoe.logs import write
-    from smartshoe.logs.bluehill import write_bluehill
+    from smartshoe.logs.formats.bluehill import write_bluehill
     from smartshoe.protocol import dynamic_protocol
 
     with open_machine("sim:instron", unit="left_toe", seed=5) as machine:

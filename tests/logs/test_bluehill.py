@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import smartshoe
 from smartshoe.errors import FormatError, InputError
-from smartshoe.logs.bluehill import write_bluehill
+from smartshoe.logs.formats.bluehill import write_bluehill
 from smartshoe.recording import Recording
 
 FILES = Path(__file__).parent / "files"

@@ -14,7 +14,7 @@ from smartshoe.errors import FormatError, InputError, MissingChannelError, Usage
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import unit
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-1e30, 1e30)  # beyond it a number is no measurement and is refused
 texts = st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), max_size=12)
 keys = texts.filter(lambda key: key not in ("name", "unit", "note") and not key.startswith("role "))
 names = st.text(string.ascii_lowercase, min_size=1, max_size=6)

@@ -17,7 +17,7 @@ from smartshoe.cli import run_command
 from smartshoe.devices.replay import ReplayedShoe
 from smartshoe.errors import DeviceTimeoutError, InputError, UsageError
 from smartshoe.logs import write
-from smartshoe.logs.bluehill import write_bluehill
+from smartshoe.logs.formats.bluehill import write_bluehill
 from smartshoe.protocol import Protocol, dynamic_protocol
 from smartshoe.recording import Recording
 from smartshoe.session import SessionFolder, conduct, machine_run

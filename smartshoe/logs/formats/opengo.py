@@ -43,4 +43,4 @@ def read(path: Path) -> Sheet:
     return Sheet(path, "opengo", columns, metadata, first_line=at + 2)
 
 
-FORMAT = Format("opengo", (), _sniff, read)
+FORMAT = Format("opengo", "OpenGo export", (), _sniff, read, is_text=True)

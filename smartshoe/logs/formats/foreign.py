@@ -162,4 +162,6 @@ def read(path: Path) -> Sheet:
     )
 
 
-FORMAT = Format("foreign", (".csv", ".txt", ".tsv", ".dat", ".mot", ".forces"), sniff, read, None)
+FORMAT = Format(
+    "foreign", "delimited text", (".csv", ".txt", ".tsv", ".dat", ".mot", ".forces"), sniff, read, asked=9, is_text=True
+)

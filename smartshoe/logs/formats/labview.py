@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import cast, get_args
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smartshoe.errors import FormatError
+from smartshoe.gate import require_columns
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, Role
+
+Array = NDArray[np.float64]
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -68,124 +73,171 @@ def _spread(cells: list[str], channels: int, multi: bool) -> list[str]:
     return [cells[k * 2 if multi else k] if (k * 2 if multi else k) < len(cells) else "" for k in range(channels)]
 
 
+@dataclass(frozen=True)
+class _Layout:
+    """How the file says that its cells are to be read; ``width`` cells make a row of ``channels`` signals."""
+
+    path: Path
+    separator: str
+    x_columns: str
+    decimal: str | None
+
+    @property
+    def is_multi(self) -> bool:
+        return self.x_columns == "multi"
+
+    def width(self, channels: int) -> int:
+        return 2 * channels if self.is_multi else channels + 1
+
+    def signals(self, channels: int) -> list[int]:
+        """The cells of a row that are signals; the others are times."""
+        return [(2 * k + 1 if self.is_multi else k + 1) for k in range(channels)]
+
+
 def read(path: Path) -> Sheet:
     """One segment (or several with the same channels, one after the other) as columns, time first.
 
     Raises `FormatError` with the line for a truncated header, marks that are mixed or cells that are no numbers.
     """
     lines = _text(path).splitlines()
-    general: dict[str, str] = {}
-    at = 0
-    while at < len(lines) and not lines[at].startswith(_END):
-        cells = lines[at].rstrip("\t").split("\t" if "\t" in lines[at] else ",")
-        if len(cells) > 1:
-            general[cells[0]] = cells[1]
-        at += 1
-    if at == len(lines):
-        raise FormatError(f"{path}, line {len(lines)}: the header has no end: export the file again")
+    general, at = _general_header(path, lines)
     separator = _SEPARATORS.get(general.get("Separator", "Tab").casefold(), "\t")
-    x_columns = general.get("X_Columns", "One").casefold()
+    layout = _Layout(path, separator, general.get("X_Columns", "One").casefold(), general.get("Decimal_Separator"))
     sheet = Sheet(path, "labview", [], {key: value for key, value in general.items() if key not in _LAYOUT})
-    at += 1
     segments: list[list[Column]] = []
-    while True:
-        while at < len(lines) and not lines[at].strip():
-            at += 1
-        if at >= len(lines):
-            break
-        columns, at = _segment(path, lines, at, separator, x_columns, general.get("Decimal_Separator"), sheet)
+    while (at := _next_filled(lines, at)) < len(lines):
+        columns, at = _segment(layout, lines, at, sheet)
         segments.append(columns)
     if not segments:
         raise FormatError(f"{path} has a header and no data: export the file again")
-    names = [column.name for column in segments[0]]
-    if any([column.name for column in columns] != names for columns in segments[1:]):
-        raise FormatError(
-            f"{path} holds {len(segments)} segments with different channels: save them as files of their own"
-        )
-    sheet.columns = segments[0]
-    if len(segments) > 1:
-        sheet.notes.append(f"{len(segments)} segments were put one after the other")
-        for position, column in enumerate(sheet.columns):
-            column.values = np.concatenate([columns[position].values for columns in segments])
+    sheet.columns = _one_after_the_other(path, segments, sheet.notes)
     sheet.recording_name = sheet.metadata.pop("smartshoe_name", None)
     sheet.unit_name = sheet.metadata.pop("smartshoe_unit", None)
     roles = sheet.metadata.pop("smartshoe_roles", "").split()
     for column, role in zip(sheet.columns[1:], roles, strict=False):
-        if role not in get_args(Role):
-            raise FormatError(f"{path}: smartshoe_roles names {role!r}: write the file again")
         column.role = cast(Role, role)
     return sheet
 
 
-def _segment(
-    path: Path, lines: list[str], at: int, separator: str, x_columns: str, declared: str | None, sheet: Sheet
-) -> tuple[list[Column], int]:
-    header: dict[str, list[str]] = {}
-    while at < len(lines) and not lines[at].startswith(_END):
-        cells = lines[at].split(separator)
-        header[cells[0]] = [cell.strip() for cell in cells[1:]]
+def _general_header(path: Path, lines: list[str]) -> tuple[dict[str, str], int]:
+    """What the file says of all segments, and the index of the line below it."""
+    general: dict[str, str] = {}
+    for at, line in enumerate(lines):
+        if line.startswith(_END):
+            return general, at + 1
+        cells = line.rstrip("\t").split("\t" if "\t" in line else ",")
+        if len(cells) > 1:
+            general[cells[0]] = cells[1]
+    raise FormatError(f"{path}, line {len(lines)}: the header has no end: export the file again")
+
+
+def _next_filled(lines: list[str], at: int) -> int:
+    while at < len(lines) and not lines[at].strip():
         at += 1
-    if at >= len(lines) - 1:
-        raise FormatError(f"{path}, line {len(lines)}: the segment's header has no data below it: export again")
+    return at
+
+
+def _one_after_the_other(path: Path, segments: list[list[Column]], notes: list[str]) -> list[Column]:
+    first = segments[0]
+    if len(segments) == 1:
+        return first
+    names = [column.name for column in first]
+    if any([column.name for column in columns] != names for columns in segments[1:]):
+        raise FormatError(
+            f"{path} holds {len(segments)} segments with different channels: save them as files of their own"
+        )
+    notes.append(f"{len(segments)} segments were put one after the other")
+    for position, column in enumerate(first):
+        column.values = np.concatenate([columns[position].values for columns in segments])
+    return first
+
+
+def _segment(layout: _Layout, lines: list[str], at: int, sheet: Sheet) -> tuple[list[Column], int]:
+    """The columns of the segment whose header begins at line index ``at``, and the index below it."""
+    path = layout.path
+    header, at = _segment_header(layout, lines, at)
     try:
         channels = int(header["Channels"][0])
     except (KeyError, IndexError, ValueError):
         raise FormatError(f"{path}, line {at + 1}: the segment does not say how many channels it has") from None
-    titles = [cell.strip() for cell in lines[at + 1].rstrip("\r").split(separator)]
+    titles = [cell.strip() for cell in lines[at + 1].rstrip("\r").split(layout.separator)]
     if titles and titles[-1] == "Comment":
         titles = titles[:-1]
-    multi = x_columns == "multi"
-    width = 2 * channels if multi else channels + 1
+    width = layout.width(channels)
     if len(titles) != width:
         raise FormatError(f"{path}, line {at + 2}: {len(titles)} column names where {width} belong: export again")
-    at += 2
-    sheet.first_line = sheet.first_line or at + 1
-    rows: list[tuple[int, list[str]]] = []
-    comments: list[str] = []
-    while at < len(lines) and lines[at].strip():
-        cells = lines[at].split(separator)
-        if cells[0] in header or cells[0] == "Channels":
-            break
-        if len(cells) > width and cells[width].strip():
-            comments.append(f"line {at + 1}: {cells[width].strip()}")
-        rows.append((at + 1, (cells + [""] * width)[:width]))
-        at += 1
+    require_columns(path, width)
+    sheet.first_line = sheet.first_line or at + 3
+    rows, comments, at = _rows(layout, lines, at + 2, width, header)
     if comments:
         shown = "; ".join(comments[:20]) + (f"; and {len(comments) - 20} more" if len(comments) > 20 else "")
         sheet.metadata["comments"] = shown
     for key in ("Notes", "Date", "Time"):
         if header.get(key):
             sheet.metadata.setdefault(f"segment_{key.lower()}", header[key][0])
-    mark = _decimal_mark(path, declared, rows, width)
-    table = {
-        column: np.array([_number(cells[column], mark, path, line, titles[column]) for line, cells in rows])
+    mark = _decimal_mark(path, layout.decimal, rows, width)
+    table = [
+        np.array([_number(cells[column], mark, path, line, titles[column]) for line, cells in rows])
         for column in range(width)
-    }
-    units = _spread(header.get("Y_Unit_Label", []), channels, multi)
-    signals = [(2 * k + 1 if multi else k + 1) for k in range(channels)]
-    if x_columns == "no":
-        start = _spread(header.get("X0", []), channels, multi)
-        step = _spread(header.get("Delta_X", []), channels, multi)
+    ]
+    columns = [Column("time", "s", _times(layout, header, table, channels))]
+    dropped: list[str] = []
+    units = _spread(header.get("Y_Unit_Label", []), channels, layout.is_multi)
+    for position, unit in zip(layout.signals(channels), units, strict=True):
+        values = table[position]
+        if values.size and np.isnan(values).all():
+            dropped.append(titles[position])
+        else:
+            columns.append(Column(titles[position], unit, values))
+    if dropped:
+        sheet.notes.append(f"channels without samples were left out: {', '.join(dropped)}")
+    return columns, at
+
+
+def _segment_header(layout: _Layout, lines: list[str], at: int) -> tuple[dict[str, list[str]], int]:
+    """A segment's header by key, and the index of its last line."""
+    header: dict[str, list[str]] = {}
+    while at < len(lines) and not lines[at].startswith(_END):
+        cells = lines[at].split(layout.separator)
+        header[cells[0]] = [cell.strip() for cell in cells[1:]]
+        at += 1
+    if at >= len(lines) - 1:
+        raise FormatError(f"{layout.path}, line {len(lines)}: the segment's header has no data below it: export again")
+    return header, at
+
+
+def _rows(
+    layout: _Layout, lines: list[str], at: int, width: int, header: dict[str, list[str]]
+) -> tuple[list[tuple[int, list[str]]], list[str], int]:
+    """The rows (line, cells) up to the next segment or blank line, what the Comment column says, the index below."""
+    rows: list[tuple[int, list[str]]] = []
+    comments: list[str] = []
+    while at < len(lines) and lines[at].strip():
+        cells = lines[at].split(layout.separator)
+        if cells[0] in header or cells[0] == "Channels":
+            break
+        if len(cells) > width and cells[width].strip():
+            comments.append(f"line {at + 1}: {cells[width].strip()}")
+        rows.append((at + 1, (cells + [""] * width)[:width]))
+        at += 1
+    return rows, comments, at
+
+
+def _times(layout: _Layout, header: dict[str, list[str]], table: list[Array], channels: int) -> Array:
+    """The segment's time (n,) in s: its X column, or the start and step that its header gives."""
+    path = layout.path
+    if layout.x_columns == "no":
+        start = _spread(header.get("X0", []), channels, layout.is_multi)
+        step = _spread(header.get("Delta_X", []), channels, layout.is_multi)
         timing = {(_cell(a, path), _cell(b, path)) for a, b in zip(start, step, strict=True) if b}
         if len(timing) != 1:
             raise FormatError(f"{path}: channels have {len(timing)} sample times; export them at one rate")
         x0, dx = timing.pop()
-        time_s = np.asarray(x0 + dx * np.arange(len(rows)), dtype=float)
-    else:
-        time_s = table[0]
-        if multi and any(not np.array_equal(table[2 * k], time_s, equal_nan=True) for k in range(1, channels)):
-            raise FormatError(f"{path}: the channels' X columns differ: export them with X_Columns One")
-    columns = [Column("time", "s", time_s)]
-    dropped: list[str] = []
-    for position, unit in zip(signals, units, strict=True):
-        values = table[position]
-        if values.size and np.isnan(values).all():
-            dropped.append(titles[position])
-            continue
-        columns.append(Column(titles[position], unit, values))
-    if dropped:
-        sheet.notes.append(f"channels without samples were left out: {', '.join(dropped)}")
-    return columns, at
+        return np.asarray(x0 + dx * np.arange(table[0].size), dtype=float)
+    time_s = table[0]
+    if layout.is_multi and any(not np.array_equal(table[2 * k], time_s, equal_nan=True) for k in range(1, channels)):
+        raise FormatError(f"{path}: the channels' X columns differ: export them with X_Columns One")
+    return time_s
 
 
 def _cell(text: str, path: Path) -> float:
@@ -240,4 +292,4 @@ def write(recording: Recording, path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-FORMAT = Format("labview", (".lvm",), _sniff, read, write)
+FORMAT = Format("labview", "LabVIEW .lvm file", (".lvm",), _sniff, read, write)

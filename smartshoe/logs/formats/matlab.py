@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from smartshoe.errors import FormatError
-from smartshoe.gate import foreign_code
-from smartshoe.logs.hdf5_objects import opened, vectors
+from smartshoe.gate import parsed_json
+from smartshoe.logs.formats._hdf5_objects import opened, vectors
+from smartshoe.logs.formats._mat5 import require_bounded
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, column_name, split_column
 
@@ -56,8 +57,8 @@ def _load(path: Path) -> dict[str, Any]:
 
     if _is_hdf5(path):
         return _load_hdf5(path)
-    with foreign_code(path, "MAT-file", "save it again"):
-        return {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
+    require_bounded(path)
+    return {k: v for k, v in loadmat(path).items() if not k.startswith("__")}
 
 
 def _load_hdf5(path: Path) -> dict[str, Any]:
@@ -78,41 +79,51 @@ def read(path: Path) -> Sheet:
     loaded = _load(path)
     about = loaded.pop("smartshoe", None)
     arrays = [pair for name, value in loaded.items() for pair in _flatten(name, value)]
-    vectors = [(name, values) for name, values in arrays if values.size > 1 or about is not None]
-    if not vectors:
+    vectors_ = [(name, values) for name, values in arrays if values.size > 1 or about is not None]
+    if not vectors_:
         raise FormatError(f"{path} holds no vectors of numbers: save one variable a channel")
-    counts = Counter(values.size for _, values in vectors)
+    counts = Counter(values.size for _, values in vectors_)
     shared = [size for size, count in counts.items() if count > 1]
     length = max(shared or counts)
     sheet = Sheet(path, "matlab", [])
-    left_out = [name for name, values in vectors if values.size != length]
+    left_out = [name for name, values in vectors_ if values.size != length]
     if left_out:
         shown = ", ".join(left_out[:8]) + (", ..." if len(left_out) > 8 else "")
         sheet.notes.append(f"variables of another length than {length} were left out: {shown}")
-    roles: dict[str, Any] = {}
+    of_one_length = [(name, values) for name, values in vectors_ if values.size == length]
     if about is not None:
-        try:
-            own = json.loads(str(np.asarray(about).item()))
-            sheet.recording_name, sheet.unit_name = own["name"], own["unit"]
-            sheet.metadata.update(own["metadata"])
-            roles = own["columns"]
-        except (ValueError, KeyError, TypeError) as error:
-            raise FormatError(f"{path}: variable 'smartshoe' is damaged ({error}): save the file again") from error
-    if about is None and not any(name.rsplit(".", 1)[-1].casefold() in ("t", "time", "time_s") for name, _ in vectors):
-        scalars = {name.casefold(): float(values[0]) for name, values in arrays if values.size == 1}
-        step = scalars.get("ts") or (1.0 / scalars["fs"] if scalars.get("fs") else None)
-        if step is not None and step > 0:
-            sheet.columns.append(Column("time", "s", np.asarray(step * np.arange(length), dtype=float)))
-    for name, values in vectors:
-        if values.size != length:
-            continue
-        if name in roles:
-            said = roles[name]
-            sheet.columns.append(Column(said["name"], said["unit"], values, said["role"]))
-        else:
-            plain, unit = split_column(name)
-            sheet.columns.append(Column(plain, unit.symbol, values) if unit else Column(name, "", values))
+        sheet.columns = _own_columns(sheet, about, of_one_length)
+    else:
+        sheet.columns = [*_sampled(arrays, length), *(_column(name, values) for name, values in of_one_length)]
     return sheet
+
+
+def _own_columns(sheet: Sheet, about: Any, vectors_: list[tuple[str, np.ndarray]]) -> list[Column]:
+    """The columns as `write` described them; what is damaged there raises whatever it raises."""
+    own = parsed_json(str(np.asarray(about).item()))
+    sheet.recording_name, sheet.unit_name = own["name"], own["unit"]
+    sheet.metadata.update(own["metadata"])
+    columns = []
+    for name, values in vectors_:
+        said = own["columns"].get(name)
+        columns.append(Column(said["name"], said["unit"], values, said["role"]) if said else _column(name, values))
+    return columns
+
+
+def _column(name: str, values: np.ndarray) -> Column:
+    plain, unit = split_column(name)
+    return Column(plain, unit.symbol, values) if unit else Column(name, "", values)
+
+
+def _sampled(arrays: list[tuple[str, np.ndarray]], length: int) -> list[Column]:
+    """A time column from the scalars Ts or fs, where no vector is the time."""
+    if any(name.rsplit(".", 1)[-1].casefold() in ("t", "time", "time_s") for name, values in arrays if values.size > 1):
+        return []
+    scalars = {name.casefold(): float(values[0]) for name, values in arrays if values.size == 1}
+    step = scalars.get("ts") or (1.0 / scalars["fs"] if scalars.get("fs") else None)
+    if step is None or not step > 0:
+        return []
+    return [Column("time", "s", np.asarray(step * np.arange(length), dtype=float))]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -138,4 +149,4 @@ def write(recording: Recording, path: Path) -> None:
         savemat(file, variables, do_compression=True)  # type: ignore[arg-type]  # any binary file will do
 
 
-FORMAT = Format("matlab", (".mat",), _sniff, read, write)
+FORMAT = Format("matlab", "MATLAB MAT-file", (".mat",), _sniff, read, write)

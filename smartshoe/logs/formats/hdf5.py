@@ -5,16 +5,19 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
 from smartshoe.errors import FormatError
-from smartshoe.logs.hdf5_objects import opened, vectors
+from smartshoe.gate import parsed_json
+from smartshoe.logs.formats._hdf5_objects import opened, vectors
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _OWN = "smartshoe.recording/1"
+_LONGEST_TEXT = 10_000  # of an attribute that others wrote
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -39,20 +42,27 @@ def read(path: Path) -> Sheet:
         sheet.notes.append(f"variables of another length were left out: {', '.join(left_out)}")
     for name, values, about in found:
         if values.size == length:
-            role = about.get("role")
-            sheet.columns.append(
-                Column(name, str(about.get("units", "")), values.astype(float), None if role is None else str(role))  # type: ignore[arg-type]
-            )
-    sheet.columns.sort(key=lambda column: column.name != "time")
-    if str(attributes.pop("schema", "")) == _OWN:
-        sheet.recording_name = str(attributes["name"])
-        sheet.unit_name = str(attributes["unit"]) if "unit" in attributes else None
-        sheet.metadata.update(json.loads(str(attributes["metadata"])))
-        order = json.loads(str(attributes["channels"]))
-        sheet.columns.sort(key=lambda column: -1 if column.name == "time" else order.index(column.name))
+            role = _text(about["role"]) if "role" in about else None
+            sheet.columns.append(Column(name, _text(about.get("units", "")), values.astype(float), cast(Any, role)))
+    if _text(attributes.pop("schema", "")) == _OWN:
+        sheet.recording_name = _text(attributes["name"])
+        sheet.unit_name = _text(attributes["unit"]) if "unit" in attributes else None
+        sheet.metadata.update(parsed_json(_text(attributes["metadata"])))
+        order = {name: at for at, name in enumerate(parsed_json(_text(attributes["channels"])))}
+        sheet.columns.sort(key=lambda column: order.get(column.name, len(order)))
     else:
-        sheet.metadata.update({key: str(value) for key, value in attributes.items()})
+        sheet.metadata.update({key: _text(value)[:_LONGEST_TEXT] for key, value in attributes.items()})
+    sheet.columns.sort(key=lambda column: column.name != "time")
     return sheet
+
+
+def _text(value: Any) -> str:
+    """An attribute as text: one of bytes or of one element too, as other writers store it."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(-1)[0]
+    if isinstance(value, bytes):
+        return value.decode("utf-8", errors="replace")
+    return str(value)
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -80,4 +90,4 @@ def write(recording: Recording, path: Path) -> None:
     path.write_bytes(content.getbuffer())
 
 
-FORMAT = Format("hdf5", (".h5", ".hdf5", ".nc"), _sniff, read, write)
+FORMAT = Format("hdf5", "HDF5 file", (".h5", ".hdf5", ".nc"), _sniff, read, write)

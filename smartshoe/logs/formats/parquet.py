@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from smartshoe.errors import FormatError, UsageError
+from smartshoe.gate import parsed_json, require_columns, require_values
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, column_name, split_column
 
@@ -34,11 +35,11 @@ def _library(path: Path) -> Any:
 def read(path: Path) -> Sheet:
     """Every numeric column; units from the names (``force_n``) where the file is not our own."""
     arrow = _library(path)
-    try:
-        table = arrow.parquet.read_table(path)
-    except (arrow.ArrowException, OSError) as error:
-        says = " ".join(str(error).split())[:120]
-        raise FormatError(f"{path} is no whole Parquet file ({says}): write it again") from error
+    declared = arrow.parquet.read_metadata(path)
+    require_columns(path, declared.num_columns)
+    require_values(path, declared.num_rows * declared.num_columns, path.stat().st_size)
+    with path.open("rb") as file:
+        table = arrow.parquet.ParquetFile(file).read()
     sheet = Sheet(path, "parquet", [])
     numeric = [f.name for f in table.schema if arrow.types.is_floating(f.type) or arrow.types.is_integer(f.type)]
     if not numeric:
@@ -65,7 +66,7 @@ def read(path: Path) -> Sheet:
 
 def _described(path: Path, about: bytes) -> dict[str, Any]:
     try:
-        found = json.loads(about)
+        found = parsed_json(about)
         if found["schema"].encode() != _OWN:
             raise ValueError(found["schema"])
         return {key: found[key] for key in ("name", "unit", "metadata", "channels")}
@@ -93,4 +94,4 @@ def write(recording: Recording, path: Path) -> None:
     arrow.parquet.write_table(table, path)
 
 
-FORMAT = Format("parquet", (".parquet",), _sniff, read, write)
+FORMAT = Format("parquet", "Parquet file", (".parquet",), _sniff, read, write)

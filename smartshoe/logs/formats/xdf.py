@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +25,7 @@ def read(path: Path) -> Sheet:
         import pyxdf
     except ImportError as error:
         raise InputError(f"{path} is an XDF file, which needs pyxdf: pip install 'smartshoe[xdf]'") from error
-    try:
-        streams, _ = pyxdf.load_xdf(path, verbose=False)
-    except (ValueError, KeyError, OSError, EOFError, IndexError, TypeError, struct.error, SyntaxError) as error:
-        raise FormatError(f"{path} is truncated or no XDF file ({error}): record it again") from error
+    streams, _ = pyxdf.load_xdf(path, verbose=False)
     numeric = [stream for stream in streams if _is_numeric(stream)]
     if not numeric:
         raise FormatError(f"{path} holds no numeric stream with samples: record the shoe's stream too")
@@ -74,4 +70,4 @@ def _channels(info: Any, count: int) -> list[tuple[str, str]]:
     return [(label or str(number + 1), unit) for number, (label, unit) in enumerate(found)]
 
 
-FORMAT = Format("xdf", (".xdf",), _sniff, read)
+FORMAT = Format("xdf", "XDF file", (".xdf",), _sniff, read)

@@ -213,4 +213,4 @@ def write(recording: Recording, path: Path) -> None:
         pd.DataFrame(columns).to_csv(file, index=False, lineterminator="\n")
 
 
-FORMAT = Format("plain", (".csv", ".txt"), sniff, read, write)
+FORMAT = Format("plain", "plain table", (".csv", ".txt"), sniff, read, write, asked=1, is_text=True)

@@ -147,4 +147,4 @@ def write_bluehill(
     Path(path).write_bytes((newline.join(lines) + newline).encode(encoding))
 
 
-FORMAT = Format("bluehill", (".csv", ".txt", ".raw"), sniff, read, None)
+FORMAT = Format("bluehill", "Bluehill CSV", (".csv", ".txt", ".raw"), sniff, read, asked=2, is_text=True)

@@ -45,4 +45,4 @@ def _unit(name: str) -> str:
     return next((unit for part, unit in _UNITS if part in name), "")
 
 
-FORMAT = Format("opensim", (".mot", ".sto"), _sniff, read)
+FORMAT = Format("opensim", "OpenSim file", (".mot", ".sto"), _sniff, read, is_text=True)

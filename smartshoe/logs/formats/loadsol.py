@@ -93,4 +93,4 @@ def _lost(names: list[str], table: Array) -> dict[str, Mask]:
     return lost
 
 
-FORMAT = Format("loadsol", (), _sniff, read)
+FORMAT = Format("loadsol", "loadsol export", (), _sniff, read, is_text=True)
