@@ -20,6 +20,14 @@ class ScenarioError(UsageError):
     """A scenario file is wrong; the message names the file, the line and the key."""
 
 
+class OptionError(UsageError):
+    """A device's option is wrong; ``keys`` lead to it, and the cause is what checked it."""
+
+    def __init__(self, message: str, keys: tuple[str | int, ...] = ()) -> None:
+        super().__init__(message)
+        self.keys = keys
+
+
 class LimitError(UsageError):
     """A protocol or setting goes beyond what a device may be asked for."""
 

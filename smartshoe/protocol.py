@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import LimitError
+from smartshoe.gate import limits
 
 Array = NDArray[np.float64]
 
@@ -42,6 +44,29 @@ class Protocol:
     name: str
     segments: tuple[Segment, ...]
 
+    def __post_init__(self) -> None:
+        """Raise `LimitError` for numbers that are none, and for more segments or a longer run than the limits."""
+        most, longest_s = limits().segments, limits().duration_s
+        if len(self.segments) > most:
+            raise LimitError(
+                f"protocol {self.name} has {len(self.segments)} segments, more than {most}: split it, or raise the"
+                f" limit with --limit segments={len(self.segments)}"
+            )
+        load_n = 0.0
+        for number, segment in enumerate(self.segments, start=1):
+            is_jump = segment.duration_s == 0.0 and segment.load_n != load_n
+            load_n = segment.load_n
+            if not (0.0 <= segment.duration_s < math.inf and math.isfinite(load_n)) or is_jump:
+                raise LimitError(
+                    f"protocol {self.name}, segment {number}: {segment.load_n:g} N within {segment.duration_s:g} s"
+                    " cannot be pressed: give finite numbers, and a time above 0"
+                )
+        if self.duration_s > longest_s:
+            raise LimitError(
+                f"protocol {self.name} lasts {self.duration_s:g} s, more than {longest_s} s: shorten it, or raise the"
+                f" limit with --limit duration_s={self.duration_s:.0f}"
+            )
+
     @property
     def duration_s(self) -> float:
         """Sum of the segments' durations."""
@@ -57,7 +82,8 @@ class Protocol:
         """The steepest ramp, either way."""
         rate, load = 0.0, 0.0
         for segment in self.segments:
-            rate, load = max(rate, abs(segment.load_n - load) / segment.duration_s), segment.load_n
+            if segment.duration_s > 0.0:
+                rate, load = max(rate, abs(segment.load_n - load) / segment.duration_s), segment.load_n
         return rate
 
     def corners(self) -> tuple[Array, Array]:
@@ -133,6 +159,8 @@ def dynamic_protocol(
     peak = _positive("peak_n", peak_n)
     if repeats < 1:
         raise LimitError(f"repeats is {repeats}: give 1 or more")
+    if 3 * repeats * len(rates_n_per_s) > limits().segments:
+        raise LimitError(f"repeats is {repeats}, which makes more than {limits().segments} segments: give fewer")
     segments = [Segment("rest", 0.0, rest_s)] if rest_s > 0 else []
     for rate_n_per_s in rates_n_per_s:
         duration_s = peak / _positive("a rate", rate_n_per_s)

@@ -22,7 +22,7 @@ class LiveReadings:
     """A table on stderr: reading now, lowest and highest so far, and a bar of it."""
 
     def __init__(self) -> None:
-        self._console = Console(stderr=True, highlight=False)
+        self._console = Console(stderr=True, highlight=False, markup=False)
         self._live = Live(console=self._console, transient=True, auto_refresh=False)
         self._drawn = 0.0
         self._low: dict[str, float] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,28 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from smartshoe.errors import InputError, UsageError
+from smartshoe.gate import parsed_json, read_text
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 
 
 def parsed(path: Path | str) -> Any:
     """The file's JSON; raises `InputError` naming it where it is no text, cannot be read or is no JSON."""
+    text = read_text(Path(path), "a calibration that identify wrote")
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is no calibration (not text): give a file that identify wrote") from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}): give a calibration file") from error
-    try:
-        return json.loads(text, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
+        return parsed_json(text)
+    except ValueError as error:
         raise InputError(
             f"{path} is truncated or no JSON ({error}): write it anew with identify --calibration"
         ) from error
-
-
-def _refuse_constant(text: str) -> float:
-    raise ValueError(f"it holds {text}")
 
 
 @dataclass(frozen=True)

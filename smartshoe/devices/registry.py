@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import parse_qsl
 
 from smartshoe.devices.base import Shoe, TestMachine
-from smartshoe.errors import UsageError
+from smartshoe.errors import OptionError, UsageError
 
 GROUP = "smartshoe.devices"
 
@@ -47,19 +47,27 @@ def _open(url: str, what: str, options: Mapping[str, Any]) -> Any:
         rng = np.random.default_rng(int(seed))
     except (TypeError, ValueError) as error:
         raise UsageError(f"device {url!r}: seed is {seed!r}; give a whole number from 0") from error
-    return opener(target, merged, rng)
+    from pydantic import ValidationError
+
+    try:
+        return opener(target, merged, rng)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        keys = tuple(first["loc"])
+        what_is_wrong = "is not known" if first["type"] == "extra_forbidden" else first["msg"]
+        raise OptionError(f"device {url!r}: option {'.'.join(map(str, keys))!r}: {what_is_wrong}", keys) from error
 
 
-def open_machine(url: str, **options: Any) -> TestMachine:
+def open_machine(url: str, /, **options: Any) -> TestMachine:
     """The testing machine at ``url``, to be used in a with block; ``seed`` (default 0) is its random root.
 
-    Raises `UsageError` for an unknown scheme, target or option.
+    Raises `UsageError` for an unknown scheme or target, `OptionError` for an option that the device refuses.
     """
     machine: TestMachine = _open(url, "machine", options)
     return machine
 
 
-def open_shoe(url: str, **options: Any) -> Shoe:
+def open_shoe(url: str, /, **options: Any) -> Shoe:
     """The shoe at ``url``, to be used in a with block; raises as `open_machine` does."""
     shoe: Shoe = _open(url, "shoe", options)
     return shoe

@@ -7,7 +7,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from smartshoe.errors import FormatError, InputError, UsageError
+from smartshoe.errors import FormatError, UsageError
+from smartshoe.gate import read_bytes
 from smartshoe.journal.appending import AppendedFile
 from smartshoe.journal.records import LONGEST_PAYLOAD, OPENING, Record, packed, scan
 
@@ -36,10 +37,7 @@ class Contents:
 def read_journal(path: Path | str) -> Contents:
     """The journal's whole records; raises `InputError` where it cannot be read, `FormatError` where it is none."""
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}): give a session's journal") from error
+    data = read_bytes(path)
     if len(data) < len(OPENING) and OPENING.startswith(data):
         return Contents((), len(data))  # stopped while the file was being made
     if not data.startswith(OPENING):

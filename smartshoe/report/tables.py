@@ -17,11 +17,13 @@ USUAL, NARROWEST = 80, 40  # characters
 
 def new_console() -> Console:
     """A console as wide as the terminal, or as ``COLUMNS`` says in a pipe: 80 where it says nothing."""
-    console = Console(highlight=False)
+    # Without markup: names from files may look like it.
+    console = Console(highlight=False, markup=False)
     if console.is_terminal:
         return console
     told = os.environ.get("COLUMNS", "")
-    return Console(highlight=False, width=int(told) if told.isdigit() and int(told) >= NARROWEST else USUAL)
+    width = int(told) if told.isdigit() and int(told) >= NARROWEST else USUAL
+    return Console(highlight=False, markup=False, width=width)
 
 
 def table_of(title: str, columns: Sequence[str]) -> Table:

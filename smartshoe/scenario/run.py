@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import ValidationError
 
 import smartshoe
 from smartshoe.compensation import Calibration
 from smartshoe.devices import open_machine
 from smartshoe.devices.base import TestMachine
-from smartshoe.errors import LimitError, SmartShoeError
+from smartshoe.errors import LimitError, OptionError, SmartShoeError
 from smartshoe.identification import Identification, identify
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
@@ -142,10 +141,9 @@ def _machine_of(scenario: Scenario, source: Source, index: int) -> TestMachine:
     options = _beside(source, {**scenario.machine.options, **unit.options})
     try:
         return open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit.name), **options)
-    except ValidationError as error:
-        key = error.errors(include_url=False)[0]["loc"][:1]
-        in_machine = bool(key) and key[0] in scenario.machine.options and key[0] not in unit.options
-        raise source.from_validation(error, ("machine",) if in_machine else ("unit", index)) from error
+    except OptionError as error:
+        in_machine = error.keys[:1] != () and error.keys[0] in {*scenario.machine.options} - {*unit.options}
+        raise source.from_option(error, ("machine",) if in_machine else ("unit", index)) from error
 
 
 def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], source: Source) -> None:

@@ -7,9 +7,10 @@ import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -19,7 +20,8 @@ from pydantic import (
     model_validator,
 )
 
-from smartshoe.errors import ScenarioError
+from smartshoe.errors import InputError, OptionError, ScenarioError
+from smartshoe.gate import read_text, require_file_name
 from smartshoe.protocol import (
     DYNAMIC_RATES_N_PER_S,
     STATIC_LOADS_N,
@@ -33,7 +35,21 @@ from smartshoe.scenario.lines import line_of
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class _OpenTable(BaseModel):
+    """A table whose further keys are a device's own, and are checked by it."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The keys beside the table's own."""
+        return dict(self.model_extra or {})
+
+
+FileName = Annotated[str, AfterValidator(lambda name: require_file_name(name, "it"))]  # recordings and results bear it
 
 
 class ProtocolTable(_Table):
@@ -94,16 +110,15 @@ def _segment(before: tuple[float, float], after: tuple[float, float]) -> Segment
     return Segment(("rest" if after[1] == 0 else "hold") if stays else "ramp", after[1], after[0] - before[0])
 
 
-class MachineTable(BaseModel):
+class MachineTable(_OpenTable):
     """``[machine]``: the backend's address; every further key is the backend's own and is checked by it."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
     backend: str = "sim:instron"
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """The keys beside ``backend``."""
-        return dict(self.model_extra or {})
+    @model_validator(mode="after")
+    def _unit_and_seed_stand_elsewhere(self) -> MachineTable:
+        _refuse_reserved(self.options)
+        return self
 
 
 class ColumnsTable(_Table):
@@ -114,18 +129,23 @@ class ColumnsTable(_Table):
     sensor: str | None = None
 
 
-class UnitTable(BaseModel):
+def _refuse_reserved(options: dict[str, Any]) -> None:
+    for key, place in (("unit", "a [[unit]] table's name"), ("seed", "the seed at the file's top")):
+        if key in options:
+            raise ValueError(f"{key} means nothing here: it is {place}")
+
+
+class UnitTable(_OpenTable):
     """``[[unit]]``: a sensing unit; its recordings are files, or come from the machine (further keys are its)."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
-    name: str = Field(min_length=1)
+    name: FileName
     recordings: tuple[str, ...] = ()
     columns: ColumnsTable = ColumnsTable()
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """The keys that describe the device behind the unit."""
-        return dict(self.model_extra or {})
+    @model_validator(mode="after")
+    def _unit_and_seed_stand_elsewhere(self) -> UnitTable:
+        _refuse_reserved(self.options)
+        return self
 
 
 class IdentifyTable(_Table):
@@ -164,22 +184,16 @@ class TrialGaitTable(_Table):
     coverage_course: Literal["even", "midfoot"] = "even"
 
 
-class TrialTable(BaseModel):
+class TrialTable(_OpenTable):
     """``[trial]``: a person in the shoes. Every further key is the shoe's own and is checked by it.
 
     ``name`` names the recording's file. A simulated shoe wears the units of the scenario, with their bladders and
     sensors.
     """
 
-    model_config = ConfigDict(extra="allow", frozen=True)
-    name: str = Field(default="trial", pattern=r"^[A-Za-z0-9][A-Za-z0-9_\-]*$")
+    name: str = Field(default="trial", max_length=120, pattern=r"^[A-Za-z0-9][A-Za-z0-9_\-]*$")
     shoe: str = "sim:walk"
     gait: TrialGaitTable = TrialGaitTable()
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """The keys beside the table's own."""
-        return dict(self.model_extra or {})
 
 
 class Scenario(_Table):
@@ -189,7 +203,7 @@ class Scenario(_Table):
     about: str = ""
     seed: int = Field(0, ge=0)
     machine: MachineTable = MachineTable()
-    protocol: dict[str, ProtocolTable] = {}
+    protocol: dict[FileName, ProtocolTable] = {}
     unit: tuple[UnitTable, ...] = Field(min_length=1)
     identify: IdentifyTable = IdentifyTable()
     validate_: ValidateTable = Field(ValidateTable(), alias="validate")
@@ -199,7 +213,8 @@ class Scenario(_Table):
     @model_validator(mode="before")
     @classmethod
     def _kind_defaults_to_the_name(cls, raw: Any) -> Any:
-        for name, table in (raw.get("protocol") or {}).items() if isinstance(raw, dict) else ():
+        protocols = raw.get("protocol") if isinstance(raw, dict) else None
+        for name, table in protocols.items() if isinstance(protocols, dict) else ():
             if isinstance(table, dict) and name in ("static", "dynamic"):
                 table.setdefault("kind", name)
         return raw
@@ -226,6 +241,15 @@ class Source:
         made.reason = message
         return made
 
+    def from_option(self, error: OptionError, prefix: tuple[str | int, ...]) -> ScenarioKeyError:
+        """What a device says of an option, at the scenario's line."""
+        cause = error.__cause__
+        return (
+            self.from_validation(cause, prefix)
+            if isinstance(cause, ValidationError)
+            else self.error((*prefix, *error.keys), str(error))
+        )
+
     def from_validation(self, error: ValidationError, prefix: tuple[str | int, ...] = ()) -> ScenarioKeyError:
         """The first of pydantic's complaints as one sentence."""
         first = error.errors(include_url=False)[0]
@@ -243,18 +267,19 @@ class Source:
         return self.error(keys, message)
 
 
-def read_tables(path: Path | str) -> tuple[Tables, Source]:
-    """A scenario's tables as they stand in its file, and the file itself; raises `ScenarioError`."""
+def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, Source]:
+    """A TOML file's tables as they stand in it, and the file itself; raises `ScenarioError`.
+
+    ``what`` says what the file should be.
+    """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"{file} is not UTF-8 text (byte {error.start}): save it as UTF-8") from error
-    except OSError as error:
-        raise ScenarioError(f"{file} cannot be read ({error.strerror}): give the path of a scenario") from error
+        text = read_text(file, what)
+    except InputError as error:
+        raise ScenarioError(str(error)) from error
     try:
         return tomllib.loads(text), Source(file, text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # a number of 5000 digits is a ValueError of its own
         raise ScenarioError(f"{file} is not valid TOML: {error}") from error
 
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from smartshoe.devices import open_shoe
 from smartshoe.devices.base import Shoe
-from smartshoe.errors import UsageError
+from smartshoe.errors import OptionError, UsageError
 from smartshoe.recording import Channel, Recording
 from smartshoe.scenario.against_truth import compare
 from smartshoe.scenario.schema import Scenario, Source, TrialTable
@@ -145,8 +144,8 @@ def opened_shoe(scenario: Scenario, source: Source, seed: int) -> Shoe:
         options = {"units": worn, **options}
     try:
         return open_shoe(_beside(source, table.shoe), **options)
-    except ValidationError as error:
-        raise source.from_validation(error, ("trial",)) from error
+    except OptionError as error:
+        raise source.from_option(error, ("trial",)) from error
     except UsageError as error:
         raise source.error(("trial", "shoe"), str(error)) from error
 

@@ -21,6 +21,7 @@ from smartshoe.atomic import json_text, make_folder, replacing, write_text
 from smartshoe.devices.base import Block, ChannelDescription, Shoe
 from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.errors import InputError, SmartShoeError, UsageError
+from smartshoe.gate import foreign_code, inside, parsed_json, read_bytes, read_text
 from smartshoe.journal import Journal, Record, read_journal
 from smartshoe.logs import read, write
 from smartshoe.recording import Channel, Recording
@@ -198,12 +199,8 @@ class SessionFolder:
     def attempts(self) -> list[Attempt]:
         """Every pressing so far, oldest first; raises `InputError` where the journal cannot be understood."""
         contents = read_journal(self.path / JOURNAL)
-        try:
+        with foreign_code(self.path / JOURNAL, "session's journal", "restore it from a copy"):
             return list(self._attempts(iter(contents.records)))
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{self.path / JOURNAL} is no session's journal ({error!r})") from error
 
     def _attempts(self, records: Iterator[Record]) -> Iterator[Attempt]:
         channels: tuple[ChannelDescription, ...] = ()
@@ -214,25 +211,28 @@ class SessionFolder:
                     names = tuple(channel.name for channel in channels)
                     attempt.blocks.append(samples.unpacked(record.payload, names, channels[0].unit))
                 continue
-            said = json.loads(record.payload)
+            said = parsed_json(record.payload)
             event = said["event"]
             if event == "stream":
                 channels = tuple(_channel(item) for item in said["channels"])
             elif event == "begin":
                 if attempt is not None:
                     yield attempt
-                attempt = Attempt(said["experiment"], said["attempt"], channels)
+                attempt = Attempt(str(said["experiment"]), int(said["attempt"]), channels)
             elif attempt is not None and event == "log":
-                attempt.log, attempt.columns, attempt.source = self._checked(said), said["columns"], said["source"]
+                attempt.log, attempt.source = self._checked(said), str(said["source"])
+                attempt.columns = {
+                    key: str(said["columns"][key]) for key in ("time", "force") if key in said["columns"]
+                }
             elif attempt is not None and event in ("accepted", "rejected"):
-                attempt.state, attempt.findings = event, said["findings"]
+                attempt.state, attempt.findings = event, [dict(finding) for finding in said["findings"]]
             elif attempt is not None and event == "shoe":
                 attempt.events.append(said)
         if attempt is not None:
             yield attempt
 
     def _checked(self, said: dict[str, Any]) -> Path:
-        path = self.path / str(said["file"])
+        path = inside(self.path, str(said["file"]), self.path / JOURNAL)
         if _sha256(path) != said["sha256"]:
             raise InputError(f"{path} is not the file that the session kept (its sha256 differs): restore it")
         return path
@@ -245,23 +245,25 @@ class SessionFolder:
 def _plan_of(folder: Path) -> Plan:
     file = folder / PLAN
     try:
-        return Plan.from_dict(json.loads(file.read_text(encoding="utf-8")), str(file))
-    except OSError as error:
-        raise UsageError(f"{folder} holds no session ({file.name}: {error.strerror}): give the --out of one") from error
-    except (ValueError, AttributeError) as error:
-        if isinstance(error, InputError | UsageError):
+        found = parsed_json(read_text(file, "a session's plan"))
+    except InputError as error:
+        if file.is_file():
             raise
+        raise UsageError(f"{folder} holds no session ({error}): give the --out of one") from error
+    except ValueError as error:
         raise InputError(f"{file} is damaged ({error}): restore it from a copy") from error
+    return Plan.from_dict(found, str(file))
 
 
 def _channel(item: dict[str, Any]) -> ChannelDescription:
     unit: Unit = find_unit(item["unit"]) or declared(item["unit"])
     range_ = None if item["range"] is None else (float(item["range"][0]), float(item["range"][1]))
-    return ChannelDescription(item["name"], unit.quantity, unit, range_, item["resolution"], item["rate_hz"])
+    resolution = None if item["resolution"] is None else float(item["resolution"])
+    return ChannelDescription(str(item["name"]), unit.quantity, unit, range_, resolution, float(item["rate_hz"]))
 
 
 def _sha256(path: Path) -> str:
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}): restore the session's raw files") from error
+        return hashlib.sha256(read_bytes(path)).hexdigest()
+    except InputError as error:
+        raise InputError(f"{error}; restore the session's raw files") from error

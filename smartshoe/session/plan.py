@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
 from smartshoe.errors import InputError, LimitError, UsageError
-from smartshoe.protocol import Protocol, Segment, dynamic_protocol, static_protocol
+from smartshoe.gate import limits, require_file_name
+from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 
 SCHEMA = "smartshoe.session_plan/1"
+LARGEST_REPEATS = 100
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,17 @@ class Plan:
     largest_repeats: int = 2
     wait_s: float = 900.0
 
+    __pydantic_config__ = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     def __post_init__(self) -> None:
+        require_file_name(self.unit, "unit")
+        for protocol in self.protocols:
+            require_file_name(protocol.name, "protocol")
+        for name in ("zero_s", "tail_s", "rest_s", "wait_s"):
+            if not 0.0 <= getattr(self, name) <= limits().duration_s:
+                raise UsageError(f"{name} is {getattr(self, name)}: give seconds from 0 to {limits().duration_s}")
+        if not 0 <= self.largest_repeats <= LARGEST_REPEATS:
+            raise UsageError(f"largest_repeats is {self.largest_repeats}: give 0 to {LARGEST_REPEATS}")
         names = [protocol.name for protocol in self.protocols]
         if not names:
             raise UsageError("a session needs a protocol: give --protocol static, dynamic or a TOML file")
@@ -58,17 +71,15 @@ class Plan:
     @classmethod
     def from_dict(cls, found: Mapping[str, Any], where: str) -> Self:
         """The plan in an object; raises `InputError` naming ``where`` and the key at fault."""
-        given = dict(found)
-        schema = given.pop("schema", None)
+        schema = found.get("schema") if isinstance(found, Mapping) else None
         if schema != SCHEMA:
             raise InputError(f"{where}: key 'schema' is {schema!r}, not {SCHEMA!r}: give a session's folder")
         try:
-            given["protocols"] = tuple(
-                Protocol(p["name"], tuple(Segment(**segment) for segment in p["segments"])) for p in given["protocols"]
-            )
-            return cls(**given)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{where} is damaged ({error}): restore it from a copy") from error
+            return TypeAdapter(cls).validate_python({key: value for key, value in found.items() if key != "schema"})
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            key = ".".join(map(str, first["loc"])) or "the plan"
+            raise InputError(f"{where}: key '{key}': {first['msg']}: restore the file from a copy") from error
 
 
 def protocols_named(names: Sequence[str]) -> tuple[Protocol, ...]:
@@ -90,21 +101,12 @@ def protocols_named(names: Sequence[str]) -> tuple[Protocol, ...]:
 
 
 def _from_file(path: Path) -> list[Protocol]:
-    from pydantic import ValidationError
+    from smartshoe.scenario.schema import ProtocolTable, read_tables
 
-    from smartshoe.scenario.schema import ProtocolTable, Source
-
-    try:
-        text = path.read_text(encoding="utf-8")
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise UsageError(f"{path} cannot be read ({error.strerror}): give static, dynamic or a TOML file") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(f"{path} is not valid TOML: {error}") from error
+    raw, source = read_tables(path, "static, dynamic or a TOML file")
     tables = raw.get("protocol")
     if not isinstance(tables, dict) or not tables:
         raise UsageError(f"{path} has no [protocol.NAME] table: write one, with kind, loads or corners")
-    source = Source(path, text)
     found: list[Protocol] = []
     for name, table in tables.items():
         if isinstance(table, dict) and name in ("static", "dynamic"):

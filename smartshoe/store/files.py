@@ -18,6 +18,7 @@ from urllib.parse import quote
 
 from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.errors import InputError, UsageError
+from smartshoe.gate import limits, parsed_json, read_bytes, read_text
 from smartshoe.store.dates import iso, moment
 from smartshoe.store.entry import EVENT_KINDS, Entry, Event
 
@@ -93,17 +94,14 @@ def listing(root: Path) -> dict[str, tuple[int, int]]:
 def read_item(root: Path, relative: str) -> dict[str, Any]:
     """What the index keeps of a file; raises `InputError` where the file is not as it was added."""
     path = root / relative
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}): mend its permissions") from error
+    content = read_bytes(path, at_most=limits().json_bytes)
     if hashlib.sha256(content).hexdigest()[:HASH_DIGITS] != path.stem.rpartition("_")[2]:
         raise InputError(
             f"{path} is not as it was added (cut or changed since): it is left out; take it away and add the"
             " calibration anew"
         )
     try:
-        found = json.loads(content)
+        found = parsed_json(content)
         if relative.startswith(f"{EVENTS}/"):
             return {key: found[key] for key in ("kind", "serial_number", "date", "position", "note", "order")}
         return {**found["store"], "fingerprint": fingerprint(found)}
@@ -144,10 +142,10 @@ def event_of(item: Mapping[str, Any]) -> Event:
 def read_index(root: Path) -> dict[str, Any]:
     """The index's items by file, {} where there is none or it cannot be used: it only saves time."""
     try:
-        found = json.loads((root / INDEX).read_text(encoding="utf-8"))
+        found = parsed_json(read_text(root / INDEX, "a store's index"))
         if found["schema"] == INDEX_SCHEMA and isinstance(found["files"], dict):
             return dict(found["files"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InputError, ValueError, KeyError, TypeError):
         return {}
     return {}
 

@@ -12,7 +12,7 @@ import pytest
 import smartshoe
 from smartshoe.errors import FormatError, InputError
 
-SECRET = b"root:x:0:0:root:/root:/bin/bash\n" * 8
+SECRET = b"what nobody else may read\n" * 8
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from smartshoe.errors import FormatError, InputError
+from smartshoe.gate import require_columns
 from smartshoe.logs.numbers import is_number, numbers_of
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.logs.text import even_rows, head_lines, is_text, read_lines, split_cells
@@ -76,6 +77,7 @@ def read(path: Path) -> Sheet:
     rows = split_cells([line for _, line in numbered], delimiter)
     width = max(index for index, (name, unit) in enumerate(_paired(names, units)) if name or unit) + 1
     names, units = ([*row, *[""] * width][:width] for row in (names, units))
+    require_columns(path, width)
     rows = even_rows(path, rows, numbers, width)
     # A column that only numbers the rows, or is blank throughout, has neither name nor unit.
     used = [index for index in range(width) if names[index] or units[index] or any(row[index] for row in rows)]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from smartshoe.errors import FormatError, InputError
+from smartshoe.gate import require_columns
 from smartshoe.logs.numbers import is_missing, is_number, numbers_of
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.logs.text import even_rows, is_text, read_lines, split_cells
@@ -113,6 +114,7 @@ def read(path: Path) -> Sheet:
     """Read delimited text; raises `FormatError` naming lines that do not fit or contradict each other."""
     lines, notes = read_lines(path)
     delimiter, width, start = _split_table(path, lines)
+    require_columns(path, width)
     above = lines[:start]
     said = _said(above, delimiter)
     of_table = {key: said.pop(key, None) for key in ("name", "unit") if f"# {key}:" in "\n".join(above)}

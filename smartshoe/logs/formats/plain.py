@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import warnings
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import FormatError, InputError
+from smartshoe.gate import require_columns
 from smartshoe.logs.columns import roles_of
 from smartshoe.logs.numbers import numbers_of
 from smartshoe.logs.sheet import Column, Format, Sheet
@@ -147,7 +149,8 @@ def _read_slowly(path: Path, header: list[str], header_line: int) -> NDArray[np.
 def read(path: Path) -> Sheet:
     """Read a plain table; raises `FormatError` naming line and column of what does not fit."""
     marks, header, header_line = _opening(path)
-    twice = [cell for index, cell in enumerate(header) if cell in header[:index]]
+    require_columns(path, len(header))
+    twice = [cell for cell, count in Counter(header).items() if count > 1]
     if twice:
         raise FormatError(f"{path}, line {header_line} names column {twice[0]!r} twice: rename one")
     commas, line_count = _marks(path, header_line)

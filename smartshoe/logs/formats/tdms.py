@@ -74,11 +74,13 @@ def _loaded(path: Path) -> tuple[Mapping[str, Any], list[tuple[str, Any]]]:
     """The file's properties and its channels (group, channel), once what they declare has been weighed."""
     from nptdms import TdmsFile
 
-    with TdmsFile.open(path) as file:
-        lengths = [len(channel) for group in file.groups() for channel in group.channels()]
-    require_columns(path, len(lengths))
-    require_values(path, sum(lengths), path.stat().st_size, item_bytes=1)
-    file = TdmsFile.read(path)
+    with path.open("rb") as content:
+        with TdmsFile.open(content) as file:
+            lengths = [len(channel) for group in file.groups() for channel in group.channels()]
+        require_columns(path, len(lengths))
+        require_values(path, sum(lengths), path.stat().st_size, item_bytes=1)
+        content.seek(0)
+        file = TdmsFile.read(content)
     return file.properties, [(group.name, channel) for group in file.groups() for channel in group.channels()]
 
 

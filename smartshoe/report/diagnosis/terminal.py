@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from smartshoe.diagnosis.design import Design
@@ -34,7 +33,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     """The whole diagnosis as a person reads it; the page of ``--out`` says more."""
     console = new_console()
     heading = f"{title}: {HEADINGS[diagnosis.verdict]}" if title else HEADINGS[diagnosis.verdict]
-    console.print(f"[bold]{escape(heading)}[/bold]", soft_wrap=True)
+    console.print(heading, style="bold", soft_wrap=True)
     _line(console, sentence(diagnosis.says))
     said = how_much(diagnosis)
     if said is not None:
@@ -88,7 +87,7 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
                 if k == 0
                 else ("", "", "")
             )
-            table.add_row(words(cause.name) if k == 0 else "", name, escape(value), *map(escape, of_cause))
+            table.add_row(words(cause.name) if k == 0 else "", name, value, *of_cause)
     console.print()
     console.print(table)
     for cause in diagnosis.causes:
@@ -110,7 +109,7 @@ def _about(cause: Cause) -> str:
 def _several(console: Console, heading: str, lines: Sequence[str]) -> None:
     if not lines:
         return
-    console.print(f"\n[bold]{heading}[/bold]")
+    console.print(f"\n{heading}", style="bold")
     for line in lines[:MOST_FAULTS]:
         _line(console, f"- {line}")
     if len(lines) > MOST_FAULTS:
@@ -118,4 +117,4 @@ def _several(console: Console, heading: str, lines: Sequence[str]) -> None:
 
 
 def _line(console: Console, text: str) -> None:
-    console.print(escape(text), soft_wrap=True)
+    console.print(text, soft_wrap=True)

@@ -1,0 +1,53 @@
+"""What holds of every command line, whatever it is given."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import resource
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from smartshoe.cli import run_command
+
+STATUSES = (0, 2, 3, 4, 5)  # of the contract; 1 says that smartshoe itself is at fault
+LONGEST_LINE = 300
+LONGEST_S = 10.0  # of processor time
+MOST_KIB = 1 << 20
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def last_line(self) -> str:
+        return self.err.rstrip("\n").rpartition("\n")[2]
+
+
+def ended(arguments: Sequence[str], folder: Path) -> Ended:
+    """Run a command line in this process and hold it against the contract; ``folder`` is where it may write."""
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+    peak_kib, began_s = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = run_command([str(argument) for argument in arguments])
+    found = Ended(status, out.getvalue(), err.getvalue())
+    assert status in STATUSES, found
+    assert "Traceback" not in found.err
+    assert time.process_time() - began_s < LONGEST_S, found
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < max(peak_kib, MOST_KIB), found
+    if status != 0:
+        assert found.last_line.startswith("error: "), found
+        assert len(found.last_line) < LONGEST_LINE, found
+        assert found.last_line.isprintable(), found
+        after = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+        assert after == before, "a refused command left or changed a file"
+    assert not [path for path in folder.rglob("*") if "partial" in path.name]
+    return found
