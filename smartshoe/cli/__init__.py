@@ -82,7 +82,7 @@ def group() -> None:
     """Calibrate, identify and compensate shoe-embedded air pressure sensors, on real and simulated devices."""
 
 
-_LONGEST_LINE = 290
+_LONGEST_LINE = 280
 _LONGEST_END = 110  # where a message says how to mend it
 
 
