@@ -1,0 +1,63 @@
+"""What a sweep costs beside its cases, and what a case costs; nothing is asserted."""
+
+from __future__ import annotations
+
+import json
+import resource
+import time
+from pathlib import Path
+
+import pytest
+from table import FigureTable
+
+from smartshoe.sweeps.case import computed
+from smartshoe.sweeps.plan import Case, read_plan
+from smartshoe.sweeps.running import sweep_plan
+
+pytestmark = pytest.mark.benchmark
+SIZES = (2_000, 20_000)
+CASES = 20
+SCENARIO = """\
+[machine]
+backend = "sim:instron"
+[protocol.static]
+[protocol.dynamic]
+repeats = 2
+[[unit]]
+name = "left_toe"
+[sweep]
+design = "random"
+count = %d
+[sweep.vary]
+"unit.left_toe.bladder.k1" = {uniform = [1.0, 2.0]}
+"unit.left_toe.bladder.k2" = {log_uniform = [0.1, 0.4]}
+"""
+
+
+def empty(case: Case) -> str:
+    figures = {f"left_toe.figure_{number}": case.values["unit.left_toe.bladder.k1"] + number for number in range(20)}
+    return json.dumps({"status": "done", "says": None, "figures": figures})
+
+
+@pytest.mark.parametrize("count", SIZES)
+def test_bookkeeping(table: FigureTable, tmp_path: Path, count: int) -> None:
+    (tmp_path / "s.toml").write_text(SCENARIO % count, encoding="utf-8")
+    plan = read_plan(tmp_path / "s.toml")
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    started = time.process_time()
+    sweep_plan(plan, tmp_path / "out", compute=empty)
+    each_ms = 1e3 * (time.process_time() - started) / count
+    grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb) / 1024
+    said = f"{each_ms:.2f} ms of processor time a case, {before_kb / 1024:.0f} MB and {grown_mb:.0f} MB more"
+    table.add("sweep", f"bookkeeping of {count} empty cases", said, asked="1 ms, 300 MB", met=each_ms < 1.0)
+
+
+def test_a_calibration(table: FigureTable, tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(SCENARIO % (CASES + 1), encoding="utf-8")
+    plan = read_plan(tmp_path / "s.toml")
+    computed(plan.case(CASES))  # the first one compiles
+    started = time.process_time()
+    sweep_plan(plan, tmp_path / "out")
+    each_s = (time.process_time() - started) / (CASES + 1)
+    said = f"{each_s:.2f} s of processor time"
+    table.add("sweep", "a calibration, static and dynamic", said, asked="0.4 s", met=each_s < 0.4)
