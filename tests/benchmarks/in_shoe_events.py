@@ -268,7 +268,8 @@ def page(results: dict[str, dict[str, EventScore]]) -> str:
         " calls two functions that it does not hold (events too near each other; unpaired events): they are written"
         " here by their names. Jumps are no gait: our detector tells contacts by the swings between them and by each"
         " foot's usual peak, and a jump has neither. They stand here because the plates do."
-        " A stance that begins before the plates' recording or ends after it counts as *false* for every algorithm alike.",
+        " A stance that begins before the plates' recording or ends after it counts as *false* for every"
+        " algorithm alike.",
     ]
     for case, scores in results.items():
         sound = [s for s in scores.values() if s.missed_percent <= 2.0 and s.false_percent <= 2.0] or [*scores.values()]
