@@ -21,6 +21,8 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
+FIRST_REST_S = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Zero:
@@ -46,21 +48,28 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
     )
 
 
-def rest_loads(sessions: Sequence[Session]) -> Array:
-    """(sessions with rests,) mean measured load of each, where the unit carries nothing, shares of full scale."""
-    means = []
+def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
+    """(m, 2) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
+
+    Nothing has happened to the unit yet, so that the reading is its zero whatever its model.
+    """
+    found = []
     for session in sessions:
-        command, load = session.recording.command_n, session.conditions.load
-        resting = session.resting & session.fitted
+        load = session.conditions.load
+        resting = session.resting.copy()
+        command = session.recording.command_n
         if command is not None:
             # By the command alone: a large tare lifts the load out of what looks like a rest.
             full = float(np.max(np.abs(command))) or 1.0
             nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
-            nothing = np.pad(nothing, (0, resting.size - nothing.size))
-            resting = nothing & (np.abs(load - np.quantile(load, 0.02)) < REST_SHARE) & session.fitted
-        if resting.sum() * session.conditions.step_s >= 1.0:
-            means.append(float(np.mean(load[resting])))
-    return np.array(means)
+            resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < REST_SHARE)
+        moved = np.flatnonzero(~resting)
+        first = slice(0, int(moved[0]) if moved.size else resting.size)
+        kept = session.fitted[first]
+        if kept.sum() * session.conditions.step_s >= FIRST_REST_S:
+            reading = session.reading[first][kept] / model.gain
+            found.append((float(np.mean(load[first][kept])), float(np.mean(reading))))
+    return np.array(found).reshape(-1, 2)
 
 
 def zeros_of(
@@ -77,37 +86,45 @@ def zeros_of(
     """
     if scale.unit.quantity != "pressure":
         return ()
+    rests = first_rests(sessions, model)
+    sensor, machine = shift_of("reading"), shift_of("load")
+    if not rests.size:
+        return _unseen(sessions, model, left, remembered, sensor, machine, thresholds)
+    loads, readings = rests.T
+    sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
+    load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
+    load, reading = float(np.mean(loads)), float(np.mean(readings))
+    many = thresholds.zero_deviations
+    if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
+        return ()  # a convention of the sensor's; or the reading agrees with the load, and the unit bears it
+    named = []
+    if abs(load) >= many * load_sd:
+        named.append(Zero(machine, -load, load_sd, abs(load * model.gain)))
+    if abs(reading) >= many * reading_sd:
+        named.append(Zero(sensor, reading * model.gain, reading_sd, abs(reading * model.gain)))
+    return tuple(sorted(named, key=lambda one: -one.size))
+
+
+def _unseen(
+    sessions: Sequence[Session],
+    model: ExtendedModel,
+    left: float,
+    remembered: float,
+    sensor: Effect,
+    machine: Effect,
+    thresholds: Thresholds,
+) -> tuple[Zero, ...]:
+    """The zero of a unit that is never seen unloaded at first: by its model, and either of the two may be it."""
     found = offsets(sessions, model)
     mean = float(np.mean(found))
-    if abs(mean) > thresholds.foreign_zero:
-        return ()
-    sensor, machine = shift_of("reading"), shift_of("load")
+    fitted = [one for one in sessions if one.fitted.any()]
+    begun = float(np.mean([abs(one.conditions.load[0]) for one in fitted]))
+    lowest = min(float(np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01)) for one in fitted)
     scatter = float(np.std(found, ddof=1) / np.sqrt(found.size)) if found.size > 1 else 0.0
-    begun = float(np.mean([abs(s.conditions.load[0]) for s in sessions if s.fitted.any()]))
-    # What the unit remembers of an unknown past, beyond what its one arm does.
+    # What the unit remembers of an unknown past, beyond what its one arm does; and the curve below the lowest load.
     past = begun * (thresholds.departure * abs(model.relaxing_share) + remembered)
-    sd = float(np.linalg.norm([scatter, thresholds.zero_sd, 0.5 * left, past]))
-    if abs(mean) < thresholds.zero_deviations * sd:
-        return ()  # the reading agrees with the load wherever both are seen
-    rests = rest_loads(sessions)
-    if not rests.size:
-        lowest = min(float(np.quantile(np.abs(s.conditions.load[s.fitted]), 0.01)) for s in sessions if s.fitted.any())
-        # Below the lowest load the curve is extrapolated.
-        sd = float(np.hypot(sd, thresholds.departure * lowest))
-        if abs(mean) < thresholds.zero_deviations * sd:
-            return ()
-        return (Zero(sensor, mean, sd, abs(mean), (machine.name,)),)
-    tare = -float(np.mean(rests))
-    tare_sd = float(
-        np.hypot(np.std(rests, ddof=1) / np.sqrt(rests.size) if rests.size > 1 else 0.0, thresholds.zero_sd)
-    )
-    named = []
-    if abs(tare) < thresholds.zero_deviations * tare_sd:
-        tare = 0.0
-    else:
-        named.append(Zero(machine, tare, tare_sd, abs(tare * model.gain)))
-    zero = mean - tare * model.gain
-    sd = float(np.hypot(sd, model.gain * tare_sd))
-    if abs(zero) >= thresholds.zero_deviations * sd:
-        named.append(Zero(sensor, zero, sd, abs(zero)))
-    return tuple(sorted(named, key=lambda one: -one.size))
+    below = thresholds.departure * lowest
+    sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below]))
+    if abs(mean) > thresholds.foreign_zero or abs(mean) < thresholds.zero_deviations * sd:
+        return ()
+    return (Zero(sensor, mean, sd, abs(mean), (machine.name,)),)
