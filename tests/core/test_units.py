@@ -47,3 +47,21 @@ def test_to_si_and_back_is_the_same_number(symbol: str, value: float) -> None:
 def test_other_quantities_do_not_convert() -> None:
     with pytest.raises(UnitError, match="pressure"):
         unit("mbar").convert([1.0], unit("N"))
+
+
+_STANDARD_GRAVITY, _POUND_KG, _INCH_M = 9.80665, 0.45359237, 0.0254  # exact by definition
+
+
+@pytest.mark.parametrize(
+    ("amount", "symbol", "si"),
+    [(1.0, "psi", _POUND_KG * _STANDARD_GRAVITY / _INCH_M**2), (760.0, "mmHg", 101325.0), (1.0, "atm", 101325.0),
+     (1.0, "bar", 1e5), (1000.0, "mbar", 1e5), (1000.0, "hPa", 1e5), (100.0, "kPa", 1e5), (0.1, "MPa", 1e5),
+     (29.921, "inHg", 101325.0), (1.0, "kgf/cm2", _STANDARD_GRAVITY * 1e4),
+     (1.0, "cmH2O", _STANDARD_GRAVITY * 10.0), (1.0, "lbf", _POUND_KG * _STANDARD_GRAVITY),
+     (1.0, "kgf", _STANDARD_GRAVITY), (1000.0, "gf", _STANDARD_GRAVITY), (1.0, "kN", 1e3), (1.0, "daN", 10.0),
+     (1.0, "mN", 1e-3), (1.0, "psi·cm²", _POUND_KG * _STANDARD_GRAVITY * 1e-4 / _INCH_M**2), (1.0, "bar·cm²", 10.0),
+     (1.0, "in", _INCH_M), (60.0, "mm/min", 1e-3), (180.0, "deg", np.pi), (20.0, "°C", 293.15), (1.0, "h", 3600.0)],
+)  # fmt: skip
+def test_units_are_as_large_as_their_definitions_say(amount: float, symbol: str, si: float) -> None:
+    # inHg is of mercury at 0 °C, known to five digits; mmHg and the standard atmosphere agree to seven.
+    assert unit(symbol).to_si([amount])[0] == pytest.approx(si, rel=2e-5 if symbol == "inHg" else 1e-6)

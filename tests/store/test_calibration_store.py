@@ -170,6 +170,13 @@ def test_nearest_looks_both_ways(store: CalibrationStore) -> None:
     assert store.nearest("S1", day(51)).says.endswith("49 days after that")
 
 
+def test_of_two_calibrations_as_near_the_earlier_is_taken(store: CalibrationStore) -> None:
+    first, second, third = (put(store, at) for at in (0, 100, 300))
+    assert store.nearest("S1", day(50)).entry == first
+    assert store.nearest("S1", day(200)).entry == second
+    assert store.nearest("S1", day(201)).entry == third
+
+
 @given(st.lists(st.integers(0, 900), min_size=1, max_size=6, unique=True), st.lists(st.integers(0, 900), max_size=3))
 def test_no_repair_ever_lies_between_a_date_and_its_calibration(
     tmp_path_factory: pytest.TempPathFactory, calibrated: list[int], repaired: list[int]

@@ -192,3 +192,19 @@ def test_columns_that_cannot_be_are_refused() -> None:
         with pytest.raises(UsageError, match="give one time"):
             LineDecoder(columns)
     assert LineDecoder(("t", "toe")).feed(b"").unit == COUNTS
+
+
+def test_a_line_with_a_wrong_checksum_is_refused() -> None:
+    good = encode_lines(np.arange(20) * 5, np.arange(80).reshape(20, 4), is_checksummed=True).splitlines(keepends=True)
+    good[10] = good[10].replace(b",41,", b",47,")
+    got, decoder = _feed(b"".join(good), time="ms")
+    assert got.readings[:, 0].tolist() == [4.0 * k for k in range(20) if k != 10]
+    assert (decoder.counters.bad_crc, decoder.counters.malformed) == (1, 0)
+
+
+def test_once_a_line_had_a_checksum_one_without_is_refused() -> None:
+    lines = encode_lines(np.arange(20) * 5, np.arange(80).reshape(20, 4), is_checksummed=True).splitlines(keepends=True)
+    lines[10] = lines[10].partition(b"*")[0].replace(b",41,", b",47,") + b"\n"
+    got, decoder = _feed(b"".join(lines), time="ms")
+    assert got.readings[:, 0].tolist() == [4.0 * k for k in range(20) if k != 10]
+    assert (decoder.counters.bad_crc, decoder.counters.malformed) == (0, 1)

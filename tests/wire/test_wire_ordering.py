@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -196,3 +197,24 @@ def test_nothing_is_given_out_for_nothing() -> None:
     assert isinstance(placed, Placed)
     assert placed.rows.size == 0
     assert placed.held is None
+
+
+@pytest.mark.parametrize("periods", [-3.0, 3.0])
+def test_a_frame_whose_clock_is_periods_off_is_dropped(periods: float) -> None:
+    sent = _regular(200)
+    count, clock = sent[100]
+    sent[100] = (count, clock + round(5000 * periods))
+    counters = Counters()
+    given_out = _place(Ordering(counters), sent, [])
+    assert [count for _, count, _ in given_out] == [*range(1000, 1100), *range(1101, 1200)]
+    assert (counters.implausible, counters.lost) == (1, 1)
+
+
+@pytest.mark.parametrize("periods", [-0.4, 0.4])
+def test_a_frame_whose_clock_is_less_than_half_a_period_off_is_given_out(periods: float) -> None:
+    sent = _regular(200)
+    count, clock = sent[100]
+    sent[100] = (count, clock + round(5000 * periods))
+    counters = Counters()
+    assert [count for _, count, _ in _place(Ordering(counters), sent, [])] == list(range(1000, 1200))
+    assert (counters.implausible, counters.lost) == (0, 0)

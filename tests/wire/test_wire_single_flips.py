@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from smartshoe.wire.checksums import checksum
-from smartshoe.wire.single_flips import FORMS, may_be_flipped
+from smartshoe.wire.counters import Counters
+from smartshoe.wire.framing import framed
+from smartshoe.wire.scanning import SAMPLE, FrameScanner
+from smartshoe.wire.single_flips import FORMS, FOUR_READINGS, may_be_flipped
 
 ENCODED = 18  # code, then 17 bytes
 Change = tuple[tuple[int, int], ...]
@@ -102,3 +105,29 @@ def test_a_frame_of_each_form_is_refused_and_its_neighbours_are_not(form: Change
         payloads[place, 4:7] = value
     payloads[form[0][0], 6] ^= 1
     assert sorted(set(may_be_flipped(payloads).tolist())) == [4, 5]
+
+
+def _frame_of(form: Change) -> np.ndarray:
+    """A sample frame's payload (17,) of the ``form``, with the checksum that belongs to it."""
+    rng = np.random.default_rng(2)
+    body = np.zeros(FOUR_READINGS - 2, dtype=np.uint8)
+    for _ in range(300_000):
+        body[1:] = rng.integers(0, 256, body.size - 1)
+        body[0] = SAMPLE
+        for place, value in form:
+            if place < body.size:
+                body[place] = value
+        payload = np.concatenate([body, np.frombuffer(checksum(body.tobytes()).to_bytes(2, "little"), np.uint8)])
+        if all(payload[place] == value for place, value in form):
+            return payload
+    raise AssertionError("no frame of this form was found")
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_whole_frame_of_a_form_is_not_read_from_a_stream(form: Change) -> None:
+    payload = _frame_of(form)
+    other = payload[:-2].copy()
+    other[form[1][0]] ^= 1
+    for body, taken in ((payload[:-2], 0), (other, 1)):
+        scanner = FrameScanner(FOUR_READINGS, Counters())
+        assert scanner.feed(framed(body.tobytes())).payloads.shape[1] == taken
