@@ -16,11 +16,13 @@ from simulators.gait import Person, Walk, trial
 from smartshoe.atomic import json_text
 from smartshoe.errors import UsageError
 from smartshoe.gait import analyse, centre_of_pressure, memberships
+from smartshoe.gait.contact import Contacts
 from smartshoe.gait.crossing import growth, level_places, rise_places, running_median
 from smartshoe.gait.insole import PLACES
 from smartshoe.gait.membership import PHASES
-from smartshoe.gait.strides import loading_rate
+from smartshoe.gait.strides import loading_rate, strides_of
 from smartshoe.gait.summary import asymmetry
+from smartshoe.gait.total import standing_mean
 from smartshoe.recording import REGIONS
 
 
@@ -226,3 +228,29 @@ def test_events_come_in_order_of_time() -> None:
     times = [event.time_s for event in analysed().events]
     assert times == sorted(times)
     assert len(times_of(analysed(), "left", "heel_strike")) > 20
+
+
+def test_impulse_and_peak_are_those_of_the_whole_stance() -> None:
+    rate_hz = 100.0
+    time_s = np.arange(0.0, 3.0, 1.0 / rate_hz)
+    strike_s, toe_off_s = np.array([0.5, 1.6, 2.7]), np.array([1.2, 2.3, np.nan])
+    down = (time_s >= 0.5) & (time_s < 1.2)
+    force_n = np.where(down, 500.0, 0.0) + np.where((time_s >= 1.6) & (time_s < 2.3), 800.0, 0.0)
+    none = np.full((3, 1), np.nan)
+    contacts = Contacts(("heel",), strike_s, toe_off_s, none, none, np.zeros(0), np.zeros((0, 1)))
+    found = strides_of("left", contacts, time_s + 1e-6, force_n, np.zeros(time_s.size, dtype=bool))
+    # 0.7 s at 500 and at 800 N; a sample's share of that is 1.4 %.
+    assert [stride.impulse_n_s for stride in found] == pytest.approx([350.0, 560.0], rel=1e-3)
+    assert [stride.peak_n for stride in found] == [500.0, 800.0]
+
+
+def test_the_sd_of_a_standing_weight_is_that_of_the_mean_of_its_blocks() -> None:
+    time_s = np.arange(0.0, 41.0, 0.01)
+    # Half a second is left out at either end; 20 blocks of 2 s are 10 N above and below 700 N in turn.
+    block = np.floor((time_s - 0.5 + 1e-6) / 2.0)
+    total_n = 700.0 + np.where(block % 2 == 0, 10.0, -10.0)
+    found = standing_mean(time_s, total_n, np.zeros(time_s.size, dtype=bool), [(0.0, 41.0)])
+    assert found is not None
+    assert found.mean_n == pytest.approx(700.0, abs=0.05)
+    assert found.length_s == pytest.approx(40.0, abs=0.02)
+    assert found.sd_n == pytest.approx(10.0 / np.sqrt(19.0), rel=0.01)

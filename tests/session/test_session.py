@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,45 @@ def test_a_damaged_journal_says_so_also_where_it_is_only_read(tmp_path: Path) ->
     journal.write_bytes(harmed)
     with SessionFolder.open(tmp_path / "s") as folder:
         assert "damaged and left out" in " ".join(folder.notes)
+
+
+def test_a_raw_log_that_was_changed_since_is_refused(tmp_path: Path) -> None:
+    with SessionFolder.begin(tmp_path, bench_plan()) as folder:
+        conduct(folder)
+        (log,) = (tmp_path / "raw").iterdir()
+        kept = log.read_bytes()
+        at = kept.rindex(b"1")
+        log.write_bytes(kept[:at] + b"2" + kept[at + 1 :])
+        with pytest.raises(InputError, match="sha256 differs"):
+            analyse(folder)
+        log.write_bytes(kept)
+        assert folder.accepted()["short"].log == log
+
+
+@pytest.mark.parametrize("is_live", [True, False])
+def test_a_live_shoes_block_is_on_disk_before_it_is_shown(
+    is_live: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plug pulled behind `keep` costs no sample of a live shoe; those of a virtual clock wait for the next event."""
+    on_disk = 0
+
+    def synced(handle: int) -> None:
+        nonlocal on_disk
+        on_disk = os.fstat(handle).st_size
+
+    with SessionFolder.begin(tmp_path, bench_plan()) as folder:
+        folder.note("begin", experiment="short", attempt=1)
+        for name in ("fsync", "fdatasync"):
+            monkeypatch.setattr(os, name, synced)
+        folder.note("shoe", says="so far")
+        before, time_s = on_disk, np.arange(20.0)
+        arrived = {"host_time_s": time_s, "arrival_s": time_s} if is_live else {}
+        folder.keep(Block(time_s, np.ones((20, 1)), np.zeros((20, 1), dtype=bool), ("toe",), MILLIBAR, **arrived))
+        written = (tmp_path / "journal.smj").stat().st_size
+        assert written > before
+        assert on_disk == (written if is_live else before)
+        folder.note("accepted", findings=[])
+        assert on_disk == (tmp_path / "journal.smj").stat().st_size
 
 
 def test_blocks_survive_the_journal_bit_for_bit(tmp_path: Path) -> None:
