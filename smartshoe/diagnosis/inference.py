@@ -32,6 +32,7 @@ Progress = Callable[[str], None]
 ROUNDS = 6
 STEPS_A_ROUND = 6
 STEPS_WITHOUT = 4
+LAST_STEPS = 25
 STEPS_A_RATE = 4
 FITTED_RIVALS = 2
 RATES_PER_S = (0.05, 0.3, 2.0)
@@ -113,10 +114,8 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     while (worst := _worse(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
         best = search(evidence, tuple(m for m in best.members if m != worst), refused)
-    chosen = tuple(sorted(given.candidates[m].name for m in best.members))
     likelihood = Likelihood(sessions, evidence.noise, extended.model, thresholds)
-    if chosen != tuple(sorted(extended.model.names)):
-        extended = fit(likelihood, _with(given, best, extended.model), STEPS_A_ROUND)
+    extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
     baseline = fit(likelihood, plain.model, STEPS_A_ROUND)
     progress("weighing alternatives")
     members = _members(evidence, best, refused, likelihood, extended)

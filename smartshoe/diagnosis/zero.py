@@ -22,6 +22,7 @@ from smartshoe.models.extended import ExtendedModel
 Array = NDArray[np.float64]
 
 FIRST_REST_S = 0.5
+MOST_REST_S = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,8 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
             nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
             resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < REST_SHARE)
         moved = np.flatnonzero(~resting)
-        first = slice(0, int(moved[0]) if moved.size else resting.size)
+        most = max(1, round(MOST_REST_S / session.conditions.step_s))  # drifts have not begun
+        first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
         kept = session.fitted[first]
         if kept.sum() * session.conditions.step_s >= FIRST_REST_S:
             reading = session.reading[first][kept] / model.gain
