@@ -31,8 +31,11 @@ _HOME = {
     "Calibration": "smartshoe.compensation",
     "CalibrationStore": "smartshoe.store",
     "Compensator": "smartshoe.compensation",
+    "compensate": "smartshoe.compensation",
     "stack": "smartshoe.compensation",
     "validate": "smartshoe.validation",
+    "Validation": "smartshoe.validation",
+    "GaitResult": "smartshoe.gait.result",
     "diagnose": "smartshoe.diagnosis",
     "Diagnosis": "smartshoe.diagnosis",
     "ExtendedModel": "smartshoe.models.extended",
@@ -42,10 +45,11 @@ _HOME = {
 }
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration, Compensator, stack
+    from smartshoe.compensation import Calibration, Compensator, compensate, stack
     from smartshoe.devices import open_machine, open_shoe
     from smartshoe.diagnosis import Diagnosis, diagnose
     from smartshoe.errors import SmartShoeError
+    from smartshoe.gait.result import GaitResult
     from smartshoe.identification import Identification, identify
     from smartshoe.identification.lack_of_fit import lack_of_fit
     from smartshoe.identification.leave_out import leave_one_rate_out
@@ -62,7 +66,7 @@ if TYPE_CHECKING:
     from smartshoe.store import CalibrationStore
     from smartshoe.studies import study
     from smartshoe.sweeps import sweep
-    from smartshoe.validation import validate
+    from smartshoe.validation import Validation, validate
 
 __all__ = [
     "Calibration",
@@ -71,12 +75,15 @@ __all__ = [
     "Compensator",
     "Diagnosis",
     "ExtendedModel",
+    "GaitResult",
     "Identification",
     "Protocol",
     "Recording",
     "RecursiveIdentification",
     "SmartShoeError",
     "TransferFunctionEstimate",
+    "Validation",
+    "compensate",
     "diagnose",
     "dynamic_protocol",
     "identify",
@@ -106,4 +113,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME, "gait"])
+    return sorted(__all__)

@@ -10,13 +10,17 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -112,8 +116,8 @@ def split_column(column: str) -> tuple[str, Unit | None]:
     return column, None
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Summarised):
     """One experiment: channels on one time base.
 
     ``time_s`` (n,) increases strictly; its step may vary. ``unit`` names the sensing unit (``left_toe``).
@@ -234,6 +238,33 @@ class Recording:
         """Whether every step is within 1 % of the median step."""
         step = np.diff(self.time_s)
         return bool(step.size == 0 or np.all(np.abs(step - np.median(step)) <= 0.01 * np.median(step)))
+
+    def plot(self) -> Figure:
+        """A figure: every channel over time, those of one unit of measurement on one axis; NaN leaves a gap."""
+        symbols = list(dict.fromkeys(channel.unit.symbol for channel in self.channels.values()))
+        figure, axes = panels(max(len(symbols), 1))
+        for axis, symbol in zip(axes, symbols, strict=False):
+            for channel in self.channels.values():
+                if channel.unit.symbol == symbol:
+                    axis.plot(self.time_s, channel.with_nan(), linewidth=0.8, label=channel.name)
+            axis.set(xlabel="time (s)", ylabel=symbol or "1")
+            axis.legend(loc="upper right")
+        axes[0].set_title(self.name)
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        rows = []
+        for channel in self.channels.values():
+            values = channel.values[channel.present]
+            ends = (float(values.min()), float(values.max())) if values.size else (None, None)
+            lost = str(len(self) - values.size)
+            rows.append([channel.name, channel.role, channel.unit.symbol, *map(significant, ends), lost])
+        return SummaryTable(
+            f"{self.name}: {len(self)} samples, {significant(self.duration_s)} s",
+            ["channel", "role", "unit", "least", "most", "missing"],
+            rows,
+            self.notes,
+        )
 
     # -- what it holds ---------------------------------------------------------------------------------------
     def of_role(self, role: Role) -> tuple[Channel, ...]:

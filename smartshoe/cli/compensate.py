@@ -25,13 +25,13 @@ def command(
     unit: str | None,
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
-    from smartshoe.compensation import Calibration, compensate
+    from smartshoe.compensation import Calibration, compensated
     from smartshoe.logs import write
 
     calibration = Calibration.load(calibration_path)
     (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
     warn_of_another_unit([recording], calibration)
-    result = compensate(recording, calibration)
+    result = compensated(recording, calibration)
     for note in result.notes[len(recording.notes) :]:
         click.echo(f"note: {note}", err=True)
     if out_path is not None:

@@ -16,6 +16,7 @@ from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.compensation.filter import Array, ForceFilter
 from smartshoe.compensation.reader import Reader, parsed
 from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.logs.accepted import RecordingLike, recording_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.first_order import simulate, steps
@@ -199,13 +200,22 @@ def _sensor_for(recording: Recording, calibration: Calibration) -> Channel:
     return named[0]
 
 
-def compensate(recording: Recording, calibration: Calibration) -> Recording:
+def compensate(recording: RecordingLike, calibration: Calibration) -> Array:
+    """Force (n,) in N of a recording, a file or a DataFrame by ``calibration``, finite at every sample.
+
+    The numbers are those of `compensated`, which keeps them beside the other channels, and so are the errors raised.
+    """
+    return compensated(recording, calibration)[ESTIMATE_NAME].si
+
+
+def compensated(recording: RecordingLike, calibration: Calibration) -> Recording:
     """``recording`` with the channel ``force_estimate`` in N (column ``force_estimate_n``), finite at every sample.
 
     An even time base runs the bilinear filter at its own rate, an uneven one the exact response for straight lines
     between samples. Missing readings hold the last one; ``notes`` count them. Raises `MissingChannelError` without a
     reading of the unit, `UnitError` where its quantity is not the calibration's.
     """
+    recording = recording_of(recording)
     channel = _sensor_for(recording, calibration)
     if channel.unit != calibration.reading_unit and channel.unit.quantity != calibration.reading_unit.quantity:
         raise UnitError(

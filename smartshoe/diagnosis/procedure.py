@@ -29,6 +29,7 @@ from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.diagnosis.traits import Traits, traits_of
 from smartshoe.diagnosis.zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.errors import UsageError
+from smartshoe.logs.accepted import RecordingLike, recordings_of
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
@@ -44,8 +45,8 @@ def _silent(_: str) -> None:
 
 
 def diagnose(
-    recordings: Sequence[Recording] | Recording,
-    hold_out: Sequence[Recording] = (),
+    recordings: RecordingLike | Sequence[RecordingLike],
+    hold_out: RecordingLike | Sequence[RecordingLike] = (),
     *,
     material: float | None = None,
     thresholds: Thresholds | None = None,
@@ -56,7 +57,8 @@ def diagnose(
     Parameters
     ----------
     recordings
-        Load and reading of one unit, each a session of its own unless its metadata ``continues`` names another.
+        Load and reading of one unit (recordings, paths or DataFrames), each a session of its own unless its metadata
+        ``continues`` names another.
     hold_out
         Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is kept.
     material
@@ -72,13 +74,13 @@ def diagnose(
         Where no recording is given. A diagnosis that the data cannot support comes back with the verdict "refused" and
         the reason in ``limits``.
     """
-    fitted = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    fitted, kept_out = recordings_of(recordings), recordings_of(hold_out, "hold_out")
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
     decided = thresholds or Thresholds()
     if material is not None:
         decided = replace(decided, material=material)
-    everything = [*fitted, *hold_out]
+    everything = [*fitted, *kept_out]
     integrity = examine(everything)
     refusals = integrity.refusals or _outside(everything)
     if refusals:

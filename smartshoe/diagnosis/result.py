@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.thresholds import Thresholds, described
+from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
@@ -19,6 +20,8 @@ from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from smartshoe.compensation import Calibration
 
 Array = NDArray[np.float64]
@@ -148,8 +151,8 @@ class Trace:
     cycle: NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Summarised):
     """What measured data says of its simulation; see the contract's section 4 for `to_dict`.
 
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
@@ -202,6 +205,39 @@ class Diagnosis:
             load_range_n=(0.0, self.full_scale_load_n),
             sample_rate_hz=sample_rate_hz,
             created=created,
+        )
+
+    def plot(self) -> Figure:
+        """A figure: by recording, what the baseline and the extended model leave of the reading over time.
+
+        Raises `NotIdentifiableError` where the diagnosis was refused.
+        """
+        if not self.traces:
+            raise NotIdentifiableError(f"there is no model to plot: {self.says}")
+        figure, axes = panels(len(self.traces))
+        for axis, trace in zip(axes, self.traces, strict=True):
+            for label, simulated, colour in (("baseline", trace.baseline, "0.6"), ("extended", trace.extended, "C0")):
+                left = np.where(trace.usable, trace.reading - simulated, np.nan)
+                axis.plot(trace.time_s, left, linewidth=0.8, color=colour, label=label)
+            axis.set(title=trace.name, xlabel="time (s)", ylabel=f"measured minus model ({self.unit})")
+            axis.legend(loc="upper right")
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        rows = [
+            [
+                cause.name.replace("_", " "),
+                significant(cause.confidence, 2),
+                significant(100.0 * cause.size, 3),
+                significant(cause.held_out.gain_percent, 3),
+            ]
+            for cause in self.causes
+        ]
+        return SummaryTable(
+            f"{self.verdict.replace('_', ' ')}: {self.says}",
+            ["cause", "confidence", "size % of full scale", "gain on held-out data %"],
+            rows,
+            self.limits,
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -272,7 +272,7 @@ def _forces(recording: Recording, units: Mapping[str, Channel], by_unit: Mapping
             forces[name] = channel.si
         elif name in by_unit:
             alone = recording.without(*(other for other in recording.channels if other != name))
-            forces[name] = compensate(alone, by_unit[name])["force_estimate"].si
+            forces[name] = compensate(alone, by_unit[name])
     return forces
 
 

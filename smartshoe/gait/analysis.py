@@ -29,7 +29,7 @@ from smartshoe.gait.total import (
     total_of,
 )
 from smartshoe.gait.trial import Foot, feet_of
-from smartshoe.recording import Recording
+from smartshoe.logs.accepted import RecordingLike, recordings_of
 
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 
 def analyse(
-    recordings: Recording | Sequence[Recording],
+    recordings: RecordingLike | Sequence[RecordingLike],
     calibrations: Calibration | Sequence[Calibration] = (),
     body_weight_n: float | None = None,
     coverage: float | Coverage = 1.0,
@@ -65,9 +65,9 @@ def analyse(
 
         if estimator not in NAMES:
             raise UsageError(f"estimator {estimator!r} is not known: use one of {', '.join(NAMES)}")
-    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    given = recordings_of(recordings)
     calibrations = list(calibrations) if isinstance(calibrations, Sequence) else [calibrations]
-    feet, flags = feet_of(recordings, calibrations, estimator)
+    feet, flags = feet_of(given, calibrations, estimator)
     contacts = {name: _detector(foot, LEAST_LOAD_N).apply(foot.load) for name, foot in feet.items()}
     if not any(len(own) for own in contacts.values()) and not any(_is_loaded(f, f.load, None) for f in feet.values()):
         # Nothing of a person's weight: perhaps another unit, in which steps are steps all the same.
@@ -76,7 +76,7 @@ def analyse(
     loaded = {name: _is_loaded(foot, loads[name], body_weight_n) for name, foot in feet.items()}
     if not any(loaded.values()) and not any(len(own) for own in contacts.values()):
         raise RefusedError(
-            f"{recordings[0].label}: no stance is found and no foot is loaded: check that the shoes were worn, and the"
+            f"{given[0].label}: no stance is found and no foot is loaded: check that the shoes were worn, and the"
             " columns' units"
         )
     courses = {

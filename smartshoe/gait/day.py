@@ -41,7 +41,7 @@ PEAKS = 1000  # stances whose peaks are what is usual
 Told = Callable[[Sequence[Event], Sequence[Stride]], None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DayResult(GaitResult):
     """A long trial: numbers and flags of the whole; ``events`` and ``strides`` are the first ones, up to
     ``listed_s``, of ``event_count`` and ``stride_count``. It keeps no course against time."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.display import Shown, SummaryTable, panels, significant
 from smartshoe.errors import UsageError
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.coverage import Coverage
@@ -20,6 +21,7 @@ from smartshoe.gait.total import BodyWeight
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -76,8 +78,8 @@ class Forces:
     rmse_estimate_n: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class GaitResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class GaitResult(Shown):
     """A trial: ``events`` in order of time, ``strides`` in order of their start, ``summary`` and ``indices`` by name.
 
     ``feet`` holds each foot against time, ``total_time_s`` and ``total_n`` (n,) both feet's force, None where it is
@@ -135,6 +137,38 @@ class GaitResult:
                 forces[f"{name}_phase"] = pd.Categorical.from_codes(forces[f"{name}_phase"], pd.Index(STATES))
             return pd.DataFrame(forces)
         raise UsageError(f"table {table!r} is not known: use strides, events or forces")
+
+    def plot(self) -> Figure:
+        """A figure: by foot, its force over time (its units' readings where no force is known), and the events."""
+        self.columns()  # a streamed trial, which keeps none, says so
+        figure, axes = panels(len(self.feet))
+        for axis, (name, foot) in zip(axes, self.feet.items(), strict=True):
+            if foot.force_n is not None:
+                axis.plot(foot.time_s, foot.force_n, linewidth=0.8, color="black", label="whole foot")
+            for column, region in enumerate(foot.regions):
+                axis.plot(foot.time_s, foot.load[:, column], linewidth=0.8, label=region)
+            for event, colour in (("heel_strike", "tab:green"), ("toe_off", "tab:red")):
+                times = [one.time_s for one in self.events if one.foot == name and one.event == event]
+                axis.plot(times, np.zeros(len(times)), "|", markersize=10, color=colour, label=event.replace("_", " "))
+            unit = "N" if foot.is_force else foot.symbol
+            axis.set(title=name, xlabel="time (s)", ylabel=f"{'force' if foot.is_force else 'reading'} ({unit})")
+            axis.legend(loc="upper right")
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        weight = self.forces.body_weight
+        rows = [
+            [name.replace("_", " "), significant(value) if isinstance(value, (int, float)) else str(value)]
+            for name, value in self.summary.items()
+            if value is not None and not isinstance(value, Mapping)
+        ]
+        said = "" if weight is None else f", body weight {significant(weight.value)} N ({weight.source})"
+        return SummaryTable(
+            f"{self.activity}: {len(self.strides)} strides, {len(self.events)} events{said}",
+            ["figure", "value"],
+            rows,
+            [flag.says for flag in self.flags],
+        )
 
     def columns(self) -> dict[str, Any]:
         """The table of forces by column: units, feet, total, centre of pressure (% of the insole), phase (0 swing,

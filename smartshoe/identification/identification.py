@@ -7,25 +7,30 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from smartshoe.compensation import Calibration, Compensator
-from smartshoe.errors import RefusedError
+from smartshoe.display import Summarised, SummaryTable, panels, significant
+from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification.consistency import ConsistencyTest, consistency_test
 from smartshoe.identification.estimator import Fit
 from smartshoe.identification.experiment import Array, Direction
 from smartshoe.identification.residual_tests import ResidualTest, residual_tests
 from smartshoe.models import Parameter, StandardLinearSolid, discretise
 from smartshoe.models.parameter import finite_or_none
+from smartshoe.recording import Recording
 from smartshoe.units import Unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SCHEMA = "smartshoe.identification/1"
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Summarised):
     """force / reading = (b0 s + b1)/(s + a1), Chinimilli 2016 (13), with its uncertainty.
 
     ``parameters`` a1, b0, b1 (readings in ``reading_unit``) and k1, k2, c, whatever the ``direction``, which says
@@ -73,6 +78,87 @@ class Identification:
             experiment.name: experiment.of_recording(problem.model_error(self.fit.theta, index))
             for index, experiment in enumerate(problem.experiments)
         }
+
+    def predicted(self, recording: str | Recording) -> Array:
+        """What the model says of a recording of this fit.
+
+        Parameters
+        ----------
+        recording
+            Its name, or the recording itself.
+
+        Returns
+        -------
+        (n,) the reading in ``reading_unit`` (forward) or the load in N (inverse) at every sample, with the offsets,
+        the delay and the initial state as fitted.
+
+        Raises
+        ------
+        UsageError
+            Where the fit did not use this recording, or ``recording`` is neither a name nor a `Recording`.
+        """
+        if not isinstance(recording, (str, Recording)):
+            raise UsageError(f"recording is of type {type(recording).__name__}: give its name or the Recording")
+        name = recording if isinstance(recording, str) else recording.name
+        if name not in self.errors:
+            raise UsageError(f"recording {name!r} is not of this fit: use one of {', '.join(self.errors)}")
+        if isinstance(recording, Recording) and len(recording) != self.errors[name].size:
+            raise UsageError(
+                f"recording {name!r} has {len(recording)} samples, the one of that name in this fit"
+                f" {self.errors[name].size}: give the recording that was fitted"
+            )
+        return self._measured[name][1] + self.errors[name]
+
+    @cached_property
+    def _measured(self) -> Mapping[str, tuple[Array, Array]]:
+        """By recording, times (n,) from its start and the output, fixed zeros in it: errors are model minus this."""
+        settings = self.fit.problem.settings
+        inverse = settings.direction == "inverse"
+        zero = (settings.load_offset_n if inverse else settings.offset) or 0.0
+        return {
+            experiment.name: (
+                experiment.of_recording(experiment.time_s),
+                experiment.of_recording(output) + zero,
+            )
+            for experiment, output in zip(self.fit.problem.experiments, self.fit.problem.outputs, strict=True)
+        }
+
+    def plot(self) -> Figure:
+        """A figure: by recording, the measured signal with the model's, and below it measured minus model."""
+        figure, axes = panels(2 * len(self._measured), height=2.0)
+        quantity = "load" if self.direction == "inverse" else "reading"
+        for upper, lower, (name, (time_s, measured)) in zip(axes[::2], axes[1::2], self._measured.items(), strict=True):
+            upper.plot(time_s, measured, color="0.6", label="measured")
+            upper.plot(time_s, self.predicted(name), linewidth=1.0, label="model")
+            upper.set(title=name, ylabel=f"{quantity} ({self.rmse_unit})")
+            upper.legend(loc="upper right")
+            lower.plot(time_s, self.residuals[name], linewidth=0.8)
+            lower.set(xlabel="time (s)", ylabel=f"residual ({self.rmse_unit})")
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        shown = {
+            **self.parameters,
+            "delay": self.delay_s,
+            **{f"offset ({name})": one for name, one in self.offsets.items()},
+        }
+        rows = [
+            [
+                name,
+                significant(one.value, 6),
+                significant(one.sd, 2),
+                *(significant(end, 6) for end in one.ci95),
+                one.unit,
+            ]
+            for name, one in shown.items()
+        ]
+        return SummaryTable(
+            f"{self.unit}: {self.direction} fit by {self.method}, {self.estimator.replace('_', ' ')},"
+            f" fit {self.fit_percent:.2f} %, RMSE {significant(self.rmse)} {self.rmse_unit}",
+            ["parameter", "value", "sd", "95 % from", "to", "unit"],
+            rows,
+            self.notes,
+        )
 
     @property
     def residuals(self) -> Mapping[str, Array]:
@@ -153,8 +239,11 @@ class Identification:
             a1, b0, b1, offset=self.offset, sample_rate_hz=sample_rate_hz, reading_unit=self.reading_unit
         )
 
-    def calibration(self, created: str = "") -> Calibration:
-        """The calibration to save; ``created`` is an ISO date where the caller wants one in the file."""
+    def calibration(self, created: str = "", *, unit: str | None = None) -> Calibration:
+        """The calibration to save, of ``unit`` (the recordings' own where it is not given).
+
+        ``created`` is an ISO date where the caller wants one in the file.
+        """
         from smartshoe import __version__
 
         a1, b0, b1 = self.coefficients
@@ -164,7 +253,7 @@ class Identification:
             b1=b1,
             reading_unit=self.reading_unit,
             offset=self.offset,
-            unit=self.unit,
+            unit=self.unit if unit is None else unit,
             parameters=dict(self.parameters),
             covariance=tuple(tuple(float(value) for value in row) for row in self.covariance),
             scale=self.scale,

@@ -16,6 +16,7 @@ from smartshoe.identification.experiment import Direction, Mask, prepare
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.parametrisation import GREY_FIXED, FreeForm, GreyBox, Parametrisation, Structure
 from smartshoe.identification.prediction_error import LARGEST_DELAY_S, PredictionError, Settings
+from smartshoe.logs.accepted import RecordingLike, recordings_of
 from smartshoe.recording import Recording
 from smartshoe.units import Unit
 
@@ -25,7 +26,7 @@ Free = Literal["estimate"]
 
 @on_one_thread
 def identify(
-    recordings: Recording | Sequence[Recording],
+    recordings: RecordingLike | Sequence[RecordingLike],
     *,
     direction: Direction = "inverse",
     method: Method = "trf",
@@ -69,7 +70,7 @@ def identify(
     not settle (unless ``strict`` is False), `RefusedError` where an estimator lacks what it needs, `InputError` and
     `UsageError` for wrong input.
     """
-    several = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    several = recordings_of(recordings)
     _check_choices(direction, method, structure, initial_state, estimator)
     _check_positive(prefilter_rad_s=prefilter_rad_s, tolerance=tolerance, max_iterations=max_iterations)
     experiments, reading_unit = prepare(several, counted)

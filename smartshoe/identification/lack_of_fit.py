@@ -12,6 +12,7 @@ from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.identification.cycles import CycleGroup, repeated_cycles
 from smartshoe.identification.experiment import Array
 from smartshoe.identification.identification import Identification
+from smartshoe.logs.accepted import RecordingLike, recordings_of
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Recording
 
@@ -46,13 +47,13 @@ class LackOfFit:
 
 
 def lack_of_fit(
-    found: Identification, recordings: Recording | Sequence[Recording], *, skip_first: int = 0
+    found: Identification, recordings: RecordingLike | Sequence[RecordingLike], *, skip_first: int = 0
 ) -> LackOfFit:
     """The F test of a fit's residual over repeated cycles of the ``recordings`` that it was made from, in their order.
 
     ``skip_first`` cycles of each recording are left out. Raises `NotIdentifiableError` where nothing repeats.
     """
-    several = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    several = recordings_of(recordings)
     return lack_of_fit_of(found.residuals, several, unknowns=found.fit.problem.size, skip_first=skip_first)
 
 

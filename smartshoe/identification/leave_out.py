@@ -13,6 +13,7 @@ from smartshoe.errors import NotConvergedError, NotIdentifiableError
 from smartshoe.identification.experiment import Array, Experiment, Mask, prepare
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.identifier import identify
+from smartshoe.logs.accepted import RecordingLike, recordings_of
 from smartshoe.models.first_order import lag, shifted
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Channel, Recording
@@ -80,7 +81,7 @@ class LeaveOneRateOut:
         }
 
 
-def leave_one_rate_out(recordings: Recording | Sequence[Recording], **options: Any) -> LeaveOneRateOut:
+def leave_one_rate_out(recordings: RecordingLike | Sequence[RecordingLike], **options: Any) -> LeaveOneRateOut:
     """Identify once without each loading rate (rates within 10 % are one); ``options`` are those of `identify`.
 
     A cycle goes out together with the rest after it. A recording of which nothing else is left goes out whole: its
@@ -89,7 +90,7 @@ def leave_one_rate_out(recordings: Recording | Sequence[Recording], **options: A
     Raises `NotIdentifiableError` where there is only one rate or each fold is refused, and what `identify` raises of
     all recordings together.
     """
-    several = _in_one_unit([recordings] if isinstance(recordings, Recording) else list(recordings))
+    several = _in_one_unit(recordings_of(recordings))
     counted: Mapping[str, Mask] = dict(options.pop("counted", None) or {})
     everything = identify(several, counted=counted, **options)
     experiments, _ = prepare(several, counted, on_one_step=False)

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
 from smartshoe.compensation import Calibration, compensate
+from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import InputError
 from smartshoe.loading import Cycle, by_rate, cycles
-from smartshoe.recording import Recording
+from smartshoe.logs.accepted import RecordingLike, recordings_of
 from smartshoe.validation import metrics
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -59,8 +63,8 @@ class RateResult:
     delay_s: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class Validation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(Summarised):
     """The verdict on a calibration: ``overall``, ``rates`` in ascending order, and the signals behind them."""
 
     unit: str | None
@@ -84,16 +88,49 @@ class Validation:
             "recordings": [{"name": t.name, "samples": int(t.time_s.size)} for t in self.traces],
         }
 
+    def plot(self) -> Figure:
+        """A figure: by recording, the force with and without compensation over the reference load."""
+        figure, axes = panels(len(self.traces))
+        for axis, trace in zip(axes, self.traces, strict=True):
+            load_n = np.where(trace.valid, trace.load_n, np.nan)
+            axis.plot(load_n, trace.static_n, color="0.6", linewidth=0.8, label="best static line")
+            axis.plot(load_n, trace.compensated_n, linewidth=0.8, label="compensated")
+            ends = [float(np.nanmin(load_n)), float(np.nanmax(load_n))] if trace.valid.any() else [0.0, 0.0]
+            axis.plot(ends, ends, color="black", linewidth=0.6, linestyle="--", label="reference")
+            axis.set(title=trace.name, xlabel="reference load (N)", ylabel="force (N)")
+            axis.legend(loc="upper left")
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        def cells(name: str, one: RateResult) -> list[str]:
+            figures = (
+                one.rmse_raw_n,
+                one.rmse_static_n,
+                one.rmse_compensated_n,
+                one.improvement_over_static_percent,
+                one.hysteresis_compensated_percent,
+            )
+            return [name, str(one.cycles), *map(significant, figures)]
+
+        rates = [cells(f"{significant(one.rate_n_per_s)} N/s", one) for one in self.rates]
+        overall = self.overall
+        return SummaryTable(
+            f"{self.unit or 'unit'}: RMSE {significant(overall.rmse_compensated_n)} N compensated,"
+            f" {significant(overall.rmse_static_n)} N best static line, full scale {significant(self.full_scale_n)} N",
+            ["rate", "cycles", "raw N", "static N", "compensated N", "better than static %", "hysteresis %"],
+            [cells("all", overall), *rates],
+        )
+
 
 @on_one_thread
-def validate(recordings: Recording | Sequence[Recording], calibration: Calibration) -> Validation:
+def validate(recordings: RecordingLike | Sequence[RecordingLike], calibration: Calibration) -> Validation:
     """Judge ``calibration`` on recordings with a reference load and one sensor each.
 
     The best static gain and offset is one pair fitted on these very recordings: the calibration has to beat a line
     that was allowed to see the data. Raises `InputError` (`MissingChannelError`, `UnitError`) for recordings that
     cannot be judged.
     """
-    given = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    given = recordings_of(recordings)
     if not given:
         raise InputError("there is no recording to validate on: give one at least")
     unit = calibration.reading_unit
@@ -113,7 +150,7 @@ def validate(recordings: Recording | Sequence[Recording], calibration: Calibrati
             load_n,
             calibration.scale * reading,
             gain * reading + offset_n,
-            compensate(recording, calibration)["force_estimate"].si,
+            compensate(recording, calibration),
             mask,
         )
         for recording, reading, load_n, mask in zip(given, readings, loads, valid, strict=True)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.compensation import Calibration, Compensator, compensate, stack
+from smartshoe.compensation import Calibration, Compensator, compensated, stack
 from smartshoe.errors import InputError, UnitError, UsageError
 from smartshoe.models import Parameter, discretise
 from smartshoe.models.discretise import run_plainly
@@ -120,11 +120,11 @@ def test_a_recording_gains_a_finite_force_estimate(even: bool) -> None:
     time_s = np.arange(300) / 100 if even else np.cumsum(rng.uniform(0.005, 0.015, 300))
     force_n = 100 * np.sin(time_s) ** 2
     pressure = np.where(rng.random(300) < 0.1, np.nan, force_n)
-    found = compensate(Recording.from_arrays(time_s=time_s, force_n=force_n, pressure_pa=pressure * 100), CALIBRATION)
+    found = compensated(Recording.from_arrays(time_s=time_s, force_n=force_n, pressure_pa=pressure * 100), CALIBRATION)
     estimate = found["force_estimate"]
     assert np.isfinite(estimate.values).all()
     assert estimate.unit.symbol == "N"
-    whole = compensate(Recording.from_arrays(time_s=time_s, pressure_pa=force_n * 100), CALIBRATION)
+    whole = compensated(Recording.from_arrays(time_s=time_s, pressure_pa=force_n * 100), CALIBRATION)
     assert np.max(np.abs(estimate.values - whole["force_estimate"].values)) < 20.0
     assert any("missing" in note for note in found.notes)
 
@@ -132,4 +132,4 @@ def test_a_recording_gains_a_finite_force_estimate(even: bool) -> None:
 def test_volts_are_refused_by_a_calibration_for_pressure() -> None:
     recording = Recording.from_arrays(time_s=[0.0, 0.01], pressure_v=[1.0, 2.0])
     with pytest.raises(UnitError, match="mbar"):
-        compensate(recording, CALIBRATION)
+        compensated(recording, CALIBRATION)

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.cli import run_command
-from smartshoe.compensation import Calibration, Compensator, compensate, extended_calibration
+from smartshoe.compensation import Calibration, Compensator, compensated, extended_calibration
 from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.errors import InputError, UnitError
 from smartshoe.logs import read, write
@@ -110,9 +110,9 @@ def test_a_damaged_model_is_refused_with_its_key(tmp_path: Path, change: dict[st
 
 def test_a_recording_is_compensated_and_told_what_is_left() -> None:
     recording = _recording(MODEL)
-    found = compensate(recording, CALIBRATION)
+    found = compensated(recording, CALIBRATION)
     error_n = found["force_estimate"].values - recording.force_n
-    undelayed = compensate(_recording(MODEL.without("delay")), CALIBRATION)["force_estimate"].values
+    undelayed = compensated(_recording(MODEL.without("delay")), CALIBRATION)["force_estimate"].values
     assert np.max(np.abs(undelayed - recording.force_n)) < 1e-6
     assert np.sqrt(np.mean(error_n**2)) > 1.0
     assert any("delay is not compensated" in note for note in found.notes)
@@ -141,7 +141,7 @@ def test_uneven_steps_give_the_same_force_whenever_the_recording_began() -> None
     uneven = np.flatnonzero(np.arange(at.time_s.size) % 7 != 3)
     readings = MODEL.reading(at)[uneven]
     now, later = (
-        compensate(Recording.from_arrays(time_s=began_s + at.time_s[uneven], pressure_mbar=readings), CALIBRATION)[
+        compensated(Recording.from_arrays(time_s=began_s + at.time_s[uneven], pressure_mbar=readings), CALIBRATION)[
             "force_estimate"
         ].values
         for began_s in (0.0, 1000.0)
@@ -159,7 +159,7 @@ def test_uneven_steps_are_set_on_an_even_grid() -> None:
     readings = model.reading(conditions)[keep]
     readings[40:43] = np.nan
     recording = Recording.from_arrays(time_s=conditions.time_s[keep], pressure_mbar=readings)
-    found = compensate(recording, extended_calibration(model))
+    found = compensated(recording, extended_calibration(model))
     error_n = found["force_estimate"].values - 800.0 * conditions.load[keep]
     # A corner between two samples is cut: half a step at 1600 N/s.
     assert np.max(np.abs(error_n)) < 16.0
@@ -178,7 +178,7 @@ def test_the_extended_model_validates_better_than_its_linear_part() -> None:
 
 def test_another_quantity_is_refused() -> None:
     with pytest.raises(UnitError, match="mbar"):
-        compensate(Recording.from_arrays(time_s=[0.0, 0.01], pressure_v=[1.0, 2.0]), CALIBRATION)
+        compensated(Recording.from_arrays(time_s=[0.0, 0.01], pressure_v=[1.0, 2.0]), CALIBRATION)
 
 
 @given(a1=st.floats(0.02, 5.0), gain=st.floats(0.3, 10.0), share=st.floats(0.01, 3.0), offset=st.floats(-20.0, 20.0))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smartshoe.compensation import compensate, extended_calibration
+from smartshoe.compensation import compensated, extended_calibration
 from smartshoe.devices import open_machine
 from smartshoe.errors import InputError, SmartShoeError
 from smartshoe.models.effects import effect
@@ -53,7 +53,7 @@ def test_the_next_simulation_of_a_unit_is_its_own(
     recording = simulate(*load(scenario))["left_toe"]["dynamic"]
     assert "unit.json" in recording.metadata["is_twin"]
     assert recording.sensor.values[:20].mean() == pytest.approx(-3.4, abs=0.2)  # below zero, as the unit reads
-    error_n = compensate(recording, extended_calibration(_leaking()))["force_estimate"].values - recording.force_n
+    error_n = compensated(recording, extended_calibration(_leaking()))["force_estimate"].values - recording.force_n
     # 12 bits of both channels: 0.05 mbar and 0.24 N; 0.3 N of the load cell.
     assert np.sqrt(np.mean(error_n**2)) < 2.5
 

@@ -12,7 +12,7 @@ from simulators.daq import MyRioParameters
 from simulators.instron import InstronParameters, SensingUnit, SimulatedInstron
 from simulators.sensor import HdiParameters, SimulatedHdiSensor
 from simulators.twin import twin_of
-from smartshoe.compensation import Calibration, compensate, extended_calibration
+from smartshoe.compensation import Calibration, compensated, extended_calibration
 from smartshoe.errors import InputError
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
@@ -52,8 +52,8 @@ def test_the_machine_presses_a_twin_and_its_filter_finds_the_load(file: Path) ->
     with _machine(file) as machine:
         recording = machine.run(dynamic_protocol((400.0, 1600.0), rest_s=2.0))
     unit = Calibration.load(file)
-    error_n = compensate(recording, unit)["force_estimate"].values - recording.force_n
-    plain_n = compensate(recording, replace(unit, extended=None))["force_estimate"].values - recording.force_n
+    error_n = compensated(recording, unit)["force_estimate"].values - recording.force_n
+    plain_n = compensated(recording, replace(unit, extended=None))["force_estimate"].values - recording.force_n
     # 16 bits of both channels, 1 N of corners that fall between samples.
     assert np.sqrt(np.mean(error_n**2)) < 1.5
     assert np.sqrt(np.mean(plain_n**2)) > 4.0

@@ -1,0 +1,83 @@
+"""How a result shows itself to a person: one line, a table as text, the same table in a notebook, a figure."""
+
+from __future__ import annotations
+
+import html
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class SummaryTable:
+    """A ``title``, rows of cells under ``columns``, and remarks below them, one sentence each."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    remarks: Sequence[str] = ()
+
+    def to_text(self) -> str:
+        """Aligned columns: the first to the left, the others to the right."""
+        lines = [self.title]
+        if self.rows:
+            table = [self.columns, *self.rows]
+            widths = [max(len(row[index]) for row in table) for index in range(len(self.columns))]
+            for row in table:
+                first, *rest = (
+                    cell.rjust(width) if index else cell.ljust(width)
+                    for index, (cell, width) in enumerate(zip(row, widths, strict=True))
+                )
+                lines.append("  ".join([first, *rest]).rstrip())
+        return "\n".join([*lines, *self.remarks])
+
+    def to_html(self) -> str:
+        """The same for a notebook; every text is escaped."""
+        head = "".join(f"<th>{html.escape(cell)}</th>" for cell in self.columns)
+        body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in self.rows)
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>" if self.rows else ""
+        below = "".join(f"<p>{html.escape(remark)}</p>" for remark in self.remarks)
+        return f"<div><p><b>{html.escape(self.title)}</b></p>{table}{below}</div>"
+
+
+class Shown(ABC):
+    """A result with a one-line ``repr`` and an HTML table in notebooks, both from one `SummaryTable`."""
+
+    @abstractmethod
+    def _summary_table(self) -> SummaryTable: ...
+
+    @abstractmethod
+    def plot(self) -> Figure:
+        """A matplotlib figure; matplotlib is imported on the first call."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {' '.join(self._summary_table().title.split())}>"
+
+    def _repr_html_(self) -> str:
+        return self._summary_table().to_html()
+
+
+class Summarised(Shown):
+    """The same with the table as text."""
+
+    def summary(self) -> str:
+        """The table for a person, as text of several lines."""
+        return self._summary_table().to_text()
+
+
+def significant(value: float | None, digits: int = 4) -> str:
+    """``value`` to ``digits`` significant digits; a dash where there is none."""
+    return "–" if value is None or value != value else f"{value:.{digits}g}"
+
+
+def panels(count: int, *, height: float = 2.6) -> tuple[Figure, list[Axes]]:
+    """A figure of ``count`` axes below each other, outside pyplot: nothing stays open."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, height * count + 0.4), layout="constrained")
+    return figure, list(figure.subplots(count, 1, squeeze=False)[:, 0])
