@@ -272,3 +272,12 @@ def test_calibrations_are_matched_by_name() -> None:
 def test_arguments_out_of_range_are_refused(settings: dict[str, float], says: str) -> None:
     with pytest.raises(UsageError, match=says):
         analyse(walked().recording, **settings)
+
+
+def test_a_result_shows_itself_in_a_line_a_table_and_a_figure() -> None:
+    found = analyse(ran().recording)
+    assert "\n" not in repr(found)
+    assert "<table>" in found._repr_html_()
+    axes = found.plot().axes
+    assert [axis.get_title() for axis in axes] == list(found.feet)
+    assert all(axis.lines for axis in axes)
