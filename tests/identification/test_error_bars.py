@@ -21,6 +21,10 @@ def test_the_quantile_is_that_of_the_printed_table(degrees: int, quantile: float
     assert t_quantile(degrees) == pytest.approx(quantile, rel=5e-5)
 
 
+def test_an_interval_from_a_standard_deviation_alone_is_the_normal_laws() -> None:
+    assert Parameter.from_sd(10.0, 2.0, "N").ci95 == pytest.approx((10.0 - 3.919928, 10.0 + 3.919928), abs=1e-6)
+
+
 def _told(found) -> dict[str, Parameter]:  # type: ignore[no-untyped-def]
     """The springs and the nuisances by name."""
     return {
