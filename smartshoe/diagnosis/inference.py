@@ -103,8 +103,7 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         again = _settled(_with_another_pole(state, sessions, thresholds), sessions, thresholds, progress)
-        noise = state.evidence.noise
-        state = min(state, again, key=lambda one: one.total(Likelihood(sessions, noise, plain.model, thresholds)))
+        state = _simpler(state, again, Likelihood(sessions, state.evidence.noise, plain.model, thresholds))
     state = _with_laws(state, sessions, thresholds)
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     refused: list[str] = []
@@ -155,6 +154,18 @@ class _State:
     def total(self, likelihood: Likelihood) -> float:
         """-2 log likelihood of the fit, and of the odds against its members."""
         return likelihood.cost(self.fit.model) + self.evidence.odds * len(self.fit.model.parts)
+
+
+def _simpler(first: _State, second: _State, likelihood: Likelihood) -> _State:
+    """The likelier of two, odds against their members counted; that with fewer where they hardly read differently.
+
+    What is immaterial counts for nothing, however sure it is: an arm that imitates a lag of a millisecond needs another
+    one in its own place.
+    """
+    thresholds = first.given.thresholds
+    if apart(likelihood.sessions, first.fit.model, second.fit.model) < thresholds.alike * thresholds.material:
+        return min(first, second, key=lambda one: len(one.fit.model.parts))
+    return min(first, second, key=lambda one: one.total(likelihood))
 
 
 def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> _State:

@@ -56,6 +56,9 @@ class Thresholds:
         "structure that small imperfections of a good unit add up to",
         "effects below 0.1 %",
     )
+    alike: float = threshold(
+        3.0, "times material", "two models whose readings differ by less are one, and the simpler is taken", "judgement"
+    )
     law_departure: float = threshold(
         0.4, "share of an effect's size", "a departure from which on the law is unsure", "effects.md: 5 to 40 %"
     )

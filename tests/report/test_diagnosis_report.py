@@ -15,7 +15,7 @@ import pytest
 from balance import Balance
 from hypothesis import given
 from hypothesis import strategies as st
-from smartshoe.diagnosis.judgement import Gain
+from smartshoe.diagnosis.held_out import Gain
 
 from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.result import Cause, Diagnosis, NextExperiment, Rival, Standing, Statement, Trace
@@ -299,8 +299,9 @@ def test_a_page_of_unusual_data_is_written_all_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_terminal_says_the_verdict_first_and_everything_after(
-    name: str, capsys: pytest.CaptureFixture[str]
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("COLUMNS", "240")  # wide enough that no number is folded
     made = case(name)
     print_diagnosis(made, "left_toe")
     lines = capsys.readouterr().out.splitlines()

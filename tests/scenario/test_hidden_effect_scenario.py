@@ -13,4 +13,4 @@ def test_the_hidden_leak_and_warm_up_are_found_and_nothing_else(root: Path, caps
     assert run_command(["run", str(root / "scenarios" / "hidden_effect.toml")]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "it is known why" in printed
-    assert "linear leak and warm up account for it" in printed
+    assert "with warm up and linear leak to" in printed or "with linear leak and warm up to" in printed
