@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from smartshoe.diagnosis.next_experiment import SEPARATED
 
 from simulators.hidden import HiddenCase, hide
 from simulators.provider import provider
 from simulators.scaling import machine_of
 from smartshoe.compensation import Calibration
 from smartshoe.diagnosis import Cause, Diagnosis, diagnose
+from smartshoe.diagnosis.next_experiment import SEPARATED
 from smartshoe.models.twin import TwinBladder
 from smartshoe.protocol import Protocol
 

@@ -15,8 +15,8 @@ import pytest
 from balance import Balance
 from hypothesis import given
 from hypothesis import strategies as st
-from smartshoe.diagnosis.held_out import Gain
 
+from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.result import Cause, Diagnosis, NextExperiment, Rival, Standing, Statement, Trace
 from smartshoe.models.effects import Conditions, Effect, effect
