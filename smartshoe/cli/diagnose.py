@@ -73,7 +73,7 @@ def command(
         _design(design_path, json_path)
         return
     if not files:
-        raise UsageError("diagnose needs a FILE: name one experiment at least, or ask --design SCENARIO.toml")
+        raise UsageError("diagnose needs FILES: name one experiment at least, or ask --design SCENARIO.toml")
     _check(files, held_out, material)
     recordings = read_all(files, unit=unit, **columns)
     others = read_all(held_out, unit=unit, **columns) if held_out else []

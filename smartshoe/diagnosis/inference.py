@@ -116,6 +116,8 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     likelihood = Likelihood(sessions, evidence.noise, extended.model, thresholds)
     extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
     baseline = fit(likelihood, plain.model, STEPS_A_ROUND)
+    if not can_validate:
+        extended = baseline
     progress("weighing alternatives")
     members = _members(evidence, best, refused, likelihood, extended)
     return Inference(baseline, extended, likelihood, members, screening, tuple(refused), can_validate)

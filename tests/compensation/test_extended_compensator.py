@@ -118,7 +118,7 @@ def test_conditioning_is_undone_but_where_a_cycle_is_counted(seed: int) -> None:
 def test_a_gain_with_rate_is_undone_but_for_corners(seed: int, gain: float) -> None:
     model, conditions = BASELINE.with_part(effect("rate_gain"), np.array([gain, 1.0])), some_conditions(seed)
     plain = ExtendedCompensator(BASELINE, 100.0).apply(model.reading(conditions)) / 800.0 - conditions.load
-    assert np.sqrt(np.mean(_error(model, conditions) ** 2)) < 0.35 * np.sqrt(np.mean(plain**2))
+    assert np.sqrt(np.mean(_error(model, conditions) ** 2)) < 0.7 * np.sqrt(np.mean(plain**2))
 
 
 missing = st.lists(st.integers(0, 399), max_size=30)

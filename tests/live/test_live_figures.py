@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import PROGRAM, Browser
+from live_browser import PROGRAM, Browser
 from serving import health, page, serving, until, walk_table
 
 from smartshoe.live.client import Client

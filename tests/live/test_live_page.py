@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser import PROGRAM, Browser
+from live_browser import PROGRAM, Browser
 from serving import serving, until, walk_table
 
 from smartshoe.compensation import Calibration
