@@ -93,13 +93,15 @@ def reduced(x: Array, signals: Sequence[Array], most: int) -> NDArray[np.intp]:
     if x.size <= most:
         return np.arange(x.size)
     block = -(-x.size * 2 * len(signals) // most)
-    count = x.size // block
+    count = -(-x.size // block)
     start = np.arange(count) * block
     chosen = [np.array([0, x.size - 1])]
     for signal in signals:
-        cut = np.where(np.isfinite(signal), signal, 0.0)[: count * block].reshape(count, block)
+        # The last stretch may be shorter than the others: its end stands in for what it lacks.
+        filled = np.pad(np.where(np.isfinite(signal), signal, 0.0), (0, count * block - x.size), mode="edge")
+        cut = filled.reshape(count, block)
         chosen += [start + cut.argmin(axis=1), start + cut.argmax(axis=1)]
-    return np.unique(np.concatenate(chosen))
+    return np.unique(np.minimum(np.concatenate(chosen), x.size - 1))
 
 
 def shares(charts: Sequence[Chart], page_bytes: float = PAGE_BYTES) -> list[int]:
