@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis.held_out import residual_of
 from smartshoe.diagnosis.likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis.noise import NoiseModel, white
+from smartshoe.diagnosis.noise import white
 from smartshoe.diagnosis.search import additions, allowed, search, step
 from smartshoe.diagnosis.sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
@@ -361,6 +361,3 @@ def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequ
         if allowed(evidence, other):
             found.append(Alternative(one.name, other.score - best.score))
     return tuple(sorted(found, key=lambda one: one.margin))
-
-
-__all__ = ["Alternative", "Candidate", "Inference", "Member", "NoiseModel", "infer"]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from smartshoe.diagnosis.inference import Alternative, Member
+from smartshoe.diagnosis.inference import Member
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 
@@ -84,6 +84,3 @@ def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tupl
     equivalents = (name for name, margin in laws if odds(margin, thresholds.law_departure) > thresholds.equivalent_odds)
     rivals = sum(odds(margin, thresholds.departure) for _, margin in laws)
     return 1.0 / (1.0 + rivals), tuple(equivalents)
-
-
-__all__ = ["Alternative", "Name", "names_of", "probability_of_kind", "probability_of_law"]

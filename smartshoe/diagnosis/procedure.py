@@ -14,7 +14,7 @@ from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.course import course_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.diagnosis.denoise import noise_sd
-from smartshoe.diagnosis.held_out import Errors, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis.held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis.inference import Inference, Progress, infer
 from smartshoe.diagnosis.integrity import Integrity, examine
 from smartshoe.diagnosis.leftover import Leftover, leftover_of
@@ -312,10 +312,7 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
     return Cause(name.effect, name.confidence, name.equivalents, values, tuple(evidence), won, member.size, rivals)
 
 
-def _held_out_evidence(size: float, won: object) -> list[Statement]:
-    from smartshoe.diagnosis.held_out import Gain
-
-    assert isinstance(won, Gain)
+def _held_out_evidence(size: float, won: Gain) -> list[Statement]:
     return [
         Statement(
             "size in percent of full scale",
