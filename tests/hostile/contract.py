@@ -42,7 +42,8 @@ def ended(arguments: Sequence[str], folder: Path) -> Ended:
     assert status in STATUSES, found
     assert "Traceback" not in found.err
     assert time.process_time() - began_s < LONGEST_S, found
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < max(peak_kib, MOST_KIB), found
+    # The peak is the process's own: a worker that an earlier test has already taken further stays where it was.
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss <= max(peak_kib, MOST_KIB), found
     if status != 0:
         assert found.last_line.startswith("error: "), found
         assert len(found.last_line) < LONGEST_LINE, found
