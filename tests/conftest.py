@@ -38,7 +38,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if "hardware" in item.keywords:
                 item.add_marker(skip)
-    for mark, reason in (("bank", "a long bank"), ("benchmark", "figures against peers")):
+    off = {"bank": "a long bank", "benchmark": "figures against peers", "site": "builds the documentation"}
+    for mark, reason in off.items():
         if mark not in (config.getoption("-m") or ""):
             skip = pytest.mark.skip(reason=f"{reason}: run it with -m {mark}")
             for item in items:

@@ -50,7 +50,7 @@ class TransferFunctionEstimate:
     (experiments, poles) in observer form (the free response is their polynomial, highest power first, over the
     denominator, from the experiment's start, or with a delay estimated from the first sample that counts) and
     ``residual`` (measured minus model, NaN where a sample did not count). ``rmse`` is in y's unit; ``fit_percent`` is
-    100 (1 - |residual| / |y - mean|). ``whiteness`` tests what the error bars take for granted. ``iterations`` are
+    ``100 (1 - |residual| / |y - mean|)``. ``whiteness`` tests what the error bars take for granted. ``iterations`` are
     those of ``method``, ``start_iterations`` SRIVC's before it.
     """
 
