@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from smartshoe.cli.inputs import column_options, read_all
+from smartshoe.cli.output import figures_option
 
 if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     metavar="OUT.json",
     help="Write the extended model's calibration for compensate.",
 )
+@figures_option
 @column_options
 def command(
     files: tuple[str, ...],
@@ -58,6 +60,7 @@ def command(
     out_folder: str | None,
     calibration_path: str | None,
     design_path: str | None,
+    figures: str | None,
     unit: str | None,
     **columns: Any,
 ) -> None:
@@ -74,6 +77,8 @@ def command(
         return
     if not files:
         raise UsageError("diagnose needs FILES: name one experiment at least, or ask --design SCENARIO.toml")
+    if figures is not None and out_folder is None:
+        raise UsageError("--figures writes into --out DIR: give --out as well")
     _check(files, held_out, material)
     recordings = read_all(files, unit=unit, **columns)
     others = read_all(held_out, unit=unit, **columns) if held_out else []
@@ -86,7 +91,7 @@ def command(
             step("writing the report")
             from smartshoe.report.diagnosis.folder import publish_diagnosis
 
-            written = publish_diagnosis(folder, found, title, _facts(recordings, others))
+            written = publish_diagnosis(folder, found, title, _facts(recordings, others), figures)
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, recordings, unit)

@@ -15,7 +15,7 @@ from smartshoe.atomic import write_text
 from smartshoe.errors import InputError
 from smartshoe.report.charts import Chart, script_text
 from smartshoe.report.numbers import plain, with_sd
-from smartshoe.report.wording import sentence
+from smartshoe.report.wording import sentence, words
 
 
 @functools.cache
@@ -34,7 +34,7 @@ def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("smartshoe.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters.update(plain=plain, with_sd=with_sd, sentence=sentence)
+    environment.filters.update(plain=plain, with_sd=with_sd, sentence=sentence, words=words)
     return environment
 
 

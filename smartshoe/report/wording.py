@@ -10,3 +10,8 @@ def sentence(text: str) -> str:
         return ""
     begun = text[:1].upper() + text[1:] if text.split(maxsplit=1)[0].rstrip(",:").isalpha() else text
     return begun if begun.endswith((".", "!", "?")) else f"{begun}."
+
+
+def words(identifier: str) -> str:
+    """An identifier as words: ``linear_leak`` as "linear leak"."""
+    return identifier.replace("_", " ")

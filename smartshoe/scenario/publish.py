@@ -13,7 +13,9 @@ from smartshoe.report.wording import sentence
 from smartshoe.scenario.run import ScenarioResult, UnitResult
 
 
-def _publish_diagnosis(unit: UnitResult, folder: Path, result: ScenarioResult) -> DiagnosisLink | None:
+def _publish_diagnosis(
+    unit: UnitResult, folder: Path, result: ScenarioResult, figures: str | None
+) -> DiagnosisLink | None:
     """The unit's diagnosis in a folder of its own, and its extended calibration beside the plain one."""
     from smartshoe.report.diagnosis.folder import publish_diagnosis
 
@@ -22,7 +24,7 @@ def _publish_diagnosis(unit: UnitResult, folder: Path, result: ScenarioResult) -
         return None
     own = make_folder(folder / "diagnosis" / unit.name)
     facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "smartshoe": smartshoe.__version__}
-    page = publish_diagnosis(own, found, unit.name, facts)["report"]
+    page = publish_diagnosis(own, found, unit.name, facts, figures)["report"]
     if found.model is not None:
         rate_hz = next(iter(unit.recordings.values())).sample_rate_hz
         saved = found.calibration(unit=unit.name, sample_rate_hz=rate_hz)
@@ -61,7 +63,9 @@ def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str
     for unit in result.units:
         unit.calibration.save(calibrations / f"{unit.name}.json")
     write_text(folder / "result.json", result_json)
-    diagnosed = {unit.name: _publish_diagnosis(unit, folder, result) for unit in result.units if unit.diagnosis}
+    diagnosed = {
+        unit.name: _publish_diagnosis(unit, folder, result, figures) for unit in result.units if unit.diagnosis
+    }
     facts = {
         "scenario": result.source.name,
         "seed": str(result.scenario.seed),

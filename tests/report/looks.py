@@ -38,7 +38,9 @@ SMALL = """
 FAINT = """
 (() => {
   const parts = (text) => {
-    const m = text.match(/[0-9.]+/g).map(Number);
+    const all = text.match(/[0-9.]+/g).map(Number);
+    // A mixed colour comes back as color(srgb 0.9 0.9 1), not as rgb(230, 230, 255).
+    const m = text.startsWith('color(') ? all.map((v, k) => k < 3 ? 255 * v : v) : all;
     return m.length < 4 ? [...m.slice(0, 3), 1] : m;
   };
   const linear = (v) => v / 255 <= .03928 ? v / 255 / 12.92 : ((v / 255 + .055) / 1.055) ** 2.4;

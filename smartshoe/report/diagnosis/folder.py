@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from smartshoe.atomic import json_text, write_text
+from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.diagnosis.result import Diagnosis
 from smartshoe.report.diagnosis.page import write_diagnosis_page
 from smartshoe.report.diagnosis.protocol_file import protocol_text, table_name
 
 
-def publish_diagnosis(folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str]) -> dict[str, Path]:
+def publish_diagnosis(
+    folder: Path, found: Diagnosis, title: str, facts: Mapping[str, str], figures: str | None = None
+) -> dict[str, Path]:
     """Write ``diagnosis.html``, ``diagnosis.json`` and the next protocol below ``folder``.
 
-    Returns those to tell of, by what they are.
+    ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns those to tell of, by what
+    they are.
     """
     page = folder / "diagnosis.html"
     written = {"report": page}
@@ -26,4 +29,9 @@ def publish_diagnosis(folder: Path, found: Diagnosis, title: str, facts: Mapping
         write_text(folder / protocol_file, protocol_text(following.steps, [following.says]))
     write_text(folder / "diagnosis.json", json_text(found.to_dict()))
     write_diagnosis_page(page, found, f"Diagnosis of {title}", facts, protocol_file)
+    if figures is not None:
+        from smartshoe.report.paper.diagnosis import write_figures
+
+        written["figures"] = make_folder(folder / "figures")
+        write_figures(written["figures"], found, figures)
     return written

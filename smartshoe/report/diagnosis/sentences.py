@@ -14,7 +14,7 @@ from smartshoe.models.effects import catalogue, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
-from smartshoe.report.wording import sentence
+from smartshoe.report.wording import sentence, words
 
 HEADINGS = {
     "adequate": "The simulation is good enough",
@@ -25,11 +25,6 @@ HEADINGS = {
 }
 SUREST = 0.99
 NO_STRUCTURE = "none beyond noise"
-
-
-def words(identifier: str) -> str:
-    """An identifier as words: ``linear_leak`` as "linear leak"."""
-    return identifier.replace("_", " ")
 
 
 def listed(names: Sequence[str], last: str = "or") -> str:

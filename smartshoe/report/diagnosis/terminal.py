@@ -21,10 +21,9 @@ from smartshoe.report.diagnosis.sentences import (
     shares_text,
     sure,
     why_this_one,
-    words,
 )
 from smartshoe.report.tables import new_console, table_of
-from smartshoe.report.wording import sentence
+from smartshoe.report.wording import sentence, words
 
 MOST_FAULTS = 12
 

@@ -21,34 +21,35 @@ FEWEST_IN_A_BIN = 5
 FEWEST_IN_A_CELL = 15  # of the map over load and rate, where the fastest ramps leave few samples
 BINS = 24
 ENOUGH = 20_000  # samples of a recording, to find its ramps
-PLACES = 40  # of a cycle, in a map
-MOST_CYCLES = 80
+PLACES = 10  # of a cycle, in a map
+MOST_GROUPS = 12  # of cycles, in a map
 
 
 @dataclass(frozen=True, eq=False)
 class Binned:
-    """Mean and standard deviation of a residual in bins of ``x``; empty bins are left out. All (m,)."""
+    """Mean and standard deviation of a residual in bins about ``x``; NaN in bins of few samples. All (m,)."""
 
     x: Array
     mean: Array
     sd: Array
 
 
-def binned(x: Array, values: Array, bins: int = BINS) -> Binned:
-    """Bins of equal width between the 0.5th and 99.5th percentile of ``x`` (n,)."""
-    if x.size < FEWEST_IN_A_BIN:
-        return Binned(*(np.zeros(0) for _ in range(3)))
-    low, high = (float(edge) for edge in np.percentile(x, [0.5, 99.5]))
-    width = (high - low) / bins or 1.0
-    place = np.clip(((x - low) / width).astype(np.intp), 0, bins - 1)
+def edges_of(x: Array, bins: int = BINS) -> Array:
+    """(bins + 1,) edges of equal bins between the 0.5th and 99.5th percentile of ``x`` (n,)."""
+    low, high = (float(edge) for edge in np.percentile(x, [0.5, 99.5])) if x.size else (0.0, 0.0)
+    return np.linspace(low, high if high > low else low + 1.0, bins + 1)
+
+
+def binned(x: Array, values: Array, edges: Array) -> Binned:
+    """``values`` (n,) in bins of ``x`` (n,); what lies beyond the edges counts with the outermost bins."""
+    bins = edges.size - 1
+    place = np.clip(((x - edges[0]) / (edges[1] - edges[0])).astype(np.intp), 0, bins - 1)
     count = np.bincount(place, minlength=bins)
-    total = np.bincount(place, values, bins)
-    square = np.bincount(place, values**2, bins)
-    kept = count >= FEWEST_IN_A_BIN
-    mean = total[kept] / count[kept]
-    variance = np.maximum(square[kept] / count[kept] - mean**2, 0.0)
-    centre = np.bincount(place, x, bins)[kept] / count[kept]
-    return Binned(centre, mean, np.sqrt(variance))
+    few = count < FEWEST_IN_A_BIN
+    mean = np.bincount(place, values, bins) / np.maximum(count, 1)
+    variance = np.bincount(place, (values - mean[place]) ** 2, bins) / np.maximum(count, 1)
+    middle = 0.5 * (edges[:-1] + edges[1:])
+    return Binned(middle, np.where(few, np.nan, mean), np.where(few, np.nan, np.sqrt(variance)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,11 +242,12 @@ def by_place_and_cycle(found: Evidence, residual: Array) -> Map | None:
     np.maximum.at(last, found.cycle, found.time_s)
     length = np.maximum(last - first, 1e-9)[found.cycle]
     row = np.clip(((found.time_s - first[found.cycle]) / length * PLACES).astype(np.intp), 0, PLACES - 1)
-    group = -(-numbers // MOST_CYCLES)
+    group = -(-numbers // MOST_GROUPS)
     columns = -(-numbers // group)
     values = _means(row, found.cycle // group, residual, PLACES, columns, FEWEST_IN_A_BIN)
     edges = np.linspace(0.0, 100.0, PLACES + 1)
-    return Map(values, tuple(str(1 + group * k) for k in range(columns)), edges)
+    ends = [(1 + group * k, min(group * (k + 1), numbers)) for k in range(columns)]
+    return Map(values, tuple(f"{a}" if a == b else f"{a}–{b}" for a, b in ends), edges)
 
 
 def _means(
@@ -287,16 +289,15 @@ def spectrum(found: Evidence, residual: Array) -> tuple[Array, Array]:
 
     Frequencies at which there is nothing are left out.
     """
-    from matplotlib import mlab
+    from scipy.signal import welch  # a diagnosis has it imported already; a page's start-up need not
 
-    time_s = found.time_s
-    gaps = np.diff(time_s)
+    gaps = np.diff(found.time_s)
     step_s = float(np.median(gaps[gaps > 0])) if np.any(gaps > 0) else 1.0
     length = int(min(residual.size, max(256, 2 ** int(np.log2(max(residual.size / 4, 2))))))
-    density: tuple[Array, Array] = mlab.psd(  # type: ignore[assignment]
-        residual - residual.mean(), NFFT=length, Fs=1.0 / step_s, noverlap=length // 2, window=np.hanning(length)
-    )
-    power, frequency = density[0][1:], density[1][1:]
+    frequency, power = welch(residual - residual.mean(), 1.0 / step_s, nperseg=length, detrend=False)
+    frequency, power = np.asarray(frequency)[1:], np.asarray(power)[1:]
+    if frequency.size == 0:
+        return frequency, power
     place = np.floor(24 * np.log10(frequency / frequency[0])).astype(np.intp)
     count = np.bincount(place)
     kept = (count > 0) & (np.bincount(place, power) > 0)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -42,14 +40,6 @@ def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
     start = np.arange(count) * block
     index = np.unique(np.concatenate([start + cut.argmin(axis=1), start + cut.argmax(axis=1), [0, x.size - 1]]))
     return (x[index], *(signal[index] for signal in signals))
-
-
-def svg(figure: Figure) -> str:
-    """The figure as an SVG element, the same bytes every time."""
-    buffer = io.StringIO()
-    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
-    text = buffer.getvalue()
-    return text[text.index("<svg") :]
 
 
 def save(figure: Figure, path: Path) -> Path:

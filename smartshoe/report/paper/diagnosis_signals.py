@@ -1,4 +1,4 @@
-"""Figures of the signals: simulation beside measurement, loops, and the residual before and after, as SVG texts."""
+"""A diagnosis' signals: simulation beside measurement, loops, and the residual before and after."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from smartshoe.diagnosis.result import Trace
 from smartshoe.masks import runs_of
 from smartshoe.report.diagnosis.views import (
     BINS,
-    MOST_CYCLES,
+    MOST_GROUPS,
     Evidence,
     Stretch,
     binned,
+    edges_of,
     loops_at_two_rates,
     spectrum,
     worst_cycle,
 )
-from smartshoe.report.paper.drawing import STYLE, figure_of, svg, thin
+from smartshoe.report.paper.drawing import STYLE, figure_of, thin
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ DIRECTIONS = ((1, "#009E73", "loading"), (-1, "#CC79A7", "unloading"))
 SHADE = "#eef2ff"
 
 
-def beside_measurement(traces: Sequence[Trace], unit: str) -> str | None:
+def beside_measurement(traces: Sequence[Trace], unit: str) -> Figure | None:
     """The worst cycle that was not fitted and the whole recording around it, with what each simulation is off by."""
     worst = worst_cycle(traces)
     if worst is None:
@@ -63,10 +64,10 @@ def beside_measurement(traces: Sequence[Trace], unit: str) -> str | None:
         axes[3].axvspan(
             float(trace.time_s[worst.start]), float(trace.time_s[worst.stop - 1]), color=SHADE, zorder=0, lw=0
         )
-        return svg(figure)
+        return figure
 
 
-def loops(traces: Sequence[Trace], unit: str) -> str | None:
+def loops(traces: Sequence[Trace], unit: str) -> Figure | None:
     """Reading against load at a slow and a fast rate; below, less a straight line, where a loop can be seen."""
     chosen = loops_at_two_rates(traces)
     if not chosen:
@@ -90,10 +91,10 @@ def loops(traces: Sequence[Trace], unit: str) -> str | None:
         axes[0].set_ylabel(f"reading ({unit})")
         axes[len(chosen)].set_ylabel(f"reading less a\nstraight line ({unit})")
         axes[0].legend(loc="upper left", fontsize=8)
-        return svg(figure)
+        return figure
 
 
-def residual_by_course(found: Evidence, unit: str) -> str:
+def residual_by_course(found: Evidence, unit: str) -> Figure:
     """The residual against time, load cycle and frequency; before above and after below, on the same axes."""
     courses = _residuals(found)
     with mpl.rc_context(STYLE):
@@ -104,12 +105,12 @@ def residual_by_course(found: Evidence, unit: str) -> str:
         for row, (residual, colour, label) in enumerate(courses):
             by_time, by_cycle, by_frequency = axes[3 * row : 3 * row + 3]
             by_time.plot(*thin(found.time_s, residual), color=colour, lw=0.5, alpha=0.45)
-            mean = binned(found.time_s, residual, 150)
+            mean = binned(found.time_s, residual, edges_of(found.time_s, 150))
             by_time.plot(mean.x, mean.mean, color=colour, lw=1.4)
             for begin, end in _held_out_spans(found):
                 by_time.axvspan(begin, end, color=SHADE, zorder=0, lw=0)
             cycle = found.cycle[judged].astype(float) + 1.0
-            _mean_and_band(by_cycle, cycle, residual[judged], colour, bins=int(min(np.ptp(cycle) + 1, MOST_CYCLES)))
+            _mean_and_band(by_cycle, cycle, residual[judged], colour, bins=int(min(np.ptp(cycle) + 1, 4 * MOST_GROUPS)))
             by_cycle.xaxis.get_major_locator().set_params(integer=True)
             shown = spectrum(found, residual)
             densities += [(*shown, colour)] if shown[0].size else []
@@ -123,10 +124,10 @@ def residual_by_course(found: Evidence, unit: str) -> str:
         _same_limits(*axes[2::3])
         _named(axes, "over time", "over load cycles", "over frequency")
         _labelled(axes, "time, recordings one after the other (s)", "load cycle (number)", "frequency (Hz)")
-        return svg(figure)
+        return figure
 
 
-def residual_by_state(found: Evidence, unit: str) -> str:
+def residual_by_state(found: Evidence, unit: str) -> Figure:
     """The residual against load, reading and rate, loading and unloading apart; before above and after below."""
     courses = _residuals(found)
     with mpl.rc_context(STYLE):
@@ -147,7 +148,7 @@ def residual_by_state(found: Evidence, unit: str) -> str:
         _named(axes, "over load", "over the reading", "over the rate of loading")
         _labelled(axes, "load (N)", f"reading ({unit})", "rate (N/s), unloading negative")
         axes[0].legend(loc="best", fontsize=8)
-        return svg(figure)
+        return figure
 
 
 def _rows_of_three(rows: int) -> tuple[Figure, list[Any]]:
@@ -200,7 +201,7 @@ def _limit(values: Array) -> float:
 
 def _mean_and_band(axis: Any, x: Array, values: Array, colour: str, label: str = "", bins: int = BINS) -> None:
     """The mean as a line, one standard deviation about it as a band."""
-    found = binned(x, values, bins)
+    found = binned(x, values, edges_of(x, bins))
     axis.fill_between(found.x, found.mean - found.sd, found.mean + found.sd, color=colour, alpha=0.15, lw=0)
     axis.plot(found.x, found.mean, color=colour, lw=1.4, marker=".", ms=3.5, label=label)
 
