@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis.held_out import residual_of
 from smartshoe.diagnosis.likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis.noise import white
+from smartshoe.diagnosis.noise import correlated
 from smartshoe.diagnosis.search import additions, allowed, search, step
 from smartshoe.diagnosis.sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
@@ -39,7 +39,6 @@ RATES_PER_S = (0.05, 0.3, 2.0)
 CERTAIN = 0.8  # standard errors of a gain over what is left out, by which it must lie above zero
 SHARE = 0.08  # that relaxes, of the units of the paper's Table 1
 FEWEST_INDEPENDENT = 2  # of recordings or cycles: within one, nothing validates anything
-FIRST_NOISE = 1e-3  # of full scale, white, until the columns have told the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +95,7 @@ class Inference:
 def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> Inference:
     """The effects in the fitted part of ``sessions``, beside the baseline ``start``."""
     progress("fitting the baseline")
-    plain = fit(Likelihood(sessions, white(FIRST_NOISE), start, thresholds), start)
+    plain = least_squares(start, sessions, thresholds)
     given, evidence, best = _searched(plain.model, sessions, thresholds)
     screening = _screening(evidence)
     state = _settled(_State(given, evidence, best, plain), sessions, thresholds, progress)
@@ -115,12 +114,18 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
         best = search(evidence, tuple(m for m in best.members if m != worst), refused)
     likelihood = Likelihood(sessions, evidence.noise, extended.model, thresholds)
     extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
-    baseline = fit(likelihood, plain.model, STEPS_A_ROUND)
+    baseline = least_squares(plain.model, sessions, thresholds)
     if not can_validate:
         extended = baseline
     progress("weighing alternatives")
     members = _members(evidence, best, refused, likelihood, extended)
     return Inference(baseline, extended, likelihood, members, screening, tuple(refused), can_validate)
+
+
+def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
+    """The best predictor of the form of ``start``: output error, each correlation time of what is left counted once."""
+    residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
+    return fit(Likelihood(sessions, correlated(residuals, kept), start, thresholds), start, LAST_STEPS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,29 @@ def white(sd: float) -> NoiseModel:
     return NoiseModel(np.zeros(1), sd)
 
 
+def correlated(residuals: Sequence[Array], kept: Sequence[Mask]) -> NoiseModel:
+    """White noise as strong as ``residuals`` (n,) each, where ``kept``, are over one correlation time.
+
+    Least squares is the best predictor where what is left is an error of the model; its samples say the same thing
+    again for as long as they are correlated, and so count only once each correlation time beside a prior
+    (Box and Jenkins 1976, variance of a mean of correlated samples).
+    """
+    square, count, repeated = 0.0, 0, 0.0
+    for residual, mask in zip(residuals, kept, strict=True):
+        if not mask.any():
+            continue
+        signal = np.where(mask, residual - residual[mask].mean(), 0.0)
+        size = int(mask.sum())
+        power = np.abs(np.fft.rfft(signal, 2 * signal.size)) ** 2
+        covariance = np.fft.irfft(power)[: signal.size]
+        first = np.flatnonzero(covariance <= 0)
+        until = int(first[0]) if first.size else signal.size
+        square += float(signal @ signal)
+        count += size
+        repeated += size * float(2.0 * covariance[:until].sum() / max(float(covariance[0]), 1e-300) - 1.0)
+    return white(float(np.sqrt(square * max(repeated / max(count, 1), 1.0) / max(count, 1))) + 1e-9)
+
+
 def autoregression(
     residuals: Sequence[Array],
     kept: Sequence[Mask],
