@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
-from smartshoe.diagnosis.noise import white
 from smartshoe.diagnosis.sensitivity import Linearised, linearised
 from smartshoe.diagnosis.session import Scale, prepare, thinning
 from smartshoe.diagnosis.thresholds import Thresholds
@@ -136,7 +135,7 @@ def _commanded(protocol: Protocol, unit: ExtendedModel, peak_n: float, sample_ra
 
 
 def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:
-    gram = columns.gram(white(sd)).whole[1:, 1:]
+    gram = columns.gram().whole[1:, 1:] / sd**2
     own = np.arange(columns.own)
     left = gram - gram[:, own] @ np.linalg.pinv(gram[np.ix_(own, own)], rcond=1e-10, hermitian=True) @ gram[own]
     laws = [one for one in columns.candidates if not one.effect.is_flexible]

@@ -1,6 +1,6 @@
 """How well a set of effects accounts for the data: a marginal likelihood in which no equation is exact.
 
-With the reading's residual y, whitened, and everything linear in it,
+With the reading's residual y, in standard deviations of what counts as noise, and everything linear in it,
 
     y = X0 b + sum over all candidates x_j s_j + sum over e in S ( x_e a_e + Phi_e w_e ) + noise
 
@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.sensitivity import (
     MODULATORS,
     Linearised,
@@ -59,21 +58,20 @@ class Posterior:
 
 
 class Evidence:
-    """The evidence for sets of candidates of ``given`` under the noise ``noise``."""
+    """The evidence for sets of candidates of ``given`` under white noise of ``noise_sd``, a share of full scale."""
 
-    def __init__(self, given: Linearised, noise: NoiseModel) -> None:
-        self.given, self.noise, self.thresholds = given, noise, given.thresholds
+    def __init__(self, given: Linearised, noise_sd: float) -> None:
+        self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
         self._seen: dict[Members, Posterior] = {}
         self._rows: list[Array] = []
         self._root: list[Array] = []
         self._past: list[Array] = []
         for session, rows in zip(given.sessions, given.rows, strict=True):
-            counted = noise.counted(session.fitted)
-            white = noise.whitened(np.column_stack([rows, nuisances(session, given.model.relaxation_rate_per_s)]))
-            rows, past = white[counted, :-2], white[counted, -2:]
+            seen = session.fitted
+            past = nuisances(session, given.model.relaxation_rate_per_s)[seen] / noise_sd
             inner = past.T @ past + nuisance_precision(session, given.model, self.thresholds)
             inner += 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(2)
-            self._rows.append(rows)
+            self._rows.append(rows[seen] / noise_sd)
             self._past.append(past)
             self._root.append(np.asarray(np.linalg.cholesky(inner), dtype=np.float64))
         self._room = [np.asfortranarray(rows) for rows in self._rows]  # grows as departures are asked for
@@ -81,7 +79,7 @@ class Evidence:
         self.gram = self._products(self._rows, self._rows)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
-        raw = given.gram(None).whole
+        raw = given.gram().whole
         inverse = np.linalg.pinv(raw[own, own], rcond=1e-10, hermitian=True)
         self._absorbed = inverse @ raw[own]
         visible = raw - raw[:, own] @ self._absorbed
@@ -122,10 +120,7 @@ class Evidence:
             signature = signature - past @ np.linalg.lstsq(past[mask], signature[mask], rcond=None)[0]
             signatures.append(signature)
         made = departures(given, signatures)
-        white = [
-            self.noise.whitened(part)[self.noise.counted(s.fitted)]
-            for part, s in zip(made, given.sessions, strict=True)
-        ]
+        white = [part[s.fitted] / self.noise_sd for part, s in zip(made, given.sessions, strict=True)]
         first = int(self.gram.shape[0])
         cross = self._products(self._rows, white)
         inner = self._products(white, white)
@@ -230,7 +225,7 @@ class Evidence:
         return np.concatenate([index, np.array(extra, dtype=np.intp)]), np.concatenate([prior, spread])
 
     def left_out_errors(self, members: Members) -> Array:
-        """(folds,) squared errors of each recording when the set is fitted to all others, unwhitened.
+        """(folds,) squared errors of each recording when the set is fitted to all others.
 
         A single recording is cut into blocks of its cycles. Its nuisances are marginalised over the recording.
         """
@@ -240,7 +235,7 @@ class Evidence:
         raw = self._folds
         errors = np.zeros(len(raw))
         total = sum(raw)
-        noise = self.noise.sd**2
+        noise = self.noise_sd**2
         for k, fold in enumerate(raw):
             rest = total - fold
             a = rest[np.ix_(columns, columns)] + noise * np.diag(precision)
@@ -250,10 +245,10 @@ class Evidence:
 
     @cached_property
     def _folds(self) -> list[Array]:
-        """Unwhitened inner products of each fold."""
+        """Inner products of each fold."""
         given = self.given
         if len(given.sessions) > 1:
-            return list(given.gram(None).sessions)
+            return list(given.gram().sessions)
         session = given.sessions[0]
         cycles = np.unique(session.cycle[session.fitted])
         blocks = np.array_split(cycles, min(FOLDS, cycles.size))
@@ -262,8 +257,6 @@ class Evidence:
                 given.rows[0],
                 replace(session, usable=session.usable & np.isin(session.cycle, block)),
                 given.model,
-                None,
-                self.thresholds,
             )
             for block in blocks
             if block.size

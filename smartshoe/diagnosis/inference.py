@@ -6,6 +6,7 @@ What is held out for judging is not looked at here. Validation is within the fit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis.held_out import residual_of
 from smartshoe.diagnosis.likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis.noise import correlated
+from smartshoe.diagnosis.noise import correlated_sd
 from smartshoe.diagnosis.search import additions, allowed, search, step
 from smartshoe.diagnosis.sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
@@ -59,7 +60,8 @@ class Member:
     ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
     ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
     ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
-    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
+    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood. ``validated``: by how many
+    standard errors the error over recordings that are left out grows without it.
     """
 
     effect: Effect
@@ -69,6 +71,7 @@ class Member:
     without: Fit
     laws: tuple[Alternative, ...]
     fall: float
+    validated: float = 0.0
 
     @property
     def name(self) -> str:
@@ -102,7 +105,7 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         again = _settled(_with_another_pole(state, sessions, thresholds), sessions, thresholds, progress)
-        state = _simpler(state, again, Likelihood(sessions, state.evidence.noise, plain.model, thresholds))
+        state = _simpler(state, again, Likelihood(sessions, state.evidence.noise_sd, plain.model, thresholds))
     state = _with_laws(state, sessions, thresholds)
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     refused: list[str] = []
@@ -112,7 +115,7 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     while (worst := _worse(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
         best = search(evidence, tuple(m for m in best.members if m != worst), refused)
-    likelihood = Likelihood(sessions, evidence.noise, extended.model, thresholds)
+    likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
     extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
     baseline = least_squares(plain.model, sessions, thresholds)
     if not can_validate:
@@ -125,7 +128,7 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
     """The best predictor of the form of ``start``: output error, each correlation time of what is left counted once."""
     residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
-    return fit(Likelihood(sessions, correlated(residuals, kept), start, thresholds), start, LAST_STEPS)
+    return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start, LAST_STEPS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +187,7 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
             break
         seen.add(chosen)
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
-        likelihood = Likelihood(sessions, state.evidence.noise, state.fit.model, thresholds)
+        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = min(
             (fit(likelihood, _with(state.given, one, state.fit.model), STEPS_A_ROUND) for one in _promising(state)),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
@@ -225,7 +228,7 @@ def _with_laws(state: _State, sessions: Sequence[Session], thresholds: Threshold
     for block in state.chosen:
         if not (block.effect.is_flexible and block.effect.is_memoryless):
             continue
-        likelihood = Likelihood(sessions, state.evidence.noise, state.fit.model, thresholds)
+        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         bare = state.fit.model.without(block.name)
         for part in bare.parts:
             if part.effect.is_memoryless:
@@ -245,7 +248,7 @@ def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: T
 
     An effect that bent the baseline's rate at first leaves the true rate to be found as a second arm.
     """
-    likelihood = Likelihood(sessions, state.evidence.noise, state.fit.model, thresholds)
+    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
     bare = state.fit.model
     for part in bare.parts:
         if isinstance(part.effect, CoreEffect):
@@ -270,7 +273,7 @@ def _searched(
 ) -> tuple[Linearised, Evidence, Posterior]:
     """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
     given = linearised(model, sessions, thresholds)
-    evidence = Evidence(given, given.noise())
+    evidence = Evidence(given, given.noise_sd())
     start = tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)
     first = step(evidence, start)
     new = [size for m, size in zip(first.members, first.sizes, strict=True) if m not in start]
@@ -307,14 +310,17 @@ def _worse(evidence: Evidence, best: Posterior) -> int | None:
     Each recording in turn (each block of a single one) is predicted from the others, with and without the member; its
     gain over them must lie above zero by most of a standard error.
     """
-    whole = evidence.left_out_errors(best.members)
-    worst: tuple[float, int] | None = None
-    for member in best.members:
-        gains = evidence.left_out_errors(tuple(m for m in best.members if m != member)) - whole
-        sure = float(gains.mean()) - CERTAIN * float(np.std(gains, ddof=1)) / np.sqrt(gains.size)
-        if sure < 0.0 and (worst is None or sure < worst[0]):
-            worst = sure, member
-    return worst[1] if worst else None
+    gains = {member: _validated(evidence, best, member) for member in best.members}
+    worst = min(gains, key=lambda member: gains[member], default=None)
+    return worst if worst is not None and gains[worst] < CERTAIN else None
+
+
+def _validated(evidence: Evidence, best: Posterior, member: int) -> float:
+    """Standard errors by which the mean error of what is left out grows without a member."""
+    less = evidence.left_out_errors(tuple(m for m in best.members if m != member))
+    gains = less - evidence.left_out_errors(best.members)
+    error = float(np.std(gains, ddof=1)) / math.sqrt(gains.size) if gains.size > 1 else 0.0
+    return float(gains.mean()) / max(error, 1e-300)
 
 
 def _members(
@@ -327,7 +333,8 @@ def _members(
         size = apart(likelihood.sessions, less.model, extended.model)
         others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
         near = alternatives(evidence, best, member, refused)
-        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
+        sure = _validated(evidence, best, member)
+        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost, sure))
     return tuple(sorted(made, key=lambda one: -one.size))
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.sensitivity import nuisance_precision, nuisances
 from smartshoe.diagnosis.session import Session
 from smartshoe.diagnosis.thresholds import Thresholds
@@ -36,26 +35,26 @@ class Likelihood:
     """What a model's parameters are judged by: ``sessions``, the noise, and nuisances that belong to a session."""
 
     def __init__(
-        self, sessions: Sequence[Session], noise: NoiseModel, like: ExtendedModel, thresholds: Thresholds
+        self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
         self.sessions = tuple(session for session in sessions if session.fitted.any())
-        self.noise = noise
+        self.noise_sd = noise_sd
         self._past: list[Array] = []
         self._inverse: list[Array] = []
         for session in self.sessions:
-            past = noise.whitened(nuisances(session, like.relaxation_rate_per_s))[noise.counted(session.fitted)]
+            past = nuisances(session, like.relaxation_rate_per_s)[session.fitted] / noise_sd
             inner = past.T @ past + nuisance_precision(session, like, thresholds)
             inner += 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(2)
             self._past.append(past)
             self._inverse.append(np.asarray(np.linalg.inv(inner), dtype=np.float64))
 
     def _gram(self, k: int, rows: Array) -> Array:
-        white = self.noise.whitened(rows)[self.noise.counted(self.sessions[k].fitted)]
+        white = rows[self.sessions[k].fitted] / self.noise_sd
         cross = self._past[k].T @ white
         return np.asarray(white.T @ white - cross.T @ self._inverse[k] @ cross)
 
     def cost(self, model: ExtendedModel) -> float:
-        """Sum of whitened squares over what is fitted."""
+        """Sum of squares over what is fitted, in units of the noise's variance."""
         total = 0.0
         for k, session in enumerate(self.sessions):
             total += float(self._gram(k, (session.reading - model.simulate(session.conditions))[:, None])[0, 0])

@@ -9,7 +9,6 @@ import numpy as np
 from smartshoe.diagnosis.experiments import EXPERIMENTS
 from smartshoe.diagnosis.inference import Inference
 from smartshoe.diagnosis.likelihood import Fit, fit
-from smartshoe.diagnosis.noise import NoiseModel
 from smartshoe.diagnosis.result import Cause, NextExperiment
 from smartshoe.diagnosis.session import Session
 from smartshoe.diagnosis.traits import Traits
@@ -50,9 +49,10 @@ def next_experiment(
     other = _in_place_of(found, cause.name, rival)
     margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
     peak_n = found.fit.model.full_scale_load_n
-    noise = found.likelihood.noise
+    noise_sd = found.likelihood.noise_sd
     expected = {
-        name: expected_margin(found.fit, other, made(peak_n), noise, sessions[0]) for name, made in EXPERIMENTS.items()
+        name: expected_margin(found.fit, other, made(peak_n), noise_sd, sessions[0])
+        for name, made in EXPERIMENTS.items()
     }
     best = max(expected, key=lambda name: expected[name])
     names = (cause.name, *cause.equivalents)
@@ -96,19 +96,19 @@ def _unseen(found: Inference, causes: Sequence[Cause], traits: Traits) -> NextEx
     return NextExperiment(names, "repeat", None, says)
 
 
-def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise: NoiseModel, like: Session) -> float:
+def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise_sd: float, like: Session) -> float:
     """By how much -2 log likelihood would be worse with the rival, were ``truth`` true and the protocol run once.
 
     The rival may move its parameters as far as the data so far lets it: min over d of |yA - yB - J d|^2 + d' H d in
-    whitened units, H the information that it was fitted with.
+    standard deviations of the noise, H the information that it was fitted with.
     """
     step_s = like.conditions.step_s
     time_s = np.arange(0.0, protocol.duration_s, step_s)
     full_n = truth.model.full_scale_load_n
     conditions = Conditions(time_s, protocol.load_at(time_s) / full_n, step_s, like.conditions.load_noise)
     reading, slopes = rival.model.sensitivities(conditions)
-    difference = noise.whitened(truth.model.simulate(conditions) - reading)
-    J = noise.whitened(slopes)
+    difference = (truth.model.simulate(conditions) - reading) / noise_sd
+    J = slopes / noise_sd
     information = np.linalg.pinv(rival.covariance, rcond=1e-12, hermitian=True)
     unseen = np.diag(rival.covariance) == 0
     scale = np.sqrt(np.sum(J**2, axis=0) + np.diag(information))

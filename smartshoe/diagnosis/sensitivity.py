@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from smartshoe.diagnosis.noise import NoiseModel, autoregression
+from smartshoe.diagnosis.noise import correlated_sd
 from smartshoe.diagnosis.session import Session
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
@@ -129,21 +129,13 @@ class Linearised:
         """Candidates (their numbers) of an effect."""
         return tuple(k for k, one in enumerate(self.candidates) if one.name == name)
 
-    def gram(self, noise: NoiseModel | None, extra: Sequence[Array] | None = None) -> Gram:
-        """Inner products, raw or whitened; ``extra`` (n, q) a session: further columns behind the others."""
-        found = []
-        for k, session in enumerate(self.sessions):
-            rows = self.rows[k] if extra is None else np.column_stack([self.rows[k], extra[k]])
-            found.append(marginal(rows, session, self.model, noise, self.thresholds))
-        return Gram(tuple(found))
+    def gram(self) -> Gram:
+        """Inner products with flat nuisances."""
+        return Gram(tuple(marginal(rows, one, self.model) for rows, one in zip(self.rows, self.sessions, strict=True)))
 
-    def noise(self) -> NoiseModel:
-        """The noise: an autoregression of what no column reaches, part of it taken for white.
-
-        What the columns cannot reach may hold structure too. Whitening structure would promise more independent
-        samples than there are, so that a share of its variance is taken for white noise whatever its spectrum.
-        """
-        whole = self.gram(None).whole
+    def noise_sd(self) -> float:
+        """Standard deviation of what no column reaches, noise or structure, each correlation time counted once."""
+        whole = self.gram().whole
         part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
         found = np.linalg.solve(part, whole[1:, 0])
         left = []
@@ -154,22 +146,14 @@ class Linearised:
             fit = np.linalg.lstsq(columns[mask], residual[mask], rcond=None)[0]
             left.append(residual - columns @ fit)
         masks = [session.fitted for session in self.sessions]
-        return autoregression(left, masks, white_share=self.thresholds.structure_as_noise)
+        return correlated_sd(left, masks)
 
 
-def marginal(
-    rows: Array, session: Session, model: ExtendedModel, noise: NoiseModel | None, thresholds: Thresholds
-) -> Array:
-    """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances marginalised."""
-    both = np.column_stack([rows, nuisances(session, model.relaxation_rate_per_s)])
-    if noise is None:
-        seen = both[session.fitted]
-        prior = np.zeros((2, 2))
-    else:
-        seen = noise.whitened(both)[noise.counted(session.fitted)]
-        prior = nuisance_precision(session, model, thresholds)
+def marginal(rows: Array, session: Session, model: ExtendedModel) -> Array:
+    """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
+    seen = np.column_stack([rows, nuisances(session, model.relaxation_rate_per_s)])[session.fitted]
     gram = seen.T @ seen
-    last = gram[-2:, -2:] + prior
+    last = gram[-2:, -2:]
     last += 1e-12 * max(float(np.trace(last)), 1e-12) * np.eye(2)
     cross = gram[-2:, :-2]
     return np.asarray(gram[:-2, :-2] - cross.T @ np.linalg.solve(last, cross))

@@ -28,9 +28,6 @@ class Thresholds:
         0.03, "share of full scale", "prior standard deviation of an effect that is there", "effects.md: 0.1 to 10 %"
     )
     false_name: float = threshold(0.02, "probability", "of an effect where there is none", "issue: floor of 2 %")
-    structure_as_noise: float = threshold(
-        0.1, "share of variance", "of what no column reaches, taken for white", "diagnosis.md, first lesson"
-    )
     unknown_past: float = threshold(
         0.05, "share of full scale", "load that an arm may remember at the start of a recording", "judgement"
     )

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.signal import lfilter
 
 from smartshoe import Recording, dynamic_protocol
 from smartshoe.diagnosis.baseline import baseline_of
@@ -15,7 +16,7 @@ from smartshoe.diagnosis.experiments import EXPERIMENTS
 from smartshoe.diagnosis.held_out import errors, gain, residual_of
 from smartshoe.diagnosis.likelihood import Likelihood, fit
 from smartshoe.diagnosis.next_experiment import expected_margin
-from smartshoe.diagnosis.noise import autoregression, white
+from smartshoe.diagnosis.noise import correlated_sd
 from smartshoe.diagnosis.remainder import repeating, slow
 from smartshoe.diagnosis.session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
 from smartshoe.diagnosis.thresholds import Thresholds
@@ -49,7 +50,7 @@ def sessions_of(*recordings: Recording) -> tuple[list[Session], Scale]:
 
 
 def likelihood_of(sessions: list[Session], like: ExtendedModel = MODEL) -> Likelihood:
-    return Likelihood(sessions, white(0.001), like, Thresholds())
+    return Likelihood(sessions, 0.001, like, Thresholds())
 
 
 # -- sessions ---------------------------------------------------------------------------------------------------
@@ -111,15 +112,22 @@ def test_noise_is_known_to_five_percent_on_any_lattice(seed: int, steps: float) 
 
 @given(st.floats(0.0, 0.9), st.integers(0, 99))
 @settings(max_examples=15, deadline=None)
-def test_whitened_noise_is_white_with_variance_one(memory: float, seed: int) -> None:
+def test_correlated_samples_tell_as_much_as_the_mean_of_a_markov_process(memory: float, seed: int) -> None:
+    """The variance of the mean of n samples is sd^2 (1 + memory) / (1 - memory) / n (Box and Jenkins 1976)."""
     rng = np.random.default_rng(seed)
-    e = np.zeros(6000)
-    for k in range(1, e.size):
-        e[k] = memory * e[k - 1] + 0.002 * rng.standard_normal()
-    model = autoregression([e], [np.ones(e.size, dtype=bool)])
-    w = model.whitened(e)[20:]
-    assert np.std(w) == pytest.approx(1.0, abs=0.05)
-    assert abs(np.corrcoef(w[1:], w[:-1])[0, 1]) < 0.06
+    e = lfilter([0.002], [1.0, -memory], rng.standard_normal(60_000))
+    own_sd = 0.002 / np.sqrt(1.0 - memory**2)
+    parts = [e[:40_000], e[40_000:]]
+    found = correlated_sd(parts, [np.ones(part.size, dtype=bool) for part in parts])
+    assert found == pytest.approx(own_sd * np.sqrt((1.0 + memory) / (1.0 - memory)), rel=0.15)
+
+
+def test_structure_counts_once_a_correlation_time() -> None:
+    slow = np.sin(np.linspace(0.0, 6.0 * np.pi, 3000))
+    everywhere = np.ones(slow.size, dtype=bool)
+    fine = correlated_sd([np.repeat(slow, 10)], [np.ones(10 * slow.size, dtype=bool)])
+    # Ten times the samples of the same course tell no more: the information n / sd^2 stays.
+    assert fine == pytest.approx(np.sqrt(10.0) * correlated_sd([slow], [everywhere]), rel=0.02)
 
 
 # -- baseline and fits --------------------------------------------------------------------------------------------
@@ -217,7 +225,7 @@ def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
     plain = baseline_of(sessions, scale)
     found = fit(likelihood_of(sessions, plain), plain)
     for made in EXPERIMENTS.values():
-        assert expected_margin(found, found, made(800.0), white(0.001), sessions[0]) == pytest.approx(0.0, abs=1e-6)
+        assert expected_margin(found, found, made(800.0), 0.001, sessions[0]) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
@@ -229,7 +237,7 @@ def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     lag = fit(likelihood, start.with_part(effect("sensor_lag"), np.array([0.02, 0.1])))
     delay = fit(likelihood, start.with_part(effect("delay"), np.array([0.02])))
     margins = {
-        name: expected_margin(lag, delay, EXPERIMENTS[name](800.0), white(0.001), sessions[0])
+        name: expected_margin(lag, delay, EXPERIMENTS[name](800.0), 0.001, sessions[0])
         for name in ("steps", "rates", "idle")
     }
     assert margins["steps"] > 2 * margins["rates"]

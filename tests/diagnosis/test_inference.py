@@ -15,7 +15,6 @@ from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.evidence import OWN_SD, Evidence
-from smartshoe.diagnosis.noise import white
 from smartshoe.diagnosis.sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis.session import full_scale, prepare
 from smartshoe.diagnosis.thresholds import described
@@ -72,7 +71,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         prior[: given.own] = OWN_SD
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
-        kept = white(sd).counted(session.fitted)
+        kept = session.fitted
         blocks.append(np.column_stack([rows[:, 1:] * prior, past])[kept])
         targets.append(rows[kept, 0])
     z, y = np.concatenate(blocks), np.concatenate(targets)
@@ -83,7 +82,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
 
 def test_the_evidence_is_the_gaussian_density_of_the_explicit_covariance(small: Linearised) -> None:
     sd = 0.002
-    evidence = Evidence(small, white(sd))
+    evidence = Evidence(small, sd)
     sets = [(k,) for k in (0, 5, 11, 30)]
     slow = [plain_score(small, sd, members) for members in [(), *sets]]
     fast = [evidence.exact(members).score - evidence.odds_of(members) for members in [(), *sets]]
@@ -92,7 +91,7 @@ def test_the_evidence_is_the_gaussian_density_of_the_explicit_covariance(small: 
 
 
 def test_every_extension_is_the_score_of_the_extended_set(small: Linearised) -> None:
-    evidence = Evidence(small, white(0.002))
+    evidence = Evidence(small, 0.002)
     for score, k, strengths in evidence.extensions(()):
         exact = evidence.exact((k,))
         assert score == pytest.approx(exact.score, abs=1e-3)
@@ -100,7 +99,7 @@ def test_every_extension_is_the_score_of_the_extended_set(small: Linearised) -> 
 
 
 def test_a_departure_never_makes_the_right_law_much_less_likely(small: Linearised) -> None:
-    evidence = Evidence(small, white(0.002))
+    evidence = Evidence(small, 0.002)
     (right,) = (k for k, one in enumerate(small.candidates) if one.name == "gas_compression")
     others = [k for k, one in enumerate(small.candidates) if one.effect.family != "static_curve"]
     best = evidence.posterior((right,)).score
