@@ -7,17 +7,18 @@ one core before the first fit: by then a second core has the kernels ready.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import subprocess
 import sys
 from pathlib import Path
 
+CACHE = Path(__file__).parent / "__pycache__"
 KERNELS = ("first_order", "shift", "srivc", "residual", "linear_filter")
 
 
 def begin() -> None:
     """Start the compilation in a process of its own, unless its results are there; never fails, never waits."""
-    cache = Path(__file__).parent / "__pycache__"
-    if all(any(cache.glob(f"{name}.*.nbi")) for name in KERNELS):
+    if all(any(CACHE.glob(f"{name}.*.nbi")) for name in KERNELS):
         return
     process = subprocess.Popen(
         [sys.executable, "-m", __spec__.name], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
@@ -48,5 +49,17 @@ def compile_all() -> None:
     orthogonalise(np.ones((2, 32)), 1)
 
 
+def compile_alone() -> bool:
+    """Compile, unless another process is at it or nothing can be kept here; whether it was done."""
+    with contextlib.suppress(OSError), (CACHE / "warm_up.lock").open("a") as lock:
+        with contextlib.suppress(ImportError):  # no such locks on Windows
+            import fcntl
+
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        compile_all()
+        return True
+    return False
+
+
 if __name__ == "__main__":
-    compile_all()
+    compile_alone()
