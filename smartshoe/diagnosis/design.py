@@ -51,7 +51,7 @@ class Design:
         """
         k = self.names.index(name)
         limits = self.thresholds
-        unit = 2.0 * (limits.evidence_temperature + limits.law_departure**2 * self.evidence)
+        unit = 2.0 * (1.0 + limits.law_departure**2 * self.evidence)
         alike = np.exp(-self.unlike[k] * self.evidence / unit)
         order = np.argsort(-alike, kind="stable")
         return tuple(self.names[j] for j in order if j != k and alike[j] > limits.equivalent_odds)

@@ -118,7 +118,7 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
     extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
     baseline = least_squares(plain.model, sessions, thresholds)
-    if not can_validate:
+    if not extended.model.parts:
         extended = baseline
     progress("weighing alternatives")
     members = _members(evidence, best, refused, likelihood, extended)
@@ -237,10 +237,19 @@ def _with_laws(state: _State, sessions: Sequence[Session], thresholds: Threshold
         flexible = likelihood.cost(state.fit.model)
         laws = [e for e in catalogue().values() if e.is_memoryless]
         fits = [fit(likelihood, nothing.model.with_part(law, law.begun(law.shapes[0])), STEPS_A_RATE) for law in laws]
-        best = min(fits, key=lambda one: one.cost)
+        best = min((one for one in fits if not _is_stretched(one.model)), key=lambda one: one.cost, default=nothing)
         if best.cost - flexible < thresholds.law_departure**2 * max(nothing.cost - flexible, 0.0):
             state = _State(*_searched(best.model, sessions, thresholds), best)
     return state
+
+
+def _is_stretched(model: ExtendedModel) -> bool:
+    """Whether a shape of the last effect lies at a bound: beyond it the equation means something else."""
+    last = model.parts[-1]
+    return any(
+        parameter.null is None and not parameter.lower < float(value) < parameter.upper
+        for parameter, value in zip(last.effect.parameters, last.values, strict=True)
+    )
 
 
 def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: Thresholds) -> _State:

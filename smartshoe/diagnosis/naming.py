@@ -31,9 +31,8 @@ def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> 
 
     A flexible block is named by the law of its family that comes nearest.
     """
-    largest = max((one.size for one in members), default=0.0)
     made = [
-        _named(one, probability_of_kind(one, largest, left, thresholds), thresholds)
+        _named(one, probability_of_kind(one, left, thresholds), thresholds)
         for one in members
         if one.size >= thresholds.material
     ]
@@ -48,24 +47,21 @@ def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
     margins = {a.effect: a.margin for a in one.laws}
     nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
-    return Name(one, nearest, kind, kind / len(family), others, True)
+    # Whatever its law is, another one of the family follows as well.
+    return Name(one, nearest, kind, kind / 2.0 if others else kind, others, True)
 
 
-def probability_of_kind(one: Member, largest: float, left: float, thresholds: Thresholds) -> float:
-    """That an effect of this family is there: a logistic of three ratios, each without a unit.
+def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:
+    """That an effect of this family is there: a logistic of two ratios, each without a unit, and the evidence for it.
 
-    What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow); how
-    far its equation is asked to depart; its size over the ``largest`` member's (whose departure it may be).
+    What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow), and
+    how far its equation is asked to depart.
     """
-    intercept, per_left, per_departed, per_share = thresholds.kind_odds
-    size = one.size + thresholds.material
-    score = (
-        intercept
-        + per_left * math.log((left + thresholds.material) / size)
-        + per_departed * one.departed
-        + per_share * math.log(size / (largest + thresholds.material))
-    )
-    return 1.0 / (1.0 + math.exp(-score))
+    intercept, per_left, per_departed = thresholds.kind_odds
+    ratio = (left + thresholds.material) / (one.size + thresholds.material)
+    score = intercept + per_left * math.log(ratio) + per_departed * one.departed
+    nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
+    return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
@@ -73,14 +69,14 @@ def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tupl
 
     No law is exact: another one that explains all but the square of the usual departure, of what this one explains, is
     as good. So the margin is counted in units of that square, and of one look at noise; of the largest departure that
-    is usual where a law is to be ruled out.
+    is usual where a law is to be ruled out. It is held against its nearest rival: one half in a dead heat.
     """
 
     def odds(margin: float, departure: float) -> float:
-        unit = 2.0 * (thresholds.evidence_temperature + departure**2 * max(one.fall, 0.0))
+        unit = 2.0 * (1.0 + departure**2 * max(one.fall, 0.0))
         return math.exp(-max(margin, 0.0) / unit)
 
     laws = [(a.effect, a.margin) for a in one.laws if a.effect is not None]
     equivalents = (name for name, margin in laws if odds(margin, thresholds.law_departure) > thresholds.equivalent_odds)
-    rivals = sum(odds(margin, thresholds.departure) for _, margin in laws)
-    return 1.0 / (1.0 + rivals), tuple(equivalents)
+    nearest = max((odds(margin, thresholds.departure) for _, margin in laws), default=0.0)
+    return 1.0 / (1.0 + nearest), tuple(equivalents)

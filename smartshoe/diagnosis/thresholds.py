@@ -48,10 +48,10 @@ class Thresholds:
         0.25, "sample intervals", "a latency shorter than this lies within what a time stamp says", "uniform: sd 0.29"
     )
     tolerable: float = threshold(
-        1e-3,
+        1.5e-3,
         "share of full scale",
         "structure that small imperfections of a good unit add up to",
-        "effects below 0.1 %",
+        "three effects of 0.08 % each: 0.14 %",
     )
     alike: float = threshold(
         3.0, "times material", "two models whose readings differ by less are one, and the simpler is taken", "judgement"
@@ -59,20 +59,17 @@ class Thresholds:
     law_departure: float = threshold(
         0.4, "share of an effect's size", "a departure from which on the law is unsure", "effects.md: 5 to 40 %"
     )
-    evidence_temperature: float = threshold(
-        4.0, "1", "by which evidence at a high sampling rate is overstated", "fitted on the bank"
-    )
     equivalent_odds: float = threshold(
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (2.14, -0.82, -0.46, 0.25),
+        (1.92, -1.04, -0.9),
         "log odds",
-        "of a kind: intercept; per log of what is left over its size, of departure, of log of its part in the largest",
-        "logistic regression on the bank",
+        "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure",
+        "logistic regression on 306 cases of two worlds",
     )
     least_confidence: float = threshold(
-        0.7, "probability", "of the kind; below it no cause is named", "twice as likely right as wrong"
+        0.6, "probability", "of the kind; below it no cause is named", "three to two for being right"
     )
     seen_confidence: float = threshold(0.97, "probability", "of a zero or tare seen at rest", "bank")
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")

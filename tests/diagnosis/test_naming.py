@@ -74,17 +74,16 @@ def test_confidence_in_a_kind_grows_with_its_size_over_what_is_left(
     size: float, times: float, left: float, departed: float
 ) -> None:
     small, large = member(size=size, departed=departed), member(size=size * times, departed=departed)
-    largest = size * times
-    assert probability_of_kind(small, largest, left, STANDARD) <= probability_of_kind(large, largest, left, STANDARD)
+    assert probability_of_kind(small, left, STANDARD) <= probability_of_kind(large, left, STANDARD)
 
 
 @given(st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 3.0), st.floats(0.0, 3.0))
 def test_confidence_falls_with_what_is_left_and_with_departure(
     left: float, more: float, departed: float, further: float
 ) -> None:
-    sure = probability_of_kind(member(departed=departed), 0.01, left, STANDARD)
-    assert probability_of_kind(member(departed=departed), 0.01, left + more, STANDARD) <= sure
-    assert probability_of_kind(member(departed=departed + further), 0.01, left, STANDARD) <= sure
+    sure = probability_of_kind(member(departed=departed), left, STANDARD)
+    assert probability_of_kind(member(departed=departed), left + more, STANDARD) <= sure
+    assert probability_of_kind(member(departed=departed + further), left, STANDARD) <= sure
 
 
 def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it() -> None:
@@ -95,7 +94,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family
-    assert name.confidence == pytest.approx(name.kind / len(family))
+    assert name.confidence == pytest.approx(name.kind / 2.0)
 
 
 # -- what each number decides -----------------------------------------------------------------------------------
@@ -106,21 +105,30 @@ def test_material_is_the_size_from_which_on_a_member_is_named() -> None:
 
 
 def test_least_confidence_is_of_the_kind_below_which_nothing_is_named() -> None:
-    sure = probability_of_kind(member(), 0.01, 1e-3, STANDARD)
+    sure = probability_of_kind(member(), 1e-3, STANDARD)
     assert names_of([member()], 1e-3, replace(STANDARD, least_confidence=sure - 0.01))
     assert not names_of([member()], 1e-3, replace(STANDARD, least_confidence=sure + 0.01))
 
 
 def test_kind_odds_are_the_logistics_coefficients() -> None:
     for intercept in (-2.0, 0.0, 3.0):
-        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0, 0.0))
-        assert probability_of_kind(member(), 0.01, 0.002, plain) == pytest.approx(1 / (1 + math.exp(-intercept)))
+        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0))
+        assert probability_of_kind(member(), 0.002, plain) == pytest.approx(1 / (1 + math.exp(-intercept)))
 
 
-def test_temperature_counts_margins_where_an_effect_brings_little() -> None:
-    rival = member(fall=0.0, laws=(("orifice_leak", 8.0),))
-    hot, cold = (probability_of_law(rival, replace(STANDARD, evidence_temperature=by))[0] for by in (40.0, 0.4))
-    assert hot < 0.6 < 0.99 < cold
+@given(st.floats(0.0, 60.0))
+def test_where_an_effect_brings_nothing_a_margin_is_evidence_as_it_stands(margin: float) -> None:
+    rival = member(fall=0.0, laws=(("orifice_leak", margin),))
+    assert probability_of_law(rival, STANDARD)[0] == pytest.approx(1.0 / (1.0 + math.exp(-margin / 2.0)))
+
+
+@given(st.floats(0.0, 60.0), st.floats(0.0, 60.0))
+def test_what_nothing_accounts_for_as_well_is_surer(margin: float, more: float) -> None:
+    less, surer = (
+        replace(member(), alternatives=(Alternative(None, by), Alternative("delay", by)))
+        for by in (margin, margin + more)
+    )
+    assert probability_of_kind(less, 1e-3, STANDARD) <= probability_of_kind(surer, 1e-3, STANDARD)
 
 
 def test_departure_counts_margins_where_an_effect_brings_much() -> None:
