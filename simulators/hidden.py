@@ -62,7 +62,7 @@ class HiddenCase:
         return _recorded(self.clean_options, self.protocols, self.seed)
 
 
-def hide(
+def hide(  # noqa: PLR0913 - a public verb
     effects: Mapping[str, float] | Sequence[str],
     *,
     strength_percent_fs: float | Mapping[str, float] = 1.0,

@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from simulators.preisach import mean_curve, relays_up
-from simulators.stepping import CYCLE_BEGINS, CYCLE_ENDS
+from simulators.stepping import cycle_at
 
 Array = NDArray[np.float64]
 
@@ -24,10 +24,7 @@ def loop_and_cycles(
     for i in range(load_n.size):
         up, count = relays_up(load_n[i], turning, partial, count, shape)
         loop[i] = up - mean_curve(load_n[i], shape)
-        if load_n[i] > CYCLE_BEGINS * full_n:
-            in_cycle = True
-        elif in_cycle and load_n[i] < CYCLE_ENDS * full_n:
-            in_cycle = False
-            done += 1.0
+        in_cycle, ended = cycle_at(load_n[i], full_n, in_cycle)
+        done += 1.0 if ended else 0.0
         cycles[i] = done
     state[0], state[1], state[2] = count, 1.0 if in_cycle else 0.0, done

@@ -1,5 +1,7 @@
-"""The entry point "sim" of smartshoe's devices: ``sim:instron``, ``sim:walk``, ``sim:run``, ``sim:stand``,
-``sim:tiptoe``."""
+"""The entry point "sim" of smartshoe's devices.
+
+It opens ``sim:instron``, ``sim:walk``, ``sim:run``, ``sim:stand`` and ``sim:tiptoe``.
+"""
 
 from __future__ import annotations
 

@@ -21,6 +21,33 @@ CYCLE_BEGINS, CYCLE_ENDS = 0.10, 0.01  # of full scale: a load cycle counts once
 
 
 @njit(cache=True)
+def newton(at: float, off: float, slope: float, low: float, high: float) -> tuple[float, float, float, float]:
+    """One step on a rising balance that is ``off`` at ``at``: the next place, the way there, and the bracket's ends.
+
+    Where Newton leaves the bracket, its middle is taken.
+    """
+    if off > 0.0:
+        high = at
+    else:
+        low = at
+    move = off / slope
+    new = at - move
+    if not low <= new <= high:
+        new = 0.5 * (low + high)
+        move = at - new
+    return new, move, low, high
+
+
+@njit(cache=True)
+def cycle_at(load_n: float, full_n: float, in_cycle: bool) -> tuple[bool, bool]:
+    """Whether a load cycle goes on at ``load_n``, having gone on before or not, and whether one ends here."""
+    if load_n > CYCLE_BEGINS * full_n:
+        return True, False
+    ended = in_cycle and load_n < CYCLE_ENDS * full_n
+    return in_cycle and not ended, ended
+
+
+@njit(cache=True)
 def advance(
     load_n: Array, finer: int, step_s: float, constants: Array, shape: Array,
     state: Array, turning: Array, partial: Array, pressure: Array, deformation: Array,
@@ -57,11 +84,8 @@ def advance(
             if exponent != 1.0 and acting > 0.0:
                 acting = full_n * (acting / full_n) ** exponent
             if conditioning != 0.0:
-                if load > CYCLE_BEGINS * full_n:
-                    in_cycle = True
-                elif in_cycle and load < CYCLE_ENDS * full_n:
-                    in_cycle = False
-                    cycles += 1.0
+                in_cycle, ended = cycle_at(load, full_n, in_cycle)
+                cycles += 1.0 if ended else 0.0
                 acting *= 1.0 + conditioning * -math.expm1(-cycles * per_cycle)
             stress = acting * per_newton
             warm = drift * time_s - warming * math.expm1(-warming_rate * time_s)
@@ -91,17 +115,7 @@ def advance(
                     stiffness *= left
                 q_new = q_fixed + (1.0 - mean) * new
                 off = p + stiffness * new + K2 * (new - q_new) - stress
-                slope += tangent + K2 * mean
-                if off > 0.0:
-                    high = new
-                else:
-                    low = new
-                move = off / slope
-                trial = new - move
-                if not low <= trial <= high:
-                    trial = 0.5 * (low + high)
-                    move = new - trial
-                new = trial
+                new, move, low, high = newton(new, off, slope + (tangent + K2 * mean), low, high)
                 if abs(move) <= 1e-13:
                     break
             # The last correction is below rounding: bring the rest of the state to the same deformation.

@@ -12,10 +12,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from simulators.stepping import ORIFICE_SMOOTHING, newton
+
 Array = NDArray[np.float64]
 
 SCALARS = 12
-ORIFICE_SMOOTHING = 1e-4  # as in `simulators.stepping`
 LAMINAR = 3e-4  # of ambient: below this difference a nozzle's flow is viscous
 GAMMA = 1.4
 
@@ -31,6 +32,35 @@ def nozzle_flow(p: float) -> float:
     )
     flow *= math.sqrt(size / (size + LAMINAR))
     return float(flow if p > 0.0 else -flow)
+
+
+@njit(cache=True)
+def faded(heats: Array, keep: Array) -> float:
+    """The sum of ``heats`` after a step in which each keeps its share ``keep``; changed in place."""
+    total = 0.0
+    for j in range(heats.size):
+        heats[j] *= keep[j]
+        total += heats[j]
+    return total
+
+
+@njit(cache=True)
+def softened(
+    wall: float, tangent: float, softening: float, e: float, e_max: float, width: float
+) -> tuple[float, float]:
+    """Force and tangent of a wall that was deformed to ``e_max`` before; ``width`` in squares of deformation."""
+    bend = math.tanh((e_max * e_max - e * e) / width)
+    left = 1.0 - softening * bend
+    bend_slope = (1.0 - bend * bend) * 2.0 * e / width
+    return wall * left, tangent * left + wall * softening * bend_slope
+
+
+@njit(cache=True)
+def slider_at(pull: float, spring: float, most: float) -> tuple[float, float]:
+    """What a slider holds (Jenkins) under an elastic ``pull``, and its stiffness: none once it slips."""
+    if abs(pull) < most:
+        return pull, spring
+    return math.copysign(most, pull), 0.0
 
 
 @njit(cache=True)
@@ -69,10 +99,7 @@ def advance_wall(
         for j in range(arms.size):
             arms[j] = arm_keep[j] * arms[j] + (arm_mean[j] - arm_keep[j]) * e
             arm_pull += arm_stiffness[j] * arms[j]
-        theta_fixed = 0.0
-        for j in range(heats.size):
-            heats[j] *= heat_keep[j]
-            theta_fixed += heats[j]
+        theta_fixed = faded(heats, heat_keep)
         if K3 != 0.0:
             thin_flow = thin_rate * thin_width * math.sinh((e - thin) / thin_width)
             thin += step_s * (1.5 * thin_flow - 0.5 * thin_flow_before)
@@ -97,20 +124,13 @@ def advance_wall(
             wall = K1 * full_e * (math.sinh(bent * x) / bent + hardening * square * x)
             tangent = K1 * (math.cosh(bent * x) + 3.0 * hardening * square)
             if softening != 0.0 and new < e_max:
-                bend = math.tanh((e_max * e_max - new * new) / (width * full_e * full_e))
-                left = 1.0 - softening * bend
-                bend_slope = (1.0 - bend * bend) * 2.0 * new / (width * full_e * full_e)
-                tangent = tangent * left + wall * softening * bend_slope
-                wall *= left
+                wall, tangent = softened(wall, tangent, softening, new, e_max, width * full_e * full_e)
             wall += arm_tangent * new - arm_pull + K3 * (new - thin)
             tangent += arm_tangent + K3
             for j in range(sliders.size):
-                held = sliders[j] + slider_spring[j] * (new - e)
-                if abs(held) < slider_most[j]:
-                    tangent += slider_spring[j]
-                    wall += held
-                else:
-                    wall += math.copysign(slider_most[j], held)
+                held, stiffness = slider_at(sliders[j] + slider_spring[j] * (new - e), slider_spring[j], slider_most[j])
+                wall += held
+                tangent += stiffness
             if bristles != 0.0:
                 way = bristle_spring * (new - e)
                 first = slide(bristle, way, bristle_power, gamma)
@@ -118,17 +138,7 @@ def advance_wall(
                 wall += bristles * bristle_new
                 tangent += bristles * bristle_spring * first
             off = p + wall - stress[i]
-            slope += tangent
-            if off > 0.0:
-                high = new
-            else:
-                low = new
-            move = off / slope
-            trial = new - move
-            if not low <= trial <= high:
-                trial = 0.5 * (low + high)
-                move = new - trial
-            new = trial
+            new, move, low, high = newton(new, off, slope + tangent, low, high)
             if abs(move) <= 1e-13:
                 break
         # The last correction is below rounding: bring the rest of the state to the same deformation.

@@ -154,8 +154,9 @@ class Wander:
 
 
 def moments(time_s: Array, mean_s: float, rng: np.random.Generator) -> tuple[NDArray[np.intp], Array, Array]:
-    """How many random moments (Poisson, ``mean_s`` apart) have passed at each time, the time since the last, and a
-    size from 0.5 to 1.5, of either sign, for each moment.
+    """Random moments (Poisson, ``mean_s`` apart).
+
+    Returns how many have passed at each time, the time since the last, and for each a size of either sign, 0.5 to 1.5.
     """
     start_s, span_s = float(time_s[0]), float(time_s[-1] - time_s[0])
     count = int(span_s / mean_s * 2 + 20)

@@ -26,8 +26,9 @@ SHORTEST_S, LONGEST_S = 5e-3, 1e5
 
 @dataclass(frozen=True, slots=True)
 class SecondRelaxation:
-    """A second arm of stiffness ``k3`` in N/m; ``eyring_width`` is the strain, in units of the full-scale
-    deformation, at which its dashpot begins to thin.
+    """A second arm of stiffness ``k3`` in N/m.
+
+    ``eyring_width`` is the strain, in units of the full-scale deformation, at which its dashpot begins to thin.
     """
 
     __pydantic_config__ = STRICT_KEYS

@@ -57,7 +57,7 @@ def trial(
     return next(iter(blocks(person, activity, duration_s, rng, block_s=np.inf, **settings)))
 
 
-def blocks(
+def blocks(  # noqa: PLR0913 - a public verb
     person: Person | None = None,
     activity: Activity | Sequence[Part] | Measured | None = None,
     duration_s: float | None = 60.0,

@@ -39,9 +39,11 @@ BUMPS = 3  # of a warp
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What a law may look at beside its argument, (n,) each: time since the session's start, load, deformation,
-    pressure, the room above its temperature at the start; ``span_s`` is the session's length, ``number`` counts
-    sessions, ``stiff`` is k1 x0^2/(nRT); ``rng`` draws what differs from session to session.
+    """What a law may look at beside its argument.
+
+    (n,) each: time since the session's start, load, deformation, pressure, the room above its temperature at the
+    start. ``span_s`` is the session's length, ``number`` counts sessions, ``stiff`` is k1 x0^2/(nRT); ``rng`` draws
+    what differs from session to session.
     """
 
     time_s: Array

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from smartshoe.devices.base import Block
     from smartshoe.session import Plan, SessionFolder
-    from smartshoe.session.checks import Finding
+    from smartshoe.session.checks import PressingFault
 
 
 @click.command(
@@ -162,7 +162,7 @@ class _AtTheMachine:
         if self._table is not None:
             self._table.show(block, experiment, elapsed_s)
 
-    def wants_repeat(self, finding: Finding, repeats_left: int) -> bool:
+    def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
         self._print(finding.says)
         if repeats_left == 0:
             return False

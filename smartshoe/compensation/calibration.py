@@ -273,21 +273,17 @@ def extended_calibration(
     model: ExtendedModel,
     *,
     unit: str = "",
-    serial_number: str = "",
     parameters: Mapping[str, Parameter] | None = None,
     covariance: tuple[tuple[float, ...], ...] = (),
-    scale: float | None = None,
     load_range_n: tuple[float, float] | None = None,
-    rate_range_n_per_s: tuple[float, float] | None = None,
     sample_rate_hz: float = 100.0,
-    sources: tuple[Mapping[str, str | None], ...] = (),
     created: str = "",
 ) -> Calibration:
     """The calibration that holds ``model``, and its linear part as a1, b0, b1, offset and delay.
 
     From p/f = (s + a)/((1 + kappa) s + a) of the model and reading = gain p: a1 = a, b0 = (1 + kappa) F/(G R) and
-    b1 = a F/(G R), with F/(G R) full-scale load over gain times full-scale reading in N per reading unit. ``scale``
-    is that number where none is given. ``parameters`` and ``covariance`` go together, as in `Calibration`.
+    b1 = a F/(G R), with F/(G R) full-scale load over gain times full-scale reading in N per reading unit, which is
+    also the calibration's ``scale``. ``parameters`` and ``covariance`` go together, as in `Calibration`.
     """
     from smartshoe import __version__
 
@@ -302,14 +298,11 @@ def extended_calibration(
         unit=unit,
         parameters=dict(parameters or {}),
         covariance=covariance,
-        scale=newton_per_reading if scale is None else scale,
+        scale=newton_per_reading,
         delay_s=sum(part.effect.delay_s(part.values) for part in model.parts),
         load_range_n=load_range_n or (0.0, model.full_scale_load_n),
-        rate_range_n_per_s=rate_range_n_per_s,
         sample_rate_hz=sample_rate_hz,
-        sources=sources,
         created=created,
         smartshoe_version=__version__,
-        serial_number=serial_number,
         extended=model,
     )

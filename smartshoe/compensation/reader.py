@@ -32,6 +32,7 @@ class Reader:
     path: str
 
     def fault(self, key: str, what: str) -> InputError:
+        """The error that says of ``key`` ``what`` is wrong with it."""
         return InputError(f"{self.path}: key '{key}' {what}: write the file anew with identify --calibration")
 
     def _get(self, found: Mapping[str, Any], key: str, above: str) -> Any:
@@ -40,29 +41,34 @@ class Reader:
         return found[key]
 
     def number(self, found: Mapping[str, Any], key: str, above: str = "") -> float:
+        """The finite number under ``key``; ``above`` is the path of ``found`` in the file, with a full stop."""
         value = self._get(found, key, above)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise self.fault(above + key, f"is {value!r}, not a finite number")
         return float(value)
 
     def maybe(self, value: Any, key: str) -> float:
+        """``value`` as a finite number, NaN where it is null."""
         if value is None:
             return math.nan
         return self.number({key: value}, key)
 
     def text(self, found: Mapping[str, Any], key: str, above: str = "") -> str:
+        """The text under ``key``."""
         value = self._get(found, key, above)
         if not isinstance(value, str):
             raise self.fault(above + key, f"is {value!r}, not a text")
         return value
 
     def mapping(self, found: Mapping[str, Any], key: str, above: str = "") -> Mapping[str, Any]:
+        """The object under ``key``."""
         value = self._get(found, key, above)
         if not isinstance(value, dict):
             raise self.fault(above + key, f"is {value!r}, not an object")
         return value
 
     def pair(self, found: Mapping[str, Any], key: str) -> tuple[float, float] | None:
+        """The two numbers under ``key``, None where it is missing or null."""
         value = found.get(key)
         if value is None:
             return None
@@ -71,6 +77,7 @@ class Reader:
         return self.number({key: value[0]}, key), self.number({key: value[1]}, key)
 
     def parameter(self, found: Mapping[str, Any], name: str, above: str) -> Parameter:
+        """The parameter ``name`` with its uncertainty and unit."""
         item = self.mapping(found, name, above)
         key = f"{above}{name}."
         interval = item.get("ci95")

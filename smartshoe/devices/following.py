@@ -47,7 +47,6 @@ class Following:
 
 def misfit_of(residual: Array, sample_rate_hz: float) -> float:
     """Variance of the residual's means over 0.5 s against that over 0.05 s, for as many samples: 1 where white."""
-
     quick = _of_means(residual, QUICK_S * sample_rate_hz)
     return _of_means(residual, SLOW_S * sample_rate_hz) / quick if quick > 0.0 else 1.0
 
@@ -133,8 +132,10 @@ def _one(even: _Load, logger_s: Array, signal: Array, delay_s: float, lag_s: flo
 
 
 def follow(machine_s: Array, load: Array, logger_s: Array, signal: Array, delay_s: float) -> Following:
-    """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) behind ``load`` (m,) at ``machine_s`` (m,), from
-    ``delay_s`` on; the better of the fits from `STARTS_S`."""
+    """Delay and rate of ``signal`` (n,) at ``logger_s`` (n,) behind ``load`` (m,) at ``machine_s`` (m,).
+
+    From ``delay_s`` on; the better of the fits from `STARTS_S`.
+    """
     even = _even(machine_s, load)
     found = [_one(even, logger_s, signal, delay_s, lag_s) for lag_s in STARTS_S]
     return min(found, key=lambda one: float(np.mean(one.residual**2)))

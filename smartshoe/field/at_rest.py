@@ -1,4 +1,4 @@
-"""The zero before use: is the shoe unloaded and still, and what does each unit read then?"""
+"""The zero before use: whether the shoe is unloaded and still, and what each unit reads then."""
 
 from __future__ import annotations
 

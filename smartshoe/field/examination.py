@@ -32,15 +32,17 @@ WORST: tuple[Verdict, ...] = ("fault", "warning", "unknown", "ok")
 
 @dataclass(frozen=True, eq=False)
 class Examination:
-    """What `examine` found of one recording; ``verdict`` is the worst of its findings, "unknown" where nothing could
-    be checked."""
+    """What `examine` found of one recording.
+
+    ``verdict`` is the worst of its findings, "unknown" where nothing could be checked.
+    """
 
     name: str
     findings: tuple[Finding, ...]
 
     @property
     def verdict(self) -> Verdict:
-        """ "fault", "warning" or "ok"."""
+        """One of "fault", "warning" and "ok"."""
         said = {finding.verdict for finding in self.findings}
         return next((verdict for verdict in ("fault", "warning", "ok") if verdict in said), "unknown")
 

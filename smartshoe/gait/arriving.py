@@ -1,5 +1,7 @@
-"""A shoe's readings as they arrive: blocks of any size on to an even time base, in pieces of one size, cut where a
-recording stops."""
+"""A shoe's readings as they arrive: blocks of any size on to an even time base.
+
+They leave in pieces of one size, cut where a recording stops.
+"""
 
 from __future__ import annotations
 

@@ -43,8 +43,11 @@ Told = Callable[[Sequence[Event], Sequence[Stride]], None]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DayResult(GaitResult):
-    """A long trial: numbers and flags of the whole; ``events`` and ``strides`` are the first ones, up to
-    ``listed_s``, of ``event_count`` and ``stride_count``. It keeps no course against time."""
+    """A long trial: numbers and flags of the whole.
+
+    ``events`` and ``strides`` are the first ones, up to ``listed_s``, of ``event_count`` and ``stride_count``. It keeps
+    no course against time.
+    """
 
     duration_s: float
     recorded_s: float

@@ -108,16 +108,11 @@ def find_edges(loads: Array, found: Cut, floors: tuple[Floors, Floors], rate_hz:
     whole_peaks = np.maximum.reduceat(whole, bounds)[::2] - floor.sum(axis=1)
     usual_whole = running_median(np.where(has_rise | has_fall, whole_peaks, np.nan), PEAKS)
     usual = np.column_stack([running_median(column, PEAKS) for column in peaks.T]) if peaks.size else peaks
-    noise = np.sqrt(found.noise**2 / loads.shape[1])
     parts = []
     for side, (has, at, base) in enumerate(((has_rise, begins, before), (has_fall, ends, after))):
         index = np.flatnonzero(has)
-        parts.append(
-            _one_side(
-                loads, whole, begins[index], ends[index], at[index], base[index], usual_whole[index], usual[index],
-                found.noise, noise, rate_hz, shapes, side,
-            )
-        )  # fmt: skip
+        ends_here = _Ends(at[index], (ends - begins)[index], base[index], usual_whole[index], usual[index])
+        parts.append(_located(loads, ends_here, found.noise, rate_hz, shapes, side))
     coarse = np.concatenate([part[0] for part in parts])
     rises = np.concatenate([np.ones(parts[0][0].size, bool), np.zeros(parts[1][0].size, bool)])
     place = np.concatenate([part[1] for part in parts])
@@ -128,19 +123,35 @@ def find_edges(loads: Array, found: Cut, floors: tuple[Floors, Floors], rate_hz:
     return Edges(coarse[order], rises[order], place[order], units[order], scale)
 
 
-def _one_side(
-    loads: Array, whole: Array, begins: Index, ends: Index, at: Index, base: Array, usual_whole: Array, usual: Array,
-    noise: float, unit_noise: float, rate_hz: float, shapes: Shapes, side: int,
-) -> tuple[Index, Array, Array]:  # fmt: skip
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """One end of k contacts.
+
+    Its coarse place ``at`` and the contact's ``length`` (k,) in samples, the floor ``base`` (k, r) of the swing beside
+    it, and the usual peak of the foot (k,) and of its units (k, r).
+    """
+
+    at: Index
+    length: Index
+    base: Array
+    usual_whole: Array
+    usual: Array
+
+
+def _located(
+    loads: Array, ends: _Ends, noise: float, rate_hz: float, shapes: Shapes, side: int
+) -> tuple[Index, Array, Array]:
     """Rises (``side`` 0) or falls (1): coarse places (k,), exact places (k,), units' places (k, r)."""
+    at, base, usual_whole = ends.at, ends.base, ends.usual_whole
     count, regions = at.size, loads.shape[1]
     units = np.full((count, regions), np.nan)
     if count == 0:
         return at, np.zeros(0), units
+    unit_noise = float(np.sqrt(noise**2 / regions))
     turn = 1 if side == 0 else -1
     first = at - turn * round(BEFORE_S * rate_hz) - (0 if side == 0 else 1)
     width = round((BEFORE_S + AFTER_S) * rate_hz) + 1
-    rows = _rows(whole, first, turn, width) - base.sum(axis=1)[:, None]
+    rows = _rows(loads.sum(axis=1), first, turn, width) - base.sum(axis=1)[:, None]
     levels, top = _levels(LEVEL, usual_whole, noise)
     places = rise_places(rows, levels, top)
     shapes.foot[side] = growth(places, shapes.foot[side])
@@ -149,13 +160,13 @@ def _one_side(
     # A unit comes and goes while the foot is down; beyond the contact's other end it is another stance's.
     first = at - turn * round(UNIT_BEFORE_S * rate_hz) - (0 if side == 0 else 1)
     margin = round(UNIT_BEFORE_S * rate_hz)
-    reach = np.minimum(ends - begins + 2 * margin, margin + round(UNIT_AFTER_S * rate_hz))
+    reach = np.minimum(ends.length + 2 * margin, margin + round(UNIT_AFTER_S * rate_hz))
     width = int(reach.max())
     outside = np.arange(width)[None, :] >= reach[:, None]
     for region in range(regions):
         rows = _rows(loads[:, region], first, turn, width) - base[:, region, None]
         rows[outside] = -np.inf
-        levels, top = _levels(UNIT_LEVEL, usual[:, region], unit_noise)
+        levels, top = _levels(UNIT_LEVEL, ends.usual[:, region], unit_noise)
         places = rise_places(rows, levels, top)
         shapes.units[side][region] = growth(places, shapes.units[side][region])
         share = BEARS * usual_whole / np.maximum(levels[:, 0], 1e-12)

@@ -38,8 +38,11 @@ class Detector(ContactDetector):
 
 
 class FootStream:
-    """One foot's run of recording. ``model`` is the foot as a first look at the record has it, ``channels`` its units'
-    channels there (for unit and range); readings without a calibration are loads in a unit of their own."""
+    """One foot's run of recording.
+
+    ``model`` is the foot as a first look at the record has it, ``channels`` its units' channels there (for unit and
+    range); readings without a calibration are loads in a unit of their own.
+    """
 
     def __init__(
         self, model: Foot, channels: tuple[Channel, ...], calibrations: Mapping[str, Calibration], start_s: float

@@ -171,9 +171,9 @@ class GaitResult(Shown):
         )
 
     def columns(self) -> dict[str, Any]:
-        """The table of forces by column: units, feet, total, centre of pressure (% of the insole), phase (0 swing,
-        1 heel, 2 flat, 3 push).
+        """The table of forces by column: units, feet, total, centre of pressure (% of the insole), phase.
 
+        A phase is 0 in swing, 1 on the heel, 2 on the flat foot, 3 in push.
         On the first foot's times; the other's are interpolated where its clock differs. NaN where nothing is known.
         """
         base = next(iter(self.feet.values())).time_s

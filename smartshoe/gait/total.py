@@ -198,9 +198,9 @@ def _floor_variance(course: FootCourse) -> float:
 
 
 def rmse_of(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], coverage: float) -> float | None:
-    """The error in N to expect of the whole force: what the feet read in swing, where the truth is nought, and the
-    gains' sd over the load they bear.
+    """The error in N to expect of the whole force.
 
+    It is what the feet read in swing, where the true force is zero, and the gains' sd over the load they bear.
     None where no swing was seen. What a load leaves behind in a unit while it lasts is in neither.
     """
     variance = 0.0

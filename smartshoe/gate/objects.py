@@ -12,8 +12,11 @@ _MOST_DIGITS = 400  # of a number as it is written; float64 ends at 309 before t
 
 
 def parsed_json(text: str | bytes) -> Any:
-    """The JSON ``text`` as objects; raises `ValueError` for what is none, for NaN, infinity, numbers beyond float64,
-    and for more bytes or depth than the limits."""
+    """The JSON ``text`` as objects.
+
+    Raises `ValueError` for what is none, for NaN, infinity, numbers beyond float64, and for more bytes or depth than
+    the limits.
+    """
     if len(text) > limits().json_bytes:
         raise ValueError(f"it has more than {limits().json_bytes} bytes")
     try:

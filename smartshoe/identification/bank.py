@@ -17,8 +17,11 @@ COARSEST_STEP_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class CoefficientFits:
-    """Of each fit, a row: ``coefficients`` (m, 3) a1, b0, b1, ``covariance`` (m, 3, 3), ``rmse`` (m,),
-    ``passes`` (m,) over the data, and whether it ``converged`` (m,); NaN where SRIVC found no start."""
+    """A row for each of m fits.
+
+    ``coefficients`` (m, 3) a1, b0, b1, ``covariance`` (m, 3, 3), ``rmse`` (m,), ``passes`` (m,) over the data, and
+    whether it ``converged`` (m,); NaN where SRIVC found no start.
+    """
 
     coefficients: Array
     covariance: Array

@@ -1,4 +1,4 @@
-"""Does the paper's two-parameter form (c = 1) agree with three free coefficients?"""
+"""Whether the paper's two-parameter form (c = 1) agrees with three free coefficients."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ Free = Literal["estimate"]
 
 
 @on_one_thread
-def identify(
+def identify(  # noqa: PLR0913 - a public verb
     recordings: RecordingLike | Sequence[RecordingLike],
     *,
     direction: Direction = "inverse",

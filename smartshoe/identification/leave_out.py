@@ -40,8 +40,11 @@ class RateFold:
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """A parameter over the folds: its ``value`` from all rates, ``lowest`` and ``highest`` without one, and the
-    largest distance from ``value`` in standard deviations of the fold, ``moved_sd``; a right model stays within 3."""
+    """A parameter over the folds: its ``value`` from all rates, ``lowest`` and ``highest`` without one.
+
+    ``moved_sd`` is the largest distance from ``value`` in standard deviations of the fold; a right model stays
+    within 3.
+    """
 
     value: float
     lowest: float

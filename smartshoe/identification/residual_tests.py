@@ -69,7 +69,7 @@ def _chi_square_tail(degrees: int, statistic: float) -> float:
 
 
 def input_independence(problem: PredictionError, theta: Array, errors: Sequence[Array]) -> ResidualTest:
-    """Score test: does the residual still lean on the input at lags 0 to 256 samples?
+    """Score test of whether the residual still leans on the input at lags 0 to 256 samples.
 
     The delayed inputs are cleared of what the fit has already used (its Jacobian), so the statistic is chi-square with
     their rank under white residuals. A slow dynamic left out shows here. Looked at in means of a few samples, which

@@ -146,6 +146,7 @@ class Columns:
 
     @classmethod
     def of(cls, start: bool, constant: bool) -> Columns:
+        """The places where an initial state (``start``) and a constant are estimated, or not."""
         at = POLES if start else 0
         u = at + POLES
         return cls(slice(0, POLES) if start else None, slice(at, u), u, u + 1 if constant else None, u + 2 + constant)
@@ -153,6 +154,8 @@ class Columns:
 
 @dataclass(frozen=True)
 class Solved:
+    """The least cost: theta (p,), the Jacobian's triangular factor (p, p) there, the cost e'e, and the iterations."""
+
     theta: Array
     jacobian: Array
     cost: float

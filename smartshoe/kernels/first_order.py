@@ -101,6 +101,35 @@ def add_products(columns, m, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_LAX)
+def leave_out(counted, columns, m):  # type: ignore[no-untyped-def]
+    """Set the first ``m`` of ``columns`` (COLUMNS, CHUNK) to 0 where ``counted`` (m or more,) is False."""
+    counts = 0
+    for j in range(m):
+        counts += counted[j]
+    for j in range(m if counts < m else 0):
+        if not counted[j]:
+            for i in range(COLUMNS):
+                columns[i, j] = 0.0
+
+
+@njit(cache=True, fastmath=_LAX)
+def complete(columns, now, now_change, now_s, target, alpha, p1, p2, offset, start, m):  # type: ignore[no-untyped-def]
+    """The first ``m`` of gradient and error into ``columns`` from the lags that stand there; see `inner_products`."""
+    drift, rest, lag, slow = columns[0], columns[1], columns[2], columns[3]
+    ones, fading, error = columns[4], columns[5], columns[6]
+    drop = p2 - p1
+    # One short loop a column: LLVM turns none into vector instructions that touches more than a few arrays.
+    for j in range(m):
+        drift[j] = alpha * (drop * drift[j] - start * now_s[j] * fading[j])
+    for j in range(m):
+        ones[j], rest[j] = 1.0, now[j] - lag[j]
+    for j in range(m):
+        slow[j] = p1 * now_change[j] + drop * slow[j]
+    for j in range(m):
+        error[j] = p1 * rest[j] + p2 * lag[j] + offset + start * fading[j] - target[j]
+
+
+@njit(cache=True, fastmath=_LAX)
 def inner_products(  # type: ignore[no-untyped-def]
     u, slope, y, counted, steps, begin_s, alpha, p1, p2, offset, start, stored, out
 ):
@@ -118,29 +147,22 @@ def inner_products(  # type: ignore[no-untyped-def]
     fades, times, now_s = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK)
     inputs, changes = np.zeros(CHUNK + 1), np.zeros(CHUNK + 1)  # the sample before the chunk, then the chunk
     before, now, before_change, now_change = inputs[:CHUNK], inputs[1:], changes[:CHUNK], changes[1:]
-    drift, rest, lag, slow = columns[0], columns[1], columns[2], columns[3]
-    ones, fading, error = columns[4], columns[5], columns[6]
+    drift, lag, slow, fading = columns[0], columns[2], columns[3], columns[5]
     E, A, B, dE, dA, dB = hold(alpha, steps[0])
     fades[0], times[0] = 1.0, 0.0
     for j in range(1, CHUNK):
         fades[j], times[j] = fades[j - 1] * E, j * steps[0]
     w = v = s = 0.0
     time_s, fade = begin_s, math.exp(-alpha * begin_s)
-    drop = p2 - p1
     for at in range(0, n, CHUNK):
         m = min(CHUNK, n - at)
-        source, target = u[at:], y[at:]
-        for j in range(m):
-            now[j] = source[j]
+        now[:m] = u[at : at + m]
         if delayed:
-            source = slope[at:]
-            for j in range(m):
-                now_change[j] = source[j]
+            now_change[:m] = slope[at : at + m]
         if at == 0:  # as if the first sample had lasted for ever
             inputs[0] = w = now[0]
             changes[0] = s = now_change[0]
-        # One short loop a column: LLVM turns none into vector instructions that touches more than a few arrays.
-        if even:
+        if even:  # one short loop a column, as in `complete`
             for j in range(m):
                 lag[j] = A * now[j] + B * before[j]
                 drift[j] = dA * now[j] + dB * before[j]
@@ -164,26 +186,13 @@ def inner_products(  # type: ignore[no-untyped-def]
                 lag[j], drift[j], slow[j], now_s[j], fading[j] = w, v, s, time_s, fade
         if fade < FADED:
             fade = 0.0
-        for j in range(m):
-            drift[j] = alpha * (drop * drift[j] - start * now_s[j] * fading[j])
-        for j in range(m):
-            ones[j], rest[j] = 1.0, now[j] - lag[j]
-        for j in range(m):
-            slow[j] = p1 * now_change[j] + drop * slow[j]
-        for j in range(m):
-            error[j] = p1 * rest[j] + p2 * lag[j] + offset + start * fading[j] - target[j]
+        complete(columns, now, now_change, now_s, y[at:], alpha, p1, p2, offset, start, m)
         inputs[0], changes[0] = now[m - 1], now_change[m - 1]
         for i in range(stored.shape[0]):
             for j in range(m):
                 stored[i, at + j] = columns[i, j]
         if masked:
-            counts = 0
-            for j in range(m):
-                counts += counted[at + j]
-            for j in range(m if counts < m else 0):
-                if not counted[at + j]:
-                    for i in range(COLUMNS):
-                        columns[i, j] = 0.0
+            leave_out(counted[at:], columns, m)
         add_products(columns, m, out)
 
 

@@ -45,6 +45,29 @@ def run_even(columns, taps, u, first, start, blocks, out):  # type: ignore[no-un
 
 
 @njit(cache=True)
+def _step(matrix, h, state, term, after):  # type: ignore[no-untyped-def]
+    """``state`` times the exponential of ``matrix`` h by its Taylor series, in place; the others are room for terms."""
+    size = state.size
+    for i in range(size):
+        term[i] = state[i]
+    for order in range(1, TAYLOR_TERMS):
+        for i in range(size):
+            after[i] = 0.0
+        for j in range(size):
+            weight = term[j] * (h / order)
+            if weight != 0.0:
+                for i in range(size):
+                    after[i] += matrix[i, j] * weight
+        largest = 0.0
+        for i in range(size):
+            term[i] = after[i]
+            state[i] += after[i]
+            largest = max(largest, abs(after[i]))
+        if largest == 0.0:
+            break
+
+
+@njit(cache=True)
 def run_uneven(  # type: ignore[no-untyped-def]
     matrix, norm, t, knots, u, hold, start, slack, out, value, slope
 ):
@@ -79,25 +102,8 @@ def run_uneven(  # type: ignore[no-untyped-def]
                 pieces = int(np.ceil(norm * length))
                 if pieces < 1:
                     pieces = 1
-                h = length / pieces
                 for _ in range(pieces):
-                    for i in range(size):
-                        term[i] = state[i]
-                    for order in range(1, TAYLOR_TERMS):
-                        for i in range(size):
-                            after[i] = 0.0
-                        for j in range(size):
-                            weight = term[j] * (h / order)
-                            if weight != 0.0:
-                                for i in range(size):
-                                    after[i] += matrix[i, j] * weight
-                        largest = 0.0
-                        for i in range(size):
-                            term[i] = after[i]
-                            state[i] += after[i]
-                            largest = max(largest, abs(after[i]))
-                        if largest == 0.0:
-                            break
+                    _step(matrix, length / pieces, state, term, after)
                 here = ends
                 while at + 1 < n and knots[at + 1] <= here + slack:
                     at += 1

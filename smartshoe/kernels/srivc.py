@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from smartshoe.kernels.first_order import CHUNK, COLUMNS, add_products, hold, recur
+from smartshoe.kernels.first_order import CHUNK, COLUMNS, add_products, hold, leave_out, recur
 
 INSTRUMENT, REGRESSOR, TARGET = 0, 5, 6  # columns; 1 to 4 are instruments and regressors both
 _LAX = {"reassoc", "contract", "nsz"}
@@ -63,10 +63,7 @@ def instrument_products(u, y, x, counted, steps, pole, out):  # type: ignore[no-
         for j in range(m):
             instrument[j] /= -pole
         if counted.size > 0:
-            for j in range(m):
-                if not counted[at + j]:
-                    for i in range(COLUMNS):
-                        columns[i, j] = 0.0
+            leave_out(counted[at:], columns, m)
         add_products(columns, m, out)
 
 

@@ -1,4 +1,4 @@
-"""What goes to a page: one binary frame a picture, and JSON for what is not a picture.
+r"""What goes to a page: one binary frame a picture, and JSON for what is not a picture.
 
 A frame, little-endian:
 
@@ -21,10 +21,10 @@ then for each shoe
 8      u32          f, feet
 12     f64          place of the first column (its time is place times width)
 20     i32[n]       place of each column, from the first
-\\      f32[c]       the last value of each unit
-\\      f32[4 f]     of each foot: phase (-1 unknown), load, centre along, centre medial
-\\      f32[n c]     least value of each unit in each column, a row a column
-\\      f32[n c]     greatest value
+\      f32[c]       the last value of each unit
+\      f32[4 f]     of each foot: phase (-1 unknown), load, centre along, centre medial
+\      f32[n c]     least value of each unit in each column, a row a column
+\      f32[n c]     greatest value
 ====== ============ ============================================================
 
 A column that was sent before is sent again while samples are still added to it. NaN is no value.

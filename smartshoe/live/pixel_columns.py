@@ -13,8 +13,11 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """``place`` (n,) of each column (its time is ``place`` times the columns' width), ``low`` and ``high`` (n, width)
-    of the samples in it, NaN where all are missing. Columns without a sample are not there."""
+    """A signal's columns of pixels: ``place`` (n,), whose time is ``place`` times the columns' width.
+
+    ``low`` and ``high`` (n, width) of the samples in it, NaN where all are missing. Columns without a sample are not
+    there.
+    """
 
     place: Places
     low: Array

@@ -28,8 +28,10 @@ def _head(path: Path) -> bytes:
 
 
 def detect(path: Path | str) -> Format:
-    """The format of the file at ``path``; raises `InputError` where it cannot be read, `FormatError` where no
-    format fits."""
+    """The format of the file at ``path``.
+
+    Raises `InputError` where it cannot be read, `FormatError` where no format fits.
+    """
     path = Path(path)
     head = _head(path)
     for format_ in formats():

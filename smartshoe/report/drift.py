@@ -117,8 +117,7 @@ def _jumps(drift: Drift) -> str:
 
 
 def write_drift(folder: Path | str, drift: Drift, figures: str | None = None) -> dict[str, Path]:
-    """Write drift.html and drift.json, and drift.svg (pdf, png) where ``figures`` says; returns paths by what they
-    are."""
+    """Write drift.html and drift.json, and drift.svg (pdf, png) where ``figures`` asks for it; returns their paths."""
     target = make_folder(folder)
     grade, says = headline(drift)
     written = {"report": target / "drift.html", "result": target / "drift.json"}

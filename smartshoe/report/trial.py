@@ -22,8 +22,11 @@ COLUMNS = ("truth", "raw", "corrected")
 
 @dataclass(frozen=True, eq=False)
 class TrialSection:
-    """What the page says of a trial: numbers against the truth (label and one text each of `COLUMNS`), sentences,
-    charts, and where the trial's own page lies (relative to the report)."""
+    """What the page shows of a trial.
+
+    Numbers against the truth (label and one text each of `COLUMNS`), sentences, charts, and where the trial's own page
+    lies (relative to the report).
+    """
 
     name: str
     verdict: str

@@ -30,11 +30,16 @@ class TrueEvent(Protocol):
     """An event that truly was."""
 
     @property
-    def time_s(self) -> float: ...
+    def time_s(self) -> float:
+        """When it was, on the recording's clock."""
+
     @property
-    def foot(self) -> str: ...
+    def foot(self) -> str:
+        """One of the truth's ``feet``."""
+
     @property
-    def event(self) -> str: ...
+    def event(self) -> str:
+        """What it was, in the words of `smartshoe.gait`."""
 
 
 class Truth(Protocol):
@@ -44,17 +49,28 @@ class Truth(Protocol):
     """
 
     @property
-    def time_s(self) -> Array: ...
+    def time_s(self) -> Array:
+        """The recording's times (n,)."""
+
     @property
-    def load_n(self) -> Array: ...
+    def load_n(self) -> Array:
+        """Each unit's load (n, units) in N."""
+
     @property
-    def foot_n(self) -> Array: ...
+    def foot_n(self) -> Array:
+        """Each foot's whole force (n, feet) in N."""
+
     @property
-    def feet(self) -> tuple[str, ...]: ...
+    def feet(self) -> tuple[str, ...]:
+        """The feet, in the order of ``foot_n``."""
+
     @property
-    def events(self) -> Sequence[TrueEvent]: ...
+    def events(self) -> Sequence[TrueEvent]:
+        """All events, in order."""
+
     @property
-    def body_weight_n(self) -> float: ...
+    def body_weight_n(self) -> float:
+        """The person's weight in N."""
 
 
 @dataclass(frozen=True, eq=False)

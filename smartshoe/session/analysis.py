@@ -100,8 +100,10 @@ def joined(plan: Plan, attempt: Attempt, *, to_fit: bool = False) -> Recording:
 
 
 def analyse(folder: SessionFolder, progress: Progress = _silent) -> SessionResult:
-    """Everything that follows from what ``folder`` holds; raises `InputError` where an experiment is not done, else
-    what the steps raise."""
+    """Everything that follows from what ``folder`` holds.
+
+    Raises `InputError` where an experiment is not done, else what the steps raise.
+    """
     plan = folder.plan
     attempts = folder.attempts()
     accepted = {attempt.experiment: attempt for attempt in attempts if attempt.state == "accepted"}

@@ -1,11 +1,11 @@
-"""What can be wrong with a pressing, seen while the unit still lies under the machine: one small class a fault."""
+"""What can be wrong with a pressing, seen while the unit still lies under the machine: one function a fault."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
-from typing import Protocol as Interface
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ PEAK_TOLERANCE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class PressingFault:
     """A fault of a pressing: ``says`` is what it is and what mends it; where it is not ``grave`` a person may go on."""
 
     kind: str
@@ -45,7 +45,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Pressing:
     """What is known of a pressing: the stream of all units, and, once it is there, the machine's log."""
 
     unit: str
@@ -80,169 +80,152 @@ class Evidence:
             return None
 
 
-class Check(Interface):
-    """Looks at a pressing and says what is wrong, or None."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None: ...
+Check = Callable[[Pressing], PressingFault | None]  # looks at a pressing and says what is wrong, or None
 
 
-class Saturation:
+def saturation(pressing: Pressing) -> PressingFault | None:
     """The reading stands at the end of the sensor's range."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        reading = evidence.reading
-        if reading.range_ is None:
-            return None
-        low, high = reading.range_
-        at_end = int(np.count_nonzero(reading.values >= low + END_OF_RANGE * (high - low)))
-        if at_end < SATURATED_SAMPLES:
-            return None
-        return Finding(
-            "saturation",
-            f"{evidence.unit} reads the end of its range ({high:g} {reading.unit.symbol}) at {at_end} samples: lower"
-            " the load, or spread it over a larger area",
-        )
-
-
-class Contact:
-    """The unit's reading does not rise at all."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        reading = evidence.reading
-        span = _span(reading.values)
-        if reading.range_ is not None:
-            least = CONTACT_SHARE * (reading.range_[1] - reading.range_[0])
-        else:
-            noise = float(np.median(np.abs(np.diff(reading.values)))) if reading.values.size > 1 else 0.0
-            least = 20.0 * noise
-        if span > least:
-            return None
-        return Finding(
-            "no_contact",
-            f"{evidence.unit} hardly reads anything ({span:.3g} {reading.unit.symbol}): see that the anvil touches it"
-            " and that its tube is whole",
-        )
-
-
-class WrongUnit:
-    """Another unit of the shoe is pressed."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        found = evidence.correlations
-        if found:
-            best = max(found, key=lambda name: found[name])
-            wrong = best != evidence.unit and found[best] >= FOLLOWS and found[evidence.unit] < 0.9 * found[best]
-        else:
-            spans = {channel.name: _share(channel) for channel in evidence.stream.sensors}
-            best = max(spans, key=lambda name: spans[name])
-            wrong = best != evidence.unit and spans[best] > 0.1 and spans[evidence.unit] < 0.1 * spans[best]
-        if not wrong:
-            return None
-        return Finding("wrong_unit", f"{best} is pressed, not {evidence.unit}: put {evidence.unit} under the anvil")
-
-
-class OtherTest:
-    """The machine's log is not the one of this pressing."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        if evidence.load is None:
-            return None
-        asked, peak = evidence.protocol.peak_load_n, float(np.max(evidence.load.force_n))
-        if abs(peak - asked) > PEAK_TOLERANCE * max(asked, peak):
-            return Finding(
-                "other_test",
-                f"{evidence.load.label} reaches {peak:.0f} N, {evidence.protocol.name} asks for {asked:.0f} N: give the"
-                " log of this test",
-            )
-        if evidence.alignment is None:
-            follows = evidence.correlations.get(evidence.unit, 0.0)
-            return Finding(
-                "other_test",
-                f"{evidence.load.label} does not match what {evidence.unit} read (correlation {follows:.2f}): give the"
-                " log of this test",
-            )
+    reading = pressing.reading
+    if reading.range_ is None:
         return None
+    low, high = reading.range_
+    at_end = int(np.count_nonzero(reading.values >= low + END_OF_RANGE * (high - low)))
+    if at_end < SATURATED_SAMPLES:
+        return None
+    return PressingFault(
+        "saturation",
+        f"{pressing.unit} reads the end of its range ({high:g} {reading.unit.symbol}) at {at_end} samples: lower"
+        " the load, or spread it over a larger area",
+    )
 
 
-class TooFewRepeats:
+def contact(pressing: Pressing) -> PressingFault | None:
+    """The unit's reading does not rise at all."""
+    reading = pressing.reading
+    span = _span(reading.values)
+    if reading.range_ is not None:
+        least = CONTACT_SHARE * (reading.range_[1] - reading.range_[0])
+    else:
+        noise = float(np.median(np.abs(np.diff(reading.values)))) if reading.values.size > 1 else 0.0
+        least = 20.0 * noise
+    if span > least:
+        return None
+    return PressingFault(
+        "no_contact",
+        f"{pressing.unit} hardly reads anything ({span:.3g} {reading.unit.symbol}): see that the anvil touches it"
+        " and that its tube is whole",
+    )
+
+
+def wrong_unit(pressing: Pressing) -> PressingFault | None:
+    """Another unit of the shoe is pressed."""
+    found = pressing.correlations
+    if found:
+        best = max(found, key=lambda name: found[name])
+        wrong = best != pressing.unit and found[best] >= FOLLOWS and found[pressing.unit] < 0.9 * found[best]
+    else:
+        spans = {channel.name: _share(channel) for channel in pressing.stream.sensors}
+        best = max(spans, key=lambda name: spans[name])
+        wrong = best != pressing.unit and spans[best] > 0.1 and spans[pressing.unit] < 0.1 * spans[best]
+    if not wrong:
+        return None
+    return PressingFault("wrong_unit", f"{best} is pressed, not {pressing.unit}: put {pressing.unit} under the anvil")
+
+
+def other_test(pressing: Pressing) -> PressingFault | None:
+    """The machine's log is not the one of this pressing."""
+    if pressing.load is None:
+        return None
+    asked, peak = pressing.protocol.peak_load_n, float(np.max(pressing.load.force_n))
+    if abs(peak - asked) > PEAK_TOLERANCE * max(asked, peak):
+        return PressingFault(
+            "other_test",
+            f"{pressing.load.label} reaches {peak:.0f} N, {pressing.protocol.name} asks for {asked:.0f} N: give the"
+            " log of this test",
+        )
+    if pressing.alignment is None:
+        follows = pressing.correlations.get(pressing.unit, 0.0)
+        return PressingFault(
+            "other_test",
+            f"{pressing.load.label} does not match what {pressing.unit} read (correlation {follows:.2f}): give the"
+            " log of this test",
+        )
+    return None
+
+
+def too_few_repeats(pressing: Pressing) -> PressingFault | None:
     """The machine stopped before the protocol's end."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        if evidence.load is None:
-            return None
-        corner_s, corner_n = evidence.protocol.corners()
-        time_s = np.arange(0.0, corner_s[-1], 0.01)
-        asked = len(loading.cycles(time_s, np.interp(time_s, corner_s, corner_n)))
-        done = len(loading.cycles(evidence.load.time_s, evidence.load.force_n))
-        if done >= asked:
-            return None
-        return Finding(
-            "too_few_repeats",
-            f"the machine pressed {done} times, {evidence.protocol.name} asks for {asked}: run it to its end",
-        )
+    if pressing.load is None:
+        return None
+    corner_s, corner_n = pressing.protocol.corners()
+    time_s = np.arange(0.0, corner_s[-1], 0.01)
+    asked = len(loading.cycles(time_s, np.interp(time_s, corner_s, corner_n)))
+    done = len(loading.cycles(pressing.load.time_s, pressing.load.force_n))
+    if done >= asked:
+        return None
+    return PressingFault(
+        "too_few_repeats",
+        f"the machine pressed {done} times, {pressing.protocol.name} asks for {asked}: run it to its end",
+    )
 
 
-class StreamTooShort:
+def stream_too_short(pressing: Pressing) -> PressingFault | None:
     """The shoe's stream does not cover the test: begun late, ended early, or with holes in it."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        if evidence.load is None or evidence.alignment is None:
-            return None
-        at = evidence.alignment.machine_time(evidence.stream.time_s)
-        load = evidence.load.force_n
-        pressed = evidence.load.time_s[load > 0.02 * float(load.max())]
-        after = np.clip(np.searchsorted(at, pressed), 1, at.size - 1)
-        apart = np.minimum(np.abs(at[after] - pressed), np.abs(pressed - at[after - 1]))
-        lost = np.count_nonzero(apart > BRIDGED_S)
-        if lost <= LARGEST_LOSS * pressed.size:
-            return None
-        return Finding(
-            "stream_too_short",
-            f"the shoe's stream misses {100.0 * lost / pressed.size:.0f} % of the test: start it before the machine and"
-            " keep the connection",
-        )
+    if pressing.load is None or pressing.alignment is None:
+        return None
+    at = pressing.alignment.machine_time(pressing.stream.time_s)
+    load = pressing.load.force_n
+    pressed = pressing.load.time_s[load > 0.02 * float(load.max())]
+    after = np.clip(np.searchsorted(at, pressed), 1, at.size - 1)
+    apart = np.minimum(np.abs(at[after] - pressed), np.abs(pressed - at[after - 1]))
+    lost = np.count_nonzero(apart > BRIDGED_S)
+    if lost <= LARGEST_LOSS * pressed.size:
+        return None
+    return PressingFault(
+        "stream_too_short",
+        f"the shoe's stream misses {100.0 * lost / pressed.size:.0f} % of the test: start it before the machine and"
+        " keep the connection",
+    )
 
 
-class ZeroDrift:
+def zero_drift(pressing: Pressing) -> PressingFault | None:
     """The unloaded reading moves between presses, beyond what the unit's own relaxation explains."""
-
-    def __call__(self, evidence: Evidence) -> Finding | None:
-        found = evidence.alignment
-        if found is None or evidence.load is None:
-            return None
-        load = evidence.load
-        at = found.machine_time(evidence.stream.time_s)
-        inside = (at >= load.time_s[0]) & (at <= load.time_s[-1])
-        at, reading = at[inside], evidence.reading.values[inside]
-        idle = np.interp(at, load.time_s, load.force_n) < 0.01 * float(load.force_n.max())
-        rests = [
-            0.5 * (at[start] + at[stop - 1])
-            for start, stop in zip(*runs_of(idle), strict=True)
-            if stop - start >= LEAST_REST_S * evidence.stream.sample_rate_hz
-        ]
-        if len(rests) < 2:
-            return None
-        zeros = zeros_at(np.array(rests), load.time_s, load.force_n, at, reading)
-        moved, span = _span(zeros), _span(reading)
-        if moved <= DRIFT_SHARE * span:
-            return None
-        return Finding(
-            "zero_drift",
-            f"the unloaded reading of {evidence.unit} moves by {100.0 * moved / span:.1f} % of its span between"
-            " presses: let the unit warm up, and look for a leak",
-            grave=False,
-        )
+    found = pressing.alignment
+    if found is None or pressing.load is None:
+        return None
+    load = pressing.load
+    at = found.machine_time(pressing.stream.time_s)
+    inside = (at >= load.time_s[0]) & (at <= load.time_s[-1])
+    at, reading = at[inside], pressing.reading.values[inside]
+    idle = np.interp(at, load.time_s, load.force_n) < 0.01 * float(load.force_n.max())
+    rests = [
+        0.5 * (at[start] + at[stop - 1])
+        for start, stop in zip(*runs_of(idle), strict=True)
+        if stop - start >= LEAST_REST_S * pressing.stream.sample_rate_hz
+    ]
+    if len(rests) < 2:
+        return None
+    zeros = zeros_at(np.array(rests), load.time_s, load.force_n, at, reading)
+    moved, span = _span(zeros), _span(reading)
+    if moved <= DRIFT_SHARE * span:
+        return None
+    return PressingFault(
+        "zero_drift",
+        f"the unloaded reading of {pressing.unit} moves by {100.0 * moved / span:.1f} % of its span between"
+        " presses: let the unit warm up, and look for a leak",
+        grave=False,
+    )
 
 
-AS_IT_GOES: tuple[Check, ...] = (Saturation(), WrongUnit())
+AS_IT_GOES: tuple[Check, ...] = (saturation, wrong_unit)
 AT_THE_END: tuple[Check, ...] = (
-    Saturation(), WrongUnit(), Contact(), OtherTest(), TooFewRepeats(), StreamTooShort(), ZeroDrift(),
+    saturation, wrong_unit, contact, other_test, too_few_repeats, stream_too_short, zero_drift,
 )  # fmt: skip
 
 
-def first_fault(checks: tuple[Check, ...], evidence: Evidence) -> Finding | None:
+def first_fault(checks: tuple[Check, ...], pressing: Pressing) -> PressingFault | None:
     """The first thing that a check has to say."""
-    return next((found for check in checks if (found := check(evidence)) is not None), None)
+    return next((found for check in checks if (found := check(pressing)) is not None), None)
 
 
 def _span(values: Array) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol as Interface
 
 from smartshoe.devices.base import Block
-from smartshoe.session.checks import Finding
+from smartshoe.session.checks import PressingFault
 
 
 class Operator(Interface):
@@ -21,7 +21,7 @@ class Operator(Interface):
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
         """Show readings that are on disk."""
 
-    def wants_repeat(self, finding: Finding, repeats_left: int) -> bool:
+    def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
         """Whether the experiment is to be pressed again because of ``finding``."""
 
 
@@ -37,6 +37,6 @@ class Unattended:
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
         """Nobody looks."""
 
-    def wants_repeat(self, finding: Finding, repeats_left: int) -> bool:
+    def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
         """As long as repeats are left."""
         return repeats_left > 0

@@ -13,7 +13,7 @@ from smartshoe.devices.base import Block, Shoe
 from smartshoe.errors import DeviceError, InputError, LimitError, RefusedError, UsageError
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
-from smartshoe.session.checks import AS_IT_GOES, AT_THE_END, Evidence, Finding, first_fault
+from smartshoe.session.checks import AS_IT_GOES, AT_THE_END, Pressing, PressingFault, first_fault
 from smartshoe.session.folder import Attempt, SessionFolder
 from smartshoe.session.machine_run import LOOK_EVERY_S, LogByHand, MachineSide, machine_at
 from smartshoe.session.operator import Operator, Unattended
@@ -220,7 +220,7 @@ def _experiment(
 
 def _press(
     folder: SessionFolder, protocol: Protocol, number: int, machine: MachineSide, stream: _Stream, operator: Operator
-) -> Finding | None:
+) -> PressingFault | None:
     """One pressing, recorded; the first fault that is seen."""
     plan = folder.plan
     folder.note("begin", experiment=protocol.name, attempt=number)
@@ -295,7 +295,7 @@ class _Pressing:
             self._told = time.monotonic()
             self._operator.tell(f"waiting for the machine's log: {self._machine.reason}")
 
-    def look(self) -> Finding | None:
+    def look(self) -> PressingFault | None:
         """What can be seen, now and then, before a test is over that a person can stop."""
         stream = self._stream
         if not (self._machine.by_hand and stream.is_live) or stream.last_s - self._looked_s < LOOK_AT_EVERY_S:
@@ -306,6 +306,6 @@ class _Pressing:
 
 def _evidence(
     folder: SessionFolder, protocol: Protocol, blocks: list[Block], load: Recording | None = None
-) -> Evidence:
+) -> Pressing:
     so_far = Attempt(protocol.name, 0, folder.channels, blocks)
-    return Evidence(folder.plan.unit, protocol, so_far.stream(), load)
+    return Pressing(folder.plan.unit, protocol, so_far.stream(), load)

@@ -26,8 +26,10 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One recording's signals in newton (n,): reference, raw (reading on the calibration's scale), best static line,
-    compensated; ``valid`` marks samples that were logged."""
+    """One recording's signals in newton (n,); ``valid`` marks samples that were logged.
+
+    Reference, raw (reading on the calibration's scale), best static line, compensated.
+    """
 
     name: str
     time_s: Array

@@ -26,10 +26,17 @@ from smartshoe.validation import validate
 
 NAMES = ["play_hysteresis", "zero_drift", "linear_leak", "delay"]
 MODEL = chain_of(NAMES, 7)
-CALIBRATION = extended_calibration(
-    MODEL, unit="left_toe", serial_number="HT-0042", parameters={"a1": Parameter.from_sd(0.3, 0.01, "1/s")},
-    covariance=((1e-4,),), sources=({"name": "toe.csv", "sha256": "0123abcd"},), created="2016-10-12",
-)  # fmt: skip
+CALIBRATION = replace(
+    extended_calibration(
+        MODEL,
+        unit="left_toe",
+        parameters={"a1": Parameter.from_sd(0.3, 0.01, "1/s")},
+        covariance=((1e-4,),),
+        created="2016-10-12",
+    ),
+    serial_number="HT-0042",
+    sources=({"name": "toe.csv", "sha256": "0123abcd"},),
+)
 
 
 def _recording(model: ExtendedModel, seed: int = 1) -> Recording:

@@ -13,7 +13,7 @@ from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError
 from smartshoe.identification.transfer_function import identify_transfer_function
 from smartshoe.identification.transfer_function.discrete import Chain
 from smartshoe.identification.transfer_function.experiment import prepare
-from smartshoe.identification.transfer_function.problem import OutputError, Whitened
+from smartshoe.identification.transfer_function.problem import OutputError, Structure, Whitened
 from smartshoe.identification.transfer_function.srivc import least_squares, reflected
 
 RAO_GARNIER = ([-6400.0, 1600.0], [1.0, 5.0, 408.0, 416.0, 1600.0])
@@ -123,11 +123,7 @@ def test_gradient_is_the_difference_quotient_of_the_cost(system, hold, initial_s
     experiments, _ = prepare(u, y, sample_time_s=None if uneven else step_s, time_s=time_s, hold=hold)
     problem = OutputError(
         experiments,
-        poles=len(system[1]) - 1,
-        zeros=len(system[0]) - 1,
-        hold=hold,
-        initial_state=initial_state,
-        offset=None,
+        Structure(len(system[1]) - 1, len(system[0]) - 1, hold, initial_state, None),
         delayed=True,
         most_delay_s=3.0 * step_s,
     )
@@ -426,9 +422,7 @@ def test_an_unstable_start_is_reflected_and_srivc_stays_stable():
     u = prbs(10, 7)
     y = with_noise(simulated(RAO_GARNIER, u, 0.01), 10.0, np.random.default_rng(14))
     experiments, _ = prepare(u, y, sample_time_s=0.01, time_s=None, hold="zoh")
-    problem = OutputError(
-        experiments, poles=4, zeros=1, hold="zoh", initial_state="estimate", offset=None, delayed=False
-    )
+    problem = OutputError(experiments, Structure(4, 1, "zoh", "estimate", None), delayed=False)
     start = least_squares(problem, 20.0, 0.0)
     assert np.any(np.roots([1.0, *start[2:]]).real > 0.0)
     mirrored = np.roots([1.0, *reflected(start[2:])])

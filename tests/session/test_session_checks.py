@@ -18,40 +18,40 @@ from smartshoe.logs import write
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.session import SessionFolder, Unattended, conduct, machine_run
-from smartshoe.session.checks import AT_THE_END, Evidence, Finding, first_fault
+from smartshoe.session.checks import AT_THE_END, Pressing, PressingFault, first_fault
 
 
 @pytest.fixture(scope="module")
-def pressed(tmp_path_factory: pytest.TempPathFactory) -> Evidence:
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> Pressing:
     with SessionFolder.begin(tmp_path_factory.mktemp("pressed"), bench_plan()) as folder:
         conduct(folder)
         attempt = folder.attempts()[0]
-        return Evidence("left_toe", SHORT, attempt.stream(), attempt.load())
+        return Pressing("left_toe", SHORT, attempt.stream(), attempt.load())
 
 
-def _changed(evidence: Evidence, change: Callable[[Channel], np.ndarray]) -> Evidence:
+def _changed(evidence: Pressing, change: Callable[[Channel], np.ndarray]) -> Pressing:
     channel = evidence.reading
     made = replace(channel, values=change(channel))
     return replace(evidence, stream=evidence.stream.with_channel(made))
 
 
-def _kind(evidence: Evidence) -> str | None:
+def _kind(evidence: Pressing) -> str | None:
     found = first_fault(AT_THE_END, evidence)
     return None if found is None else found.kind
 
 
-def test_a_good_pressing_has_no_fault(pressed: Evidence) -> None:
+def test_a_good_pressing_has_no_fault(pressed: Pressing) -> None:
     assert _kind(pressed) is None
 
 
-def test_a_reading_at_the_end_of_its_range_is_saturation(pressed: Evidence) -> None:
+def test_a_reading_at_the_end_of_its_range_is_saturation(pressed: Pressing) -> None:
     assert pressed.reading.range_ is not None
     high = pressed.reading.range_[1]
     assert _kind(_changed(pressed, lambda c: np.minimum(c.values * 1.3, high))) == "saturation"
     assert _kind(_changed(pressed, lambda c: np.minimum(c.values * 1.1, high))) is None
 
 
-def test_the_unit_that_is_really_pressed_is_named(pressed: Evidence) -> None:
+def test_the_unit_that_is_really_pressed_is_named(pressed: Pressing) -> None:
     found = first_fault(AT_THE_END, replace(pressed, unit="left_heel"))
     assert found is not None
     assert found.kind == "wrong_unit"
@@ -59,13 +59,13 @@ def test_the_unit_that_is_really_pressed_is_named(pressed: Evidence) -> None:
     assert _kind(replace(pressed, unit="left_heel", load=None)) == "wrong_unit"
 
 
-def test_a_unit_that_reads_nothing_has_no_contact(pressed: Evidence) -> None:
+def test_a_unit_that_reads_nothing_has_no_contact(pressed: Pressing) -> None:
     rng = np.random.default_rng(1)
     assert _kind(_changed(pressed, lambda c: rng.normal(0.0, 0.05, c.values.size))) in ("no_contact", "wrong_unit")
     assert _kind(replace(_changed(pressed, lambda c: 0.001 * c.values), load=None)) == "no_contact"
 
 
-def test_another_tests_log_is_not_taken(pressed: Evidence) -> None:
+def test_another_tests_log_is_not_taken(pressed: Pressing) -> None:
     load = pressed.load
     assert load is not None
     half = load.with_channel(replace(load.load, values=0.5 * load.load.values))
@@ -76,19 +76,19 @@ def test_another_tests_log_is_not_taken(pressed: Evidence) -> None:
     assert _kind(replace(pressed, load=other)) == "other_test"
 
 
-def test_a_test_that_was_stopped_early_has_too_few_repeats(pressed: Evidence) -> None:
+def test_a_test_that_was_stopped_early_has_too_few_repeats(pressed: Pressing) -> None:
     load = pressed.load
     assert load is not None
     assert _kind(replace(pressed, load=load.between(0.0, 12.0))) == "too_few_repeats"
 
 
-def test_a_stream_that_misses_a_part_of_the_test_is_seen(pressed: Evidence) -> None:
+def test_a_stream_that_misses_a_part_of_the_test_is_seen(pressed: Pressing) -> None:
     stream = pressed.stream
     late = stream.between(stream.time_s[0] + 6.0, stream.time_s[-1])
     assert _kind(replace(pressed, stream=late)) == "stream_too_short"
 
 
-def test_a_connection_that_was_lost_for_a_second_is_seen_and_single_samples_are_not(pressed: Evidence) -> None:
+def test_a_connection_that_was_lost_for_a_second_is_seen_and_single_samples_are_not(pressed: Pressing) -> None:
     stream = pressed.stream
     rng = np.random.default_rng(4)
     assert _kind(replace(pressed, stream=stream.taken(rng.random(len(stream)) > 0.05))) is None
@@ -96,7 +96,7 @@ def test_a_connection_that_was_lost_for_a_second_is_seen_and_single_samples_are_
     assert _kind(replace(pressed, stream=stream.taken(~hole))) == "stream_too_short"
 
 
-def test_a_zero_that_moves_is_told_and_may_be_accepted(pressed: Evidence) -> None:
+def test_a_zero_that_moves_is_told_and_may_be_accepted(pressed: Pressing) -> None:
     # Five millibar over the session, of a span of 87.
     found = first_fault(AT_THE_END, _changed(pressed, lambda c: c.values + np.linspace(0.0, 5.0, c.values.size)))
     assert found is not None
@@ -107,7 +107,7 @@ class _Counting(Unattended):
     def __init__(self) -> None:
         self.asked: list[tuple[str, int]] = []
 
-    def wants_repeat(self, finding: Finding, repeats_left: int) -> bool:
+    def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
         self.asked.append((finding.kind, repeats_left))
         return super().wants_repeat(finding, repeats_left)
 
@@ -134,7 +134,7 @@ def test_the_wrong_unit_under_the_anvil_is_pressed_again_once_it_is_put_right(
     monkeypatch.setattr("smartshoe.session.procedure.machine_at", misplaced)
 
     class PutsItRight(_Counting):
-        def wants_repeat(self, finding: Finding, repeats_left: int) -> bool:
+        def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
             bench = shoes[0].bench  # type: ignore[attr-defined]
             bench.unit = "left_toe"
             return super().wants_repeat(finding, repeats_left)
@@ -153,7 +153,7 @@ def test_the_wrong_unit_under_the_anvil_is_pressed_again_once_it_is_put_right(
     assert operator.asked == [("wrong_unit", 2)]
 
 
-def test_a_recording_with_another_tests_log_is_refused_as_input(tmp_path: Path, pressed: Evidence) -> None:
+def test_a_recording_with_another_tests_log_is_refused_as_input(tmp_path: Path, pressed: Pressing) -> None:
     load = pressed.load
     assert load is not None
     write(pressed.stream, tmp_path / "stream.csv")

@@ -123,8 +123,9 @@ class Chain:
         return state
 
     def derivatives_of_x(self) -> tuple[Array, Array]:
-        """Rows (n + 2, m) that give x and its derivatives up to n + 1 from balanced states, and what they take of
-        the input (n + 2, 2): columns value and slope.
+        """Rows (n + 2, m) that give x and its derivatives up to n + 1 from balanced states.
+
+        And what they take of the input (n + 2, 2): columns value and slope.
         """
         n, m = self.order, self.size
         rows, inputs = np.zeros((n + 2, m)), np.zeros((n + 2, 2))

@@ -12,7 +12,7 @@ from smartshoe.errors import UsageError
 from smartshoe.identification.residual_tests import ResidualTest, whiteness
 from smartshoe.identification.transfer_function.discrete import Array, Intersample
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
-from smartshoe.identification.transfer_function.problem import Look, OutputError, orthogonal_factor
+from smartshoe.identification.transfer_function.problem import Look, OutputError, Structure, orthogonal_factor
 from smartshoe.models import Parameter
 
 QUANTILE = 1.959963984540054
@@ -124,15 +124,22 @@ class TransferFunctionEstimate:
                     signal, signal, sample_time_s=sample_time_s, time_s=time_s, hold=self.intersample, strict=False
                 )[0][0]
             ],
-            poles=self.denominator.size - 1,
-            zeros=self.numerator.size - 1,
-            hold=self.intersample,
-            initial_state=initial_state,
-            offset=0.0,
+            Structure(self.denominator.size - 1, self.numerator.size - 1, self.intersample, initial_state, 0.0),
             delayed=False,
             delay_s=self.delay_s,
         )
         return problem.output(np.concatenate([self.numerator, self.denominator[1:]]), 0) + offset
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a fit ended: its method, iterations, those of SRIVC before it, whether it converged, and a sentence."""
+
+    method: str
+    iterations: int
+    start_iterations: int
+    converged: bool
+    message: str
 
 
 def summarise(
@@ -140,16 +147,13 @@ def summarise(
     theta: Array,
     looks: Sequence[Look],
     *,
-    method: str,
-    iterations: int,
-    start_iterations: int,
-    converged: bool,
-    message: str,
+    ended: Ending,
     n_missing: int,
     notes: Sequence[str],
 ) -> TransferFunctionEstimate:
-    """The estimate at ``theta``, whose ``looks`` give error and gradient; raises `FloatingPointError` on a gradient
-    that does not tell its parameters apart.
+    """The estimate at ``theta``, whose ``looks`` give error and gradient.
+
+    Raises `FloatingPointError` on a gradient that does not tell its parameters apart.
     """
     from scipy.linalg import solve_triangular
 
@@ -205,13 +209,13 @@ def summarise(
         static_gain=Parameter.from_sd(static, float(np.linalg.norm(slope @ shared)), ""),
         residual=tuple(residual),
         whiteness=white,
-        method=method,
+        method=ended.method,
         intersample=problem.hold,
         sample_time_s=problem.experiments[0].typical_step_s,
-        iterations=iterations,
-        start_iterations=start_iterations,
-        converged=converged,
-        message=message,
+        iterations=ended.iterations,
+        start_iterations=ended.start_iterations,
+        converged=ended.converged,
+        message=ended.message,
         n_samples=problem.count,
         n_missing=n_missing,
         notes=tuple(notes),

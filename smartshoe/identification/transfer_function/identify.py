@@ -13,9 +13,9 @@ from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.solve import minimise
 from smartshoe.identification.transfer_function import delay
 from smartshoe.identification.transfer_function.discrete import Array, Intersample
-from smartshoe.identification.transfer_function.estimate import TransferFunctionEstimate, summarise
+from smartshoe.identification.transfer_function.estimate import Ending, TransferFunctionEstimate, summarise
 from smartshoe.identification.transfer_function.experiment import Excitation, prepare
-from smartshoe.identification.transfer_function.problem import InitialState, OutputError, Whitened
+from smartshoe.identification.transfer_function.problem import InitialState, OutputError, Structure, Whitened
 from smartshoe.identification.transfer_function.srivc import Settled, least_squares, reflected, srivc
 
 Method = Literal["srivc", "gn", "lm", "trf"]
@@ -40,7 +40,7 @@ class _Options:
 
 
 @on_one_thread
-def identify_transfer_function(
+def identify_transfer_function(  # noqa: PLR0913 - a public verb
     u: Any,
     y: Any,
     *,
@@ -75,9 +75,11 @@ def identify_transfer_function(
     unsettled, `UsageError` and `InputError` on arguments that do not fit. Sources: Young and Jakeman 1980; Garnier and
     Wang 2008.
     """
-    _check(poles, zeros, method, intersample, initial_state, offset, delay_s, prefilter_rad_s, max_delay_s)
+    fixed = None if offset == "estimate" else offset
+    structure = Structure(poles, zeros, intersample, initial_state, fixed)
+    options = _Options(method, prefilter_rad_s, tolerance, max_iterations)
+    _check(structure, options, delay_s, max_delay_s)
     experiments, missing = prepare(u, y, sample_time_s=sample_time_s, time_s=time_s, hold=intersample)
-    fixed = None if offset == "estimate" else float(offset)
     unknowns = zeros + 1 + poles + (delay_s == "estimate")
     nuisances = len(experiments) * ((fixed is None) + (poles if initial_state == "estimate" else 0))
     counted = sum(int(np.count_nonzero(experiment.counted)) for experiment in experiments)
@@ -85,8 +87,7 @@ def identify_transfer_function(
         raise NotIdentifiableError(
             f"{counted} samples for {unknowns + nuisances} unknowns: record {2 * unknowns + nuisances} at least"
         )
-    options = _Options(method, prefilter_rad_s, tolerance, max_iterations)
-    fit = _Fit(experiments, poles, zeros, intersample, initial_state, fixed, options)
+    fit = _Fit(experiments, structure, options)
     try:
         problem, found, started, notes = (
             fit.with_delay(max_delay_s) if delay_s == "estimate" else fit.at(float(delay_s))
@@ -108,11 +109,7 @@ def identify_transfer_function(
         problem,
         found.theta,
         looks,
-        method=method,
-        iterations=found.iterations,
-        start_iterations=started,
-        converged=found.converged,
-        message=message,
+        ended=Ending(method, found.iterations, started, found.converged, message),
         n_missing=missing,
         notes=notes,
     )
@@ -121,31 +118,13 @@ def identify_transfer_function(
 class _Fit:
     """One data set and structure, fitted at a known delay or with it."""
 
-    def __init__(
-        self,
-        experiments: Sequence[Excitation],
-        poles: int,
-        zeros: int,
-        hold: Intersample,
-        initial_state: InitialState,
-        offset: float | None,
-        options: _Options,
-    ) -> None:
-        self.experiments, self.poles, self.zeros = experiments, poles, zeros
-        self.hold, self.initial_state, self.offset, self.options = hold, initial_state, offset, options
+    def __init__(self, experiments: Sequence[Excitation], structure: Structure, options: _Options) -> None:
+        self.experiments, self.structure, self.options = experiments, structure, options
 
     def problem(self, *, delayed: bool, delay_s: float = 0.0, most_delay_s: float | None = None) -> OutputError:
         """The output error with this structure."""
         return OutputError(
-            self.experiments,
-            poles=self.poles,
-            zeros=self.zeros,
-            hold=self.hold,
-            initial_state=self.initial_state,
-            offset=self.offset,
-            delayed=delayed,
-            delay_s=delay_s,
-            most_delay_s=most_delay_s,
+            self.experiments, self.structure, delayed=delayed, delay_s=delay_s, most_delay_s=most_delay_s
         )
 
     def at(self, delay_s: float) -> tuple[OutputError, Settled, int, list[str]]:
@@ -177,13 +156,13 @@ class _Fit:
         if not tried:
             raise NotIdentifiableError("no delay gives a finite fit: give delay_s as a number, or fewer poles")
         _, at_s, first = min(tried, key=lambda one: one[0])
-        if self.zeros == self.poles and self.hold == "zoh":
+        if self.structure.zeros == self.structure.poles and self.structure.hold == "zoh":
             problem, found, started, notes = self.at(at_s)
             notes.append("with a direct term a held input tells whole samples of delay only")
             return problem, found, started, notes
         step_s = max(experiment.typical_step_s for experiment in self.experiments)
         ends = [self.walk(*self.between_samples(at_s, first.theta, step_s, most_s), step_s, most_s)]
-        m = self.zeros + 1
+        m = self.structure.zeros + 1
         last = ends[0][1].theta
         for numerator, later_s in delay.traded_zeros(last[:m]):
             there_s = float(np.clip(last[-1] + later_s, 0.0, most_s))
@@ -349,21 +328,12 @@ def _require_distinct(columns: Array) -> None:
         )
 
 
-def _check(
-    poles: int,
-    zeros: int,
-    method: str,
-    intersample: str,
-    initial_state: str,
-    offset: float | str,
-    delay_s: float | str,
-    prefilter_rad_s: float | None,
-    max_delay_s: float | None,
-) -> None:
+def _check(structure: Structure, options: _Options, delay_s: float | str, max_delay_s: float | None) -> None:
+    poles, zeros = structure.poles, structure.zeros
     for name, value, allowed in (
-        ("method", method, get_args(Method)),
-        ("intersample", intersample, get_args(Intersample)),
-        ("initial_state", initial_state, get_args(InitialState)),
+        ("method", options.method, get_args(Method)),
+        ("intersample", structure.hold, get_args(Intersample)),
+        ("initial_state", structure.initial_state, get_args(InitialState)),
     ):
         if value not in allowed:
             raise UsageError(f"{name} is {value!r}: give one of {', '.join(allowed)}")
@@ -374,11 +344,13 @@ def _check(
             f"{zeros} zeros and {poles} poles: no sampled signal holds a derivative of the input, "
             "give at least as many poles as zeros"
         )
+    offset = "estimate" if structure.offset is None else structure.offset
     for name, number in (("offset", offset), ("delay_s", delay_s)):
         if number != "estimate" and not (isinstance(number, int | float) and np.isfinite(number)):
             raise UsageError(f"{name} is {number!r}: give a finite number or 'estimate'")
     for name, least in (("delay_s", delay_s), ("max_delay_s", max_delay_s)):
         if isinstance(least, int | float) and least < 0.0:
             raise UsageError(f"{name} is {least}: give 0 s or more, the output cannot come first")
+    prefilter_rad_s = options.prefilter_rad_s
     if prefilter_rad_s is not None and not (np.isfinite(prefilter_rad_s) and prefilter_rad_s > 0.0):
         raise UsageError(f"prefilter_rad_s is {prefilter_rad_s}: give a number above 0 rad/s")

@@ -13,7 +13,7 @@ from smartshoe.identification.transfer_function.discrete import Array
 from smartshoe.identification.transfer_function.estimate import TransferFunctionEstimate
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
 from smartshoe.identification.transfer_function.identify import identify_transfer_function
-from smartshoe.identification.transfer_function.problem import OutputError
+from smartshoe.identification.transfer_function.problem import OutputError, Structure
 
 Criterion = Literal["bic", "yic", "held_out"]
 
@@ -150,12 +150,14 @@ def _held_out(
     offset = options.get("offset", "estimate")
     problem = OutputError(
         experiments,
-        poles=estimate.denominator.size - 1,
-        zeros=estimate.numerator.size - 1,
-        hold=estimate.intersample,
-        # A record cut in two is in motion where its second part begins.
-        initial_state="estimate" if single else options.get("initial_state", "estimate"),
-        offset=None if offset == "estimate" else float(offset),
+        Structure(
+            poles=estimate.denominator.size - 1,
+            zeros=estimate.numerator.size - 1,
+            hold=estimate.intersample,
+            # A record cut in two is in motion where its second part begins.
+            initial_state="estimate" if single else options.get("initial_state", "estimate"),
+            offset=None if offset == "estimate" else float(offset),
+        ),
         delayed=False,
         delay_s=estimate.delay_s,
     )

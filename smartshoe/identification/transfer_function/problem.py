@@ -56,6 +56,21 @@ class Look:
     leaning: Array
 
 
+@dataclass(frozen=True)
+class Structure:
+    """What is fitted: degrees of A and B, the input between samples, where an experiment begins, and the offset.
+
+    ``hold`` says whether the input is held or straight between samples. ``offset`` in the output's unit, None where
+    each experiment has one of its own that is estimated.
+    """
+
+    poles: int
+    zeros: int
+    hold: Intersample
+    initial_state: InitialState
+    offset: float | None
+
+
 class OutputError:
     """Experiments and a structure; a `smartshoe.identification.solve.Problem` by way of `Whitened`.
 
@@ -68,19 +83,15 @@ class OutputError:
     def __init__(
         self,
         experiments: Sequence[Excitation],
+        structure: Structure,
         *,
-        poles: int,
-        zeros: int,
-        hold: Intersample,
-        initial_state: InitialState,
-        offset: float | None,
         delayed: bool,
         delay_s: float = 0.0,
         most_delay_s: float | None = None,
     ) -> None:
         self.experiments = experiments
-        self.poles, self.zeros, self.hold = poles, zeros, hold
-        self.initial_state, self.offset = initial_state, offset
+        self.poles, self.zeros, self.hold = structure.poles, structure.zeros, structure.hold
+        self.initial_state, self.offset = structure.initial_state, structure.offset
         self.delayed, self.delay_s = delayed, delay_s
         self.most_delay_s = delay_s if most_delay_s is None else most_delay_s
         self.firsts = [self._first(experiment) for experiment in experiments]

@@ -62,8 +62,10 @@ def _preamble(lines: Sequence[str], delimiter: str) -> dict[str, str]:
 
 
 def read(path: Path) -> Sheet:
-    """Read a Bluehill log; raises `FormatError` naming the lines where cells are no numbers or contradict each
-    other in their decimal mark."""
+    """Read a Bluehill log.
+
+    Raises `FormatError` naming the lines where cells are no numbers or contradict each other in their decimal mark.
+    """
     lines, notes = read_lines(path)
     found = _unit_row(lines)
     if found is None:
@@ -105,7 +107,7 @@ def _paired(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, str]]
     return list(zip([*names, *[""] * (length - len(names))], [*units, *[""] * (length - len(units))], strict=True))
 
 
-def write_bluehill(
+def write_bluehill(  # noqa: PLR0913 - a public verb
     recording: Recording,
     path: Path | str,
     *,

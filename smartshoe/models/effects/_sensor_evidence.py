@@ -64,9 +64,10 @@ PRESSURE, SLOPE = 1, 2
 
 
 def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> LocalVariance | None:
-    """`LocalVariance` from second differences of separate triplets of samples, so that neither a smooth misfit nor
-    coloured noise counts; None where too little is there, or where the lattice of the readings is coarser than noise.
+    """`LocalVariance` from second differences of separate triplets of samples.
 
+    So neither a smooth misfit nor coloured noise counts. None where too little is there, or where the readings'
+    quantisation grid is coarser than noise.
     Triplets at a corner of the prediction are left out: a late model leaves its corners in the residual.
     """
     if residual.size < LEAST_SAMPLES:
