@@ -258,7 +258,7 @@ class Source:
             *(part for part in first["loc"] if part not in ("function-before", "float", "literal")),
         )
         message = first["msg"].removeprefix("Value error, ")
-        if first["type"] == "extra_forbidden":
+        if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
             message = "this key is not known; remove it or mend its spelling"
         elif first["type"] == "missing":
             message = "this key is needed"

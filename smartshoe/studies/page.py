@@ -20,6 +20,7 @@ SHOWN = (
     "flight_percent", "asymmetry_percent", "peak_body_weight_percent", "impulse_body_weight_percent_s",
     "loading_rate_n_per_s",
 )  # fmt: skip
+NAMED = 3  # of the trials that a sentence is said of
 AGREED = {"stance_time_s": "s", "stance_percent": "%", "peak_n": "N", "impulse_n_s": "N s"}
 
 
@@ -43,7 +44,7 @@ def write_page(path: Path, result: StudyResult, source: Path) -> None:
                 "smartshoe": smartshoe.__version__,
             },
             "left_out": [(trial.entry.file, trial.left_out) for trial in result.left_out],
-            "flags": result.flags,
+            "flags": [*result.flags, *careful(result)],
             "conditions": list(result.conditions),
             "rows": [(name, [_mean(own.get(name)) for own in result.conditions.values()]) for name in figures],
             "differences": [_difference_row(each) for each in result.differences if each.figure in figures],
@@ -65,6 +66,24 @@ def write_page(path: Path, result: StudyResult, source: Path) -> None:
 def shown_figures(result: StudyResult) -> list[str]:
     """The figures of `SHOWN` that some trial has: the rest is in the files."""
     return [name for name in SHOWN if any(name in trial.figures for trial in result.trials)]
+
+
+def careful(result: StudyResult) -> list[tuple[str, str]]:
+    """What to be careful with, each sentence once, with the trials that it is said of."""
+    told: dict[str, list[str]] = {}
+    for trial in result.trials:
+        for flag in trial.flags:
+            files = told.setdefault(str(flag["says"]), [])
+            if trial.entry.file not in files:
+                files.append(trial.entry.file)
+    return [(_some(files, len(result.trials)), says) for says, files in told.items()]
+
+
+def _some(files: list[str], of: int) -> str:
+    """A few files by name, the rest by number."""
+    if len(files) == of > 1:
+        return f"all {of} trials"
+    return ", ".join(files[:NAMED]) + (f" and {len(files) - NAMED} more" if len(files) > NAMED else "")
 
 
 def headline(result: StudyResult) -> str:
@@ -112,10 +131,9 @@ def _of_subject(result: StudyResult, subject: str, condition: str, name: str) ->
     return plain(float(np.mean(own)), 4) if own else "–"
 
 
-def _trial_row(trial: TrialFigures, figures: list[str]) -> tuple[str, str, str, str, list[str], str]:
-    told = "; ".join(dict.fromkeys(str(flag["says"]) for flag in trial.flags))
+def _trial_row(trial: TrialFigures, figures: list[str]) -> tuple[str, str, str, str, list[str]]:
     cells = [plain(trial.figures.get(name), 4) for name in figures]
-    return trial.entry.file, trial.entry.subject, trial.entry.condition, trial.activity, cells, told
+    return trial.entry.file, trial.entry.subject, trial.entry.condition, trial.activity, cells
 
 
 def _band_chart(result: StudyResult) -> Chart | None:
@@ -126,7 +144,8 @@ def _band_chart(result: StudyResult) -> Chart | None:
         Line(condition, band.mean, COLOURS[number % len(COLOURS)], low=band.low, high=band.high)
         for number, (condition, band) in enumerate(result.bands.items())
     ]
-    says = "Mean over subjects; a band holds what 95 % of subjects do, if they spread normally."
+    sources = "; ".join(f"{condition}: {band.source}" for condition, band in result.bands.items())
+    says = f"From {sources}. A band is where a further subject lies with 95 %, if subjects spread normally."
     return Chart("Force of a foot over a stride", says, "stride (%)", x, [Panel("force (% of body weight)", lines)])
 
 

@@ -50,6 +50,8 @@ def read_study(path: Path | str) -> tuple[StudyPlan, Source]:
         plan = StudyPlan.model_validate(tables)
     except ValidationError as error:
         raise source.from_validation(error) from error
+    if plan.calibrations is not None and not (source.path.parent / plan.calibrations).exists():
+        raise source.error(("calibrations",), f"{plan.calibrations} does not exist: give a folder of calibrations")
     seen: dict[str, int] = {}
     for index, entry in enumerate(plan.trial):
         if entry.file in seen:

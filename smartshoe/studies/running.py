@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.studies.plan import StudyPlan, read_study
-from smartshoe.studies.statistics import Agreement, Mean, agreement_of, by_subject, difference_of, mean_of
+from smartshoe.studies.statistics import (
+    Agreement,
+    Mean,
+    agreement_of,
+    by_subject,
+    difference_of,
+    mean_of,
+    prediction_interval,
+)
 from smartshoe.studies.swapped import swapped_trials
 from smartshoe.studies.trials import TrialFigures, figures_of_trial
 
@@ -25,17 +33,37 @@ Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 SCHEMA = "smartshoe.study/1"
-NORMAL = 1.96  # standard deviations of a band that holds 95 % of subjects
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """The mean force of a foot over a stride (101,) in percent of body weight, and what 95 % of subjects lie in."""
+    """The mean force of a foot over a stride (101,) in percent of body weight, and what 95 % of subjects do.
+
+    ``low`` and ``high`` are where a further subject's mean lies with 95 %; None with fewer than three subjects.
+    """
 
     mean: Array
-    low: Array
-    high: Array
+    low: Array | None
+    high: Array | None
     subjects: int
+
+    @property
+    def source(self) -> str:
+        """Whom the band is taken from, and how."""
+        whom = f"this study's {self.subjects} subject{'' if self.subjects == 1 else 's'}"
+        return f"{whom}: mean" if self.low is None else f"{whom}: mean and 95 % prediction interval"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {
+            "unit": "percent of body weight",
+            "percent_of_stride": list(range(self.mean.size)),
+            "mean": self.mean.tolist(),
+            "low": None if self.low is None else self.low.tolist(),
+            "high": None if self.high is None else self.high.tolist(),
+            "subjects": self.subjects,
+            "source": self.source,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +84,8 @@ class Difference:
 class StudyResult:
     """A study: the ``trials`` that were used, and those ``left_out``; means by condition and figure, ``differences``.
 
-    ``agreement`` with the trials' references is by figure. ``bands`` maps a condition to the normal course of a
-    stride; ``flags`` says of which trials to be careful.
+    ``agreement`` with the trials' references is by figure. ``bands`` maps a condition to the usual course of a
+    stride; ``flags`` says what concerns a study and not a trial alone: of which trials to be careful.
     """
 
     plan: StudyPlan
@@ -93,17 +121,7 @@ class StudyResult:
             },
             "differences": [difference.to_dict() for difference in self.differences],
             "agreement": {name: agreement.to_dict() for name, agreement in self.agreement.items()},
-            "bands": {
-                condition: {
-                    "unit": "percent of body weight",
-                    "percent_of_stride": list(range(band.mean.size)),
-                    "mean": band.mean.tolist(),
-                    "low": band.low.tolist(),
-                    "high": band.high.tolist(),
-                    "subjects": band.subjects,
-                }
-                for condition, band in self.bands.items()
-            },
+            "bands": {condition: band.to_dict() for condition, band in self.bands.items()},
             "left_out": [{"file": trial.entry.file, "says": trial.left_out} for trial in self.left_out],
             "flags": [{"file": file, "says": says} for file, says in self.flags],
         }
@@ -246,7 +264,7 @@ def _differences(plan: StudyPlan, means: Mapping[str, Mapping[str, Mapping[str, 
 
 
 def _bands(plan: StudyPlan, trials: Sequence[TrialFigures]) -> dict[str, Band]:
-    """The normal course of a stride under each condition: mean over subjects, and 95 % of subjects."""
+    """The usual course of a stride under each condition: mean over subjects, and where a further one would lie."""
     found: dict[str, Band] = {}
     for condition in plan.conditions:
         curves: dict[str, list[Array]] = {}
@@ -255,9 +273,8 @@ def _bands(plan: StudyPlan, trials: Sequence[TrialFigures]) -> dict[str, Band]:
                 curves.setdefault(trial.entry.subject, []).append(trial.curve)
         if curves:
             own = np.array([np.mean(each, axis=0) for each in curves.values()])
-            sd = own.std(axis=0, ddof=1) if len(own) > 1 else np.zeros(own.shape[1])
-            mean = own.mean(axis=0)
-            found[condition] = Band(mean, mean - NORMAL * sd, mean + NORMAL * sd, len(own))
+            low, high = prediction_interval(own) or (None, None)
+            found[condition] = Band(own.mean(axis=0), low, high, len(own))
     return found
 
 

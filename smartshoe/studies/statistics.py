@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
 BOOTSTRAP_FROM = 10  # subjects: with fewer, resampling them cannot show their spread, and Student's t is used
+PREDICTED_FROM = 3  # subjects: from two, an interval for a third is wider than anything that one does
 RESAMPLES = 5000
 SEED = 20160920  # of the resampling, so that a study gives the same numbers twice
 
@@ -69,6 +70,20 @@ def _t_interval(values: Array) -> tuple[float, float] | None:
         return None
     half = float(t.ppf(0.5 + CONFIDENCE / 2, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))
     return float(values.mean()) - half, float(values.mean()) + half
+
+
+def prediction_interval(values: Array) -> tuple[Array, Array] | None:
+    """Where one more subject's values lie with 95 %, from those of n subjects (n, m), if they spread normally.
+
+    None with fewer than `PREDICTED_FROM` subjects.
+    """
+    from scipy.stats import t
+
+    count = len(values)
+    if count < PREDICTED_FROM:
+        return None
+    half = t.ppf(0.5 + CONFIDENCE / 2, count - 1) * np.sqrt(1.0 + 1.0 / count) * values.std(axis=0, ddof=1)
+    return values.mean(axis=0) - half, values.mean(axis=0) + half
 
 
 @dataclass(frozen=True, slots=True)

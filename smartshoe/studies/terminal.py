@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
-from smartshoe.studies.page import headline, is_clear, shown_figures
+from smartshoe.studies.page import careful, headline, is_clear, shown_figures
 from smartshoe.studies.running import StudyResult
 
 
@@ -16,7 +16,8 @@ def print_study(result: StudyResult) -> None:
         cells = []
         for figures in result.conditions.values():
             mean = figures.get(name)
-            cells.append("–" if mean is None else f"{plain(mean.mean, 4)} ± {plain(mean.sd, 2)}")
+            spread = "" if mean is None or mean.sd is None else f" ± {plain(mean.sd, 2)}"
+            cells.append("–" if mean is None else f"{plain(mean.mean, 4)}{spread}")
         table.add_row(name, *cells)
     console.print(table)
     console.print(headline(result), soft_wrap=True, markup=False)
@@ -28,7 +29,9 @@ def print_study(result: StudyResult) -> None:
     for file, says in [
         *((trial.entry.file, f"left out: {trial.left_out}") for trial in result.left_out),
         *result.flags,
+        *careful(result),
     ]:
         console.print(f"{file}: {says}", soft_wrap=True, markup=False)
-    console.print(f"{len(result.trials)} trials used, {len(result.left_out)} left out")
+    used = "1 trial" if len(result.trials) == 1 else f"{len(result.trials)} trials"
+    console.print(f"{used} used, {len(result.left_out)} left out")
     console.print(f"report: {result.report}", soft_wrap=True, markup=False)

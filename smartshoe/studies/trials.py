@@ -56,9 +56,12 @@ def figures_of_trial(entry: TrialEntry, folder: str, calibrations: str | None, c
         recording = read(base / entry.file)
         fitting = calibrations_for(recording, None if calibrations is None else base / calibrations, entry)
         found = analyse([recording], fitting, entry.body_weight_n, entry.coverage)
+        flags = [flag.to_dict() for flag in found.flags]
         pairs: Mapping[str, Array] = {}
         if entry.reference is not None:
             pairs = pairs_of(found, analyse([read(base / entry.reference)], (), entry.body_weight_n))
+            if not pairs:
+                flags.append(_nothing_in_common(entry))
         if c3d is not None:
             from smartshoe.gait.c3d import write_c3d
 
@@ -67,7 +70,7 @@ def figures_of_trial(entry: TrialEntry, folder: str, calibrations: str | None, c
             entry,
             dict(found.summary),
             flat_figures(found),
-            [flag.to_dict() for flag in found.flags],
+            flags,
             found.activity,
             mean_curve(found),
             pairs,
@@ -76,6 +79,16 @@ def figures_of_trial(entry: TrialEntry, folder: str, calibrations: str | None, c
         # Files named from the study's folder, so that the study is the same on any machine.
         said = str(error).replace(f"{base}{os.sep}", "")
         return TrialFigures(entry, left_out=" ".join(said.split()))
+
+
+def _nothing_in_common(entry: TrialEntry) -> dict[str, Any]:
+    from smartshoe.gait.flag import Flag
+
+    says = (
+        f"no stride of reference {entry.reference} begins within {SAME_STRIDE_S:g} s of one of this trial's on the"
+        " same foot: nothing is compared; check that both are the same trial, on one clock"
+    )
+    return Flag("reference_differs", says).to_dict()
 
 
 def calibrations_for(recording: Recording, place: Path | None, entry: TrialEntry) -> list[Calibration]:

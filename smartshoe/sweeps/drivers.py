@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MAIN = ("rmse_compensated_n", "trial.rmse_total_n.corrected", "explained_percent")
+CLEAR = 0.01  # p value below which a dependence is called one
 LOW_IS_BAD = ("explained_percent", "fit_percent", "improvement_percent", "improvement_over_static_percent")
 
 
@@ -71,6 +72,18 @@ def _driver(there: pd.DataFrame, key: str, figure: str) -> Driver:
     whole = float(((ranks - ranks.mean()) ** 2).sum())
     p_value = float(stats.kruskal(*groups).pvalue)
     return Driver(key, figure, float(np.sqrt(between / whole)), False, p_value)
+
+
+def what_drives(figure: str, drivers: list[Driver]) -> str:
+    """What drives the figure, in one clause; ``drivers`` with the strongest first."""
+    clear = [driver for driver in drivers if driver.p_value < CLEAR]
+    if not clear:
+        return f"no varied key drives {figure} beyond chance"
+    strongest = clear[0]
+    way = "with" if strongest.strength > 0 else "against"
+    if not strongest.is_signed:
+        return f"{figure} depends most on {strongest.key} (correlation ratio {strongest.strength:.2f})"
+    return f"{figure} goes most {way} {strongest.key} (rank correlation {strongest.strength:+.2f})"
 
 
 def worst_first(table: pd.DataFrame, figure: str, count: int) -> pd.DataFrame:

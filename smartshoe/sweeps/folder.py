@@ -77,9 +77,10 @@ class SweepFolder:
         old = Plan(plan.source, theirs["base"], design_of(theirs["sweep"], 0, plan.source.error), theirs["version"])
         foreign = sum(name not in mine for name in set(old.names()))
         if foreign:
+            begun = "" if self.done() else "none is computed yet: remove it, or "
             raise UsageError(
                 f"{self.path} holds another sweep ({theirs['scenario']}; {foreign} of its {len(old)} cases are not in"
-                " this one): choose another --out"
+                f" this one): {begun}choose another --out"
             )
 
     def _sweep_up(self) -> None:

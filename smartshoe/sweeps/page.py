@@ -11,7 +11,7 @@ from smartshoe.report.charts import Chart
 from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain
 from smartshoe.sweeps.charts import against_key, over_pairs
-from smartshoe.sweeps.drivers import Driver, drivers_of, main_figures, worst_first
+from smartshoe.sweeps.drivers import Driver, drivers_of, main_figures, what_drives, worst_first
 from smartshoe.sweeps.plan import Plan
 from smartshoe.sweeps.repeating import command_of
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 WORST = 8
 SENTENCES = 10
-CLEAR = 0.01  # p value below which a dependence is called one
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
@@ -44,6 +43,7 @@ def write_page(path: Path, plan: Plan, table: pd.DataFrame) -> None:
     sentences = failed.groupby("says", sort=False)["case"].agg(["size", "first"]).sort_values("size", ascending=False)
     sections = [_section(plan, table, figure) for figure in main]
     done = f"{len(plan) - len(failed)} of {len(plan)} cases done" if len(failed) else f"All {len(plan)} cases done"
+    done = "The one case is done" if len(plan) == 1 and not len(failed) else done
     write_document(
         path,
         "sweep.html",
@@ -94,16 +94,4 @@ def _section(plan: Plan, table: pd.DataFrame, figure: str) -> Section:
     ]
     quantiles = [plain(float(table[figure].quantile(share)), 4) for share in QUANTILES]
     alone = [against_key(table, key, figure) for key in keys]
-    return Section(figure, quantiles, _says(figure, found), found, alone, over_pairs(table, keys, figure), worst)
-
-
-def _says(figure: str, drivers: list[Driver]) -> str:
-    """What drives the figure, in one clause."""
-    clear = [driver for driver in drivers if driver.p_value < CLEAR]
-    if not clear:
-        return f"no varied key drives {figure} beyond chance"
-    strongest = clear[0]
-    way = "with" if strongest.strength > 0 else "against"
-    if not strongest.is_signed:
-        return f"{figure} depends most on {strongest.key} (correlation ratio {strongest.strength:.2f})"
-    return f"{figure} goes most {way} {strongest.key} (rank correlation {strongest.strength:+.2f})"
+    return Section(figure, quantiles, what_drives(figure, found), found, alone, over_pairs(table, keys, figure), worst)

@@ -69,15 +69,19 @@ def _client_of(address: str) -> Iterator[Any]:
     """A client of the Dask scheduler at ``address``; raises `UsageError` or `DeviceError` where there is none."""
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
     except ImportError as error:
         raise UsageError("--scheduler needs Dask: pip install 'smartshoe[cluster]'") from error
+    try:
+        # Before a client tries to connect: one that fails on the way in takes long to end, and says so on its own.
+        get_address_host_port(address)
+    except (ValueError, NotImplementedError) as error:
+        raise UsageError(f"--scheduler {address} is no address ({error}): give one like tcp://host:8786") from error
     open_client: Any = Client  # typed or not, as Dask is installed or not
     try:
         client = open_client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError) as error:
         raise DeviceError(f"no Dask scheduler answers at {address}: start one, or mend --scheduler") from error
-    except ValueError as error:
-        raise UsageError(f"--scheduler {address} is no address ({error}): give one like tcp://host:8786") from error
     with client:
         yield client
 

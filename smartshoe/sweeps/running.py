@@ -192,6 +192,7 @@ def _concluded(plan: Plan, folder: SweepFolder, count: int) -> SweepResult:
     """The table and the page, from the cases."""
     from smartshoe.sweeps.page import write_page
 
+    folder.claim(plan)  # of two sweeps that took the folder at the same moment, the first to end sees it here
     results = folder.path / "results.csv"
     write_text(results, results_text(plan, folder))
     report = folder.path / "sweep.html"

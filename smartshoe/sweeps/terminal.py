@@ -4,25 +4,28 @@ from __future__ import annotations
 
 from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
-from smartshoe.sweeps.drivers import drivers_of, main_figures
+from smartshoe.sweeps.drivers import drivers_of, main_figures, what_drives
 from smartshoe.sweeps.running import SweepResult
 
 
 def print_sweep(result: SweepResult) -> None:
     """Counts, the main figures' medians and worst, what drives each, and where the files lie."""
     found = result.table()
-    shown = table_of("figures over the cases", ["figure", "median", "5 %", "95 %", "driven by", "rank correlation"])
+    shown = table_of("figures over the cases", ["figure", "median", "5 %", "95 %"])
     figures = main_figures(found, result.plan)
     for figure in figures:
         low, middle, high = (plain(float(found[figure].quantile(share))) for share in (0.05, 0.5, 0.95))
-        drivers = drivers_of(found, result.plan, [figure])
-        by = (drivers[0].key, f"{drivers[0].strength:+.2f}") if drivers else ("–", "–")
-        shown.add_row(figure, middle, low, high, *by)
+        shown.add_row(figure, middle, low, high)
     console = new_console()
     if figures:
         console.print(shown)
+    for figure in figures:
+        if result.plan.design.axes:
+            says = what_drives(figure, drivers_of(found, result.plan, [figure]))
+            console.print(says, soft_wrap=True, markup=False)
     computed = "" if result.computed == result.cases else f" ({result.computed} computed now)"
-    console.print(f"{result.cases} cases{computed}, {result.failed} failed", soft_wrap=True)
+    cases = "1 case" if result.cases == 1 else f"{result.cases} cases"
+    console.print(f"{cases}{computed}, {result.failed} failed", soft_wrap=True)
     for says, count in found.loc[found["status"] == "failed", "says"].value_counts().head(3).items():
         console.print(f"  {count} failed: {says}", soft_wrap=True, markup=False)
     console.print(f"table: {result.results}", soft_wrap=True, markup=False)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from smartshoe.studies.plan import TrialEntry
-from smartshoe.studies.statistics import _icc, agreement_of, difference_of, mean_of
+from smartshoe.studies.statistics import _icc, agreement_of, difference_of, mean_of, prediction_interval
 from smartshoe.studies.swapped import swapped_trials
 from smartshoe.studies.trials import TrialFigures
 
@@ -101,3 +101,14 @@ def test_a_trial_that_mirrors_the_others_is_told(percent: float, expected: list[
     ]
     assert [trial.entry.file for trial in swapped_trials(trials)] == expected
     assert swapped_trials(trials[:2]) == []
+
+
+def test_a_prediction_interval_holds_a_further_subject_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(8)
+    held = []
+    for _ in range(2000):
+        values = rng.normal(100.0, 15.0, (6, 1))
+        low, high = prediction_interval(values[:5])
+        held.append(low[0] < values[5, 0] < high[0])
+    assert abs(np.mean(held) - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 2000)
+    assert prediction_interval(values[:2]) is None

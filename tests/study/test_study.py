@@ -14,6 +14,7 @@ from simulators.gait import Person, Walk, trial
 from smartshoe.cli import run_command
 from smartshoe.logs import write
 from smartshoe.recording import Recording
+from smartshoe.studies.page import careful
 
 SPEEDS = {"slow": 1.0, "fast": 1.5}
 SUBJECTS = {"Anna": 540.0, "Ben": 700.0, "Carl": 620.0}
@@ -109,6 +110,23 @@ def test_a_reference_is_agreed_with(result: dict[str, object]) -> None:
     assert peak["limits_of_agreement"][0] < peak["bias"] < peak["limits_of_agreement"][1]
 
 
+def test_a_reference_of_another_trial_is_told_once_with_its_trials(tmp_path: Path) -> None:
+    recording = _walk("Anna", "slow")
+    late = Recording.from_arrays(
+        time_s=recording.time_s + 500.0, name="late", **{f"{c.name}_n": c.values for c in recording.sensors}
+    )
+    write(recording, tmp_path / "a.csv")
+    write(late, tmp_path / "late.csv")
+    (tmp_path / "study.toml").write_text(
+        '[[trial]]\nfile = "a.csv"\nsubject = "Anna"\ncondition = "slow"\nreference = "late.csv"\n'
+    )
+    found = smartshoe.study(tmp_path / "study.toml", jobs=1)
+    assert not found.agreement
+    ((files, says),) = [each for each in careful(found) if "late.csv" in each[1]]
+    assert files == "a.csv"
+    assert "check that both are the same trial" in says
+
+
 def test_the_folder_holds_the_page_and_the_tables(folder: Path, result: dict[str, object]) -> None:
     out = folder / "out"
     assert json.loads((out / "study.json").read_text()) == result
@@ -116,6 +134,9 @@ def test_the_folder_holds_the_page_and_the_tables(folder: Path, result: dict[str
     assert list(trials["file"])[:2] == ["Anna_slow.csv", "Anna_fast.csv"]
     assert len(trials) == 6
     assert len(pd.read_csv(out / "differences.csv")) == len(result["differences"])
+    band = result["bands"]["slow"]
+    assert band["source"] == "this study's 3 subjects: mean and 95 % prediction interval"
+    assert all(low < high for low, high in zip(band["low"], band["high"], strict=True))
     page = (out / "study.html").read_text()
     for text in ("Slow and fast", "Left out", "triangles.csv", "Agreement with the reference", "Force of a foot"):
         assert text in page
@@ -136,6 +157,7 @@ def test_processes_give_the_same_result(folder: Path, result: dict[str, object])
         ('[[trial]]\nfile = "a.csv"\nsubject = "A"\ncondition = "x"\nweight = 3\n', 2, "line 5, key trial.0.weight"),
         ('[[trial]]\nfile = "a"\nsubject = "A"\ncondition = "x"\n' * 2, 2, "a is there twice"),
         ('[[trial]]\nfile = "a.csv"\nsubject = "A"\ncondition = "x"\n', 5, "none of 1 trials can be used"),
+        ('calibrations = "c"\n[[trial]]\nfile = "a"\nsubject = "A"\ncondition = "x"\n', 2, "line 1, key calibrations"),
     ],
 )
 def test_a_study_that_cannot_be_is_told(

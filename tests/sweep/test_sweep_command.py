@@ -6,6 +6,7 @@ import json
 import re
 import resource
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from small_sweeps import SMALL, empty, write_scenario
 import smartshoe
 from smartshoe.cli import run_command
 from smartshoe.errors import DeviceError, InputError, UsageError
+from smartshoe.sweeps.folder import SweepFolder
 from smartshoe.sweeps.plan import Case, read_plan
 from smartshoe.sweeps.repeating import command_of
 from smartshoe.sweeps.running import sweep_plan
@@ -88,7 +90,9 @@ def test_a_scheduler_that_is_not_there_is_told(
     words = ["sweep", str(done.parent / "small.toml"), "--out", str(tmp_path / "out")]
     assert run_command([*words, "--scheduler", "tcp://127.0.0.1:1"]) == 4
     assert "no Dask scheduler answers at tcp://127.0.0.1:1" in capsys.readouterr().err
-    assert run_command([*words, "--scheduler", "nonsense://x"]) == 2
+    for address in ("nonsense://x", "127.0.0.1"):
+        assert run_command([*words, "--scheduler", address]) == 2
+        assert f"--scheduler {address} is no address" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_shards_that_share_a_folder_make_the_same_table(
@@ -131,6 +135,27 @@ def test_another_sweep_and_another_version_are_kept_out_of_the_folder(tmp_path: 
     with pytest.raises(UsageError, match=r"holds a sweep of smartshoe .*, this is 99\.0: choose another --out"):
         sweep_plan(later, out, compute=empty)
     assert {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
+
+
+def test_a_sweep_whose_folder_another_takes_meanwhile_says_so_and_writes_no_table(tmp_path: Path) -> None:
+    plan = read_plan(write_scenario(tmp_path))
+    another = read_plan(write_scenario(tmp_path, SMALL.replace("[1.2, 1.5]", "[1.2, 1.6]")))
+    SweepFolder(tmp_path / "other").claim(another)
+
+    def taken(case: Case) -> str:  # as by a sweep that looked before this one's note was there
+        shutil.copy(tmp_path / "other" / "sweep.json", tmp_path / "out" / "sweep.json")
+        return empty(case)
+
+    with pytest.raises(UsageError, match="2 of its 4 cases are not in this one"):
+        sweep_plan(plan, tmp_path / "out", compute=taken)
+    assert not (tmp_path / "out" / "results.csv").exists()
+
+
+def test_a_plan_of_which_nothing_is_computed_may_be_removed(tmp_path: Path) -> None:
+    SweepFolder(tmp_path / "out").claim(read_plan(write_scenario(tmp_path)))
+    another = read_plan(write_scenario(tmp_path, SMALL.replace("[1.2, 1.5]", "[1.2, 1.6]")))
+    with pytest.raises(UsageError, match="none is computed yet: remove it, or choose another --out"):
+        sweep_plan(another, tmp_path / "out", compute=empty)
 
 
 def test_a_sweep_grows_in_its_folder(tmp_path: Path) -> None:
