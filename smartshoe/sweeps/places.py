@@ -69,7 +69,7 @@ def _client_of(address: str) -> Iterator[Any]:
     """A client of the Dask scheduler at ``address``; raises `UsageError` or `DeviceError` where there is none."""
     try:
         from distributed import Client
-        from distributed.comm import get_address_host_port
+        from distributed.comm.addressing import get_address_host_port
     except ImportError as error:
         raise UsageError("--scheduler needs Dask: pip install 'smartshoe[cluster]'") from error
     try:

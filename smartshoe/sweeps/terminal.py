@@ -21,8 +21,8 @@ def print_sweep(result: SweepResult) -> None:
         console.print(shown)
     for figure in figures:
         if result.plan.design.axes:
-            says = what_drives(figure, drivers_of(found, result.plan, [figure]))
-            console.print(says, soft_wrap=True, markup=False)
+            driver = what_drives(figure, drivers_of(found, result.plan, [figure]))
+            console.print(driver, soft_wrap=True, markup=False)
     computed = "" if result.computed == result.cases else f" ({result.computed} computed now)"
     cases = "1 case" if result.cases == 1 else f"{result.cases} cases"
     console.print(f"{cases}{computed}, {result.failed} failed", soft_wrap=True)
