@@ -32,6 +32,36 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--shoe-url", default=None, help="a real shoe for the tests marked hardware")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput"):  # of one process, or the one that starts the workers
+        _require_unique_names(ROOT / "tests")
+    elif os.name == "posix":
+        from compiled_once import compile_each_kernel_once
+
+        compile_each_kernel_once()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Give each worker whole folders until one runs dry: what a file's tests share is made once, not in each."""
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log)
+
+
+def _require_unique_names(tests: Path) -> None:
+    """Refuse two files of one name: tests are modules without packages, and the second would be taken for the first."""
+    files: dict[str, list[str]] = {}
+    for path in sorted(tests.rglob("*.py")):
+        if path.name != "conftest.py":
+            files.setdefault(path.name, []).append(str(path.relative_to(tests.parent)))
+    twice = [" and ".join(paths) for paths in files.values() if len(paths) > 1]
+    if twice:
+        raise pytest.UsageError(
+            f"files of tests need names that differ over all folders: rename one of {'; '.join(twice)}"
+        )
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if config.getoption("--shoe-url") is None:
         skip = pytest.mark.skip(reason="needs --shoe-url")
