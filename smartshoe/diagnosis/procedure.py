@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from smartshoe.blas import on_one_thread
 from smartshoe.diagnosis.aligned import aligned
 from smartshoe.diagnosis.baseline import baseline_of
-from smartshoe.diagnosis.course import course_of
+from smartshoe.diagnosis.characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.diagnosis.denoise import noise_sd
 from smartshoe.diagnosis.held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
@@ -121,7 +121,7 @@ def _refused(
 def _seen(recording: Recording) -> str | None:
     """What can be told of a recording without a model."""
     decay = decay_of(recording)
-    return decay.says if decay is not None else course_of(recording)
+    return decay.says if decay is not None else characteristic_of(recording)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,7 @@ class _Prepared:
     limits: list[str]
     start: ExtendedModel
     traits: Traits
-    is_trap: bool
+    is_no_unit: bool
 
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
@@ -144,9 +144,11 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     traits, ranges = traits_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
-    limits = [*clocks.says, *ranges.says, *traits.limits()]
+    friction = [friction_of(recording, thresholds) for recording in clocks.recordings[:count]]
+    limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *traits.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale)
-    return _Prepared(sessions, fine, scale, limits, start, traits, ranges.is_trap)
+    is_no_unit = ranges.is_trap or all(said is not None for said in friction)
+    return _Prepared(sessions, fine, scale, limits, start, traits, is_no_unit)
 
 
 @on_one_thread
@@ -162,7 +164,7 @@ def _diagnosed(
     after = leftover_of(sessions, [residual_of(one, extended) for one in sessions])
     left = after.rms if after.significant else 0.0
     everything = max(left, _unexplained(sessions, extended))
-    silent = given.is_trap or not found.can_validate
+    silent = given.is_no_unit or not found.can_validate
     names = () if silent else names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings, thresholds))
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
@@ -172,8 +174,8 @@ def _diagnosed(
     causes = [_cause(name, found, fine, best, given) for name in names]
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
     causes.sort(key=lambda one: -one.size)
-    # A gain that is none of the unit's is no adequate simulation, however well it fits.
-    verdict = "unexplained" if given.is_trap else _verdict(causes, before, after, thresholds)
+    # What follows something else than the load is simulated by no unit, however well it fits.
+    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise

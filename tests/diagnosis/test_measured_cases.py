@@ -92,7 +92,6 @@ class TestFriction:
         assert 1.0 / between == pytest.approx(49.9, rel=0.02)
         assert 1.0 / within > 3.0 / between
 
-    @pytest.mark.xfail(strict=True, reason="causes are named of a stroke, some with a loss held out")
     @pytest.mark.parametrize("bar", [1, 7])
     def test_displacement_against_force_is_a_loop_that_grows_with_pressure(self, measured: Path, bar: int) -> None:
         found = diagnose(_friction(measured, f"Circle_{bar}bar", "5[N]", "7[N]"))
