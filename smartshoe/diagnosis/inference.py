@@ -95,12 +95,18 @@ class Inference:
     can_validate: bool = True
 
 
-def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> Inference:
-    """The effects in the fitted part of ``sessions``, beside the baseline ``start``."""
+def infer(
+    start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
+) -> Inference:
+    """The effects in the fitted part of ``sessions``, beside the baseline ``start``; none where it is no unit's."""
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
     given, evidence, best = _searched(plain.model, sessions, thresholds)
     screening = _screening(evidence)
+    can_validate = independent(sessions) >= FEWEST_INDEPENDENT
+    if not (is_unit and can_validate):
+        likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
+        return Inference(plain, plain, likelihood, (), screening, (), can_validate)
     state = _settled(_State(given, evidence, best, plain), sessions, thresholds, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
@@ -109,20 +115,16 @@ def infer(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresho
     state = _with_laws(state, sessions, thresholds)
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     refused: list[str] = []
-    can_validate = independent(sessions) >= FEWEST_INDEPENDENT
-    if not can_validate:
-        best = evidence.posterior(())
     while (worst := _worse(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
         best = search(evidence, tuple(m for m in best.members if m != worst), refused)
     likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
     extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
-    baseline = least_squares(plain.model, sessions, thresholds)
     if not extended.model.parts:
-        extended = baseline
+        extended = plain
     progress("weighing alternatives")
     members = _members(evidence, best, refused, likelihood, extended)
-    return Inference(baseline, extended, likelihood, members, screening, tuple(refused), can_validate)
+    return Inference(plain, extended, likelihood, members, screening, tuple(refused))
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

@@ -157,7 +157,7 @@ def _diagnosed(
 ) -> Diagnosis:
     given = _prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
-    found = infer(given.start, sessions, thresholds, progress)
+    found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     extended = found.fit.model
     before = leftover_of(sessions, [residual_of(one, found.baseline.model) for one in sessions])
@@ -165,7 +165,7 @@ def _diagnosed(
     left = after.rms if after.significant else 0.0
     everything = max(left, _unexplained(sessions, extended))
     silent = given.is_no_unit or not found.can_validate
-    names = () if silent else names_of(found.members, everything, thresholds)
+    names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings, thresholds))
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.course import course_of
+from smartshoe.diagnosis.characteristic import characteristic_of
 from smartshoe.diagnosis.decay import decay_of, largest_of_noise
 from smartshoe.diagnosis.session import full_scale, prepare
 from smartshoe.diagnosis.thresholds import Thresholds, described
@@ -55,7 +55,7 @@ def test_each_number_has_a_unit_a_meaning_and_an_origin() -> None:
 
 def test_clear_is_what_parts_a_straight_line_from_a_bent_one() -> None:
     bent = _pressed(np.tanh(3.0 * (TRIANGLE - 0.5)))
-    near, far = _decides("clear", 2.0, 50.0, lambda t: course_of(bent, t))
+    near, far = _decides("clear", 2.0, 50.0, lambda t: characteristic_of(bent, t))
     assert "flattens" in str(near)
     assert "nearly straight" in str(far)
 

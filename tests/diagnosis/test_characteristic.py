@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.course import course_of
+from smartshoe.diagnosis.characteristic import characteristic_of
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ TRIANGLE = 100.0 * (2.0 * np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0) - 1.0)
 
 
 def _said(reading: Array, load: Array = TRIANGLE) -> str | None:
-    return course_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading))
+    return characteristic_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading))
 
 
 def _rising() -> Array:
