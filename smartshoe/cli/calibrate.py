@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 @click.option("--out", "out_folder", metavar="DIR", help="A new folder for the session.")
 @click.option("--serial-number", default="", metavar="S", help="Which unit it is; with it the result is stored.")
 @click.option("--store", metavar="DIR", help="The store of calibrations (default: the user's own).")
+@click.option("--valid-for-days", type=click.FloatRange(min=0.0, min_open=True), metavar="DAYS",
+              help="How long the stored calibration holds (default: no expiry).")  # fmt: skip
 @click.option("--resume", metavar="DIR", help="Go on with the session in DIR.")
 @click.option("--replay", metavar="DIR", help="Judge the session in DIR anew from its raw data; no device is used.")
 @click.option("--yes", is_flag=True, help="Ask nothing: confirm every step, repeat what is faulty.")
@@ -129,6 +131,8 @@ def _plan(options: dict[str, Any]) -> Plan:
 
     if options["store"] is not None and not options["serial_number"]:
         raise UsageError("--store needs --serial-number: the store keeps units by their serial number")
+    if options["valid_for_days"] is not None and not options["serial_number"]:
+        raise UsageError("--valid-for-days needs --serial-number: the store keeps units by their serial number")
     return Plan(
         shoe=options["shoe"],
         machine=options["machine"],
@@ -141,6 +145,7 @@ def _plan(options: dict[str, Any]) -> Plan:
         diagnosed=options["diagnosed"],
         largest_repeats=options["repeats"],
         wait_s=options["wait_s"],
+        valid_for_days=options["valid_for_days"],
     )
 
 

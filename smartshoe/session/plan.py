@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ class Plan:
     The stream is recorded for ``zero_s`` before and ``tail_s`` after each test; from the second pressing on until the
     unit has come to rest, ``rest_s`` at most. A fault is answered by
     at most ``largest_repeats`` repeats. ``wait_s`` bounds the wait for a machine that is run by hand, beyond the
-    test's own duration. ``created`` is an ISO date.
+    test's own duration. ``created`` is an ISO date. ``valid_for_days``: how long the stored calibration holds.
     """
 
     shoe: str
@@ -41,6 +42,7 @@ class Plan:
     rest_s: float = 120.0
     largest_repeats: int = 2
     wait_s: float = 900.0
+    valid_for_days: float | None = None
 
     __pydantic_config__ = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -51,6 +53,8 @@ class Plan:
         for name in ("zero_s", "tail_s", "rest_s", "wait_s"):
             if not 0.0 <= getattr(self, name) <= limits().duration_s:
                 raise UsageError(f"{name} is {getattr(self, name)}: give seconds from 0 to {limits().duration_s}")
+        if self.valid_for_days is not None and not 0.0 < self.valid_for_days < math.inf:
+            raise UsageError(f"valid_for_days is {self.valid_for_days:g}: give a number above 0, or none")
         if not 0 <= self.largest_repeats <= LARGEST_REPEATS:
             raise UsageError(f"largest_repeats is {self.largest_repeats}: give 0 to {LARGEST_REPEATS}")
         names = [protocol.name for protocol in self.protocols]

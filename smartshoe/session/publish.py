@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import smartshoe
 from smartshoe.atomic import json_text, make_folder, write_text
@@ -10,7 +11,11 @@ from smartshoe.logs import write
 from smartshoe.recording import Recording
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.session.analysis import SessionResult
+from smartshoe.session.checks import AT_THE_END
 from smartshoe.session.folder import kept_on_disk
+
+if TYPE_CHECKING:
+    from smartshoe.store.entry import Entry
 
 
 def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
@@ -19,15 +24,25 @@ def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
     Returns what to tell of, by what it is.
     """
     with kept_on_disk(folder):
-        written = _write(result, folder)
-    if result.plan.serial_number:
-        from smartshoe.store import CalibrationStore
+        unit, written = _write(result, folder)
+    entry = _stored(result)
+    with kept_on_disk(folder):
+        written["report"] = _write_page(result, folder, unit, entry)
+    return written if entry is None else {**written, "stored": entry.path}
 
-        written["stored"] = CalibrationStore(result.plan.store).add(result.calibration).path
-    return written
+
+def _stored(result: SessionResult) -> Entry | None:
+    """The calibration's entry in the store; None without a serial number, by which the store keeps units."""
+    plan = result.plan
+    if not plan.serial_number:
+        return None
+    from smartshoe.store import CalibrationStore
+
+    return CalibrationStore(plan.store).add(result.calibration, valid_for_days=plan.valid_for_days)
 
 
-def _write(result: SessionResult, folder: Path) -> dict[str, Path]:
+def _write(result: SessionResult, folder: Path) -> tuple[UnitReport, dict[str, Path]]:
+    """Everything but the page, and what that is to say of the unit."""
     plan = result.plan
     make_folder(folder / "recordings")
     for name, recording in result.recordings.items():
@@ -52,14 +67,39 @@ def _write(result: SessionResult, folder: Path) -> dict[str, Path]:
         ],
         "" if link else f"smartshoe diagnose {' '.join(f'recordings/{name}.csv' for name in result.recordings)}",
     )
+    return unit, written
+
+
+def _write_page(result: SessionResult, folder: Path, unit: UnitReport, entry: Entry | None) -> Path:
+    plan = result.plan
     about = (
         f"Pressed by {', '.join(result.recordings)}. Load and reading were put on one time base by the load itself"
         f" ({'; '.join(_clocks(name, recording) for name, recording in result.recordings.items())})."
     )
     facts = {"shoe": plan.shoe, "machine": plan.machine, "serial number": plan.serial_number or "not given",
              "date": plan.created, "smartshoe": smartshoe.__version__}  # fmt: skip
-    written["report"] = write_page(folder / "report.html", f"Calibration of {plan.unit}", about, facts, [unit])
-    return written
+    title = f"Calibration of {plan.unit}"
+    return write_page(folder / "report.html", title, about, facts, [unit], session=_card(result, entry))
+
+
+def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
+    """What a person asks of a session, and the answers: pressed, checked, clocks, stored, valid."""
+    plan = result.plan
+    rows = [("unit", f"{plan.unit}, serial number {plan.serial_number or 'not given'}")]
+    for name in result.recordings:
+        tries = [attempt for attempt in result.attempts if attempt.experiment == name]
+        said = f"accepted at attempt {next(attempt.number for attempt in tries if attempt.state == 'accepted')}"
+        found = [f"attempt {attempt.number}: {one['says']}" for attempt in tries for one in attempt.findings]
+        rows.append((f"pressed: {name}", "; ".join([said, *found]) if found else f"{said}, no fault found"))
+    looked_for = " ".join((check.__doc__ or "").split("\n")[0] for check in AT_THE_END)
+    rows.append(("faults looked for", looked_for))
+    rows += [("clocks", _clocks(name, recording)) for name, recording in result.recordings.items()]
+    if entry is None:
+        return [*rows, ("stored", "only in this folder: with --serial-number it goes into the store")]
+    until = "no expiry was set: --valid-for-days sets one"
+    if entry.expires is not None:
+        until = f"until {entry.expires.date().isoformat()} ({entry.valid_for_days:g} days), or a repair"
+    return [*rows, ("stored", f"{entry.path}"), ("valid", until)]
 
 
 def _clocks(name: str, recording: Recording) -> str:

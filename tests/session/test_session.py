@@ -45,13 +45,19 @@ def test_the_units_springs_come_out_of_a_session_within_their_intervals(unit: st
 def test_a_session_by_the_command_line_is_stored_and_replays_bit_for_bit(tmp_path: Path, short_file: Path) -> None:
     out, again = tmp_path / "session", tmp_path / "again"
     store = tmp_path / "store"
-    common = ["--protocol", str(short_file), "--serial-number", "T7", "--store", str(store)]
+    common = ["--protocol", str(short_file), "--serial-number", "T7", "--store", str(store), "--valid-for-days", "90"]
     assert run_command(["calibrate", *BENCH, *common, "--out", str(out)]) == 0
     assert run_command(["calibrate", "--replay", str(out), "--out", str(again)]) == 0
     assert (out / "result.json").read_bytes() == (again / "result.json").read_bytes()
     assert (out / "left_toe.json").read_bytes() == (again / "left_toe.json").read_bytes()
     assert {path.name for path in out.iterdir()} >= {"report.html", "raw", "recordings", "journal.smj", "session.json"}
     entry = CalibrationStore(store).latest("T7")
+    card = (out / "report.html").read_text(encoding="utf-8").split('id="session"')[1].split("</section>")[0]
+    assert "serial number T7" in card
+    assert "no fault found" in card
+    assert str(entry.path) in card
+    assert "until" in card
+    assert entry.valid_for_days == 90.0
     assert entry.calibration().to_dict() == json.loads((out / "left_toe.json").read_text())
     # The stored calibration now says how far the reading will go, and a load that is too much for it is refused.
     heavy = tmp_path / "heavy.toml"

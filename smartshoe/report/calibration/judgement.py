@@ -71,6 +71,8 @@ def judge(unit: UnitReport) -> Judgement:
     gain = overall.improvement_over_static_percent
     loop = max((rate.hysteresis_compensated_percent or 0.0 for rate in unit.validation.rates), default=0.0)
     left = f"{plain(overall.rmse_compensated_n)} N left ({plain(share, 2)} % of full scale)"
+    if set(unit.judged) <= set(unit.fitted):
+        left += " on the very data that was fitted"
     look_into = "see its diagnosis" if unit.diagnosis else "diagnose it"
     if not unit.identification["converged"]:
         return Judgement(

@@ -92,8 +92,12 @@ def write_page(
     units: Sequence[UnitReport],
     trial: TrialSection | None = None,
     commands: Sequence[str] = (),
+    session: Sequence[tuple[str, str]] = (),
 ) -> Path:
-    """Write the report to ``path``, whole or not at all, and return it. ``commands`` made it and what it shows."""
+    """Write the report to ``path``, whole or not at all, and return it.
+
+    ``commands`` made it and what it shows; ``session`` is what a session's card says, by what it is about.
+    """
     made = cards(units)
     grade, says = judgement.headline([card.judged for card in made])
     return write_document(
@@ -109,6 +113,7 @@ def write_page(
             "trial": trial,
             "trial_columns": COLUMNS,
             "commands": commands,
+            "session": session,
             "good_percent": judgement.GOOD_PERCENT,
             "bad_percent": judgement.BAD_PERCENT,
             "loop_percent": judgement.LOOP_PERCENT,

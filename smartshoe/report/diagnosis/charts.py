@@ -148,15 +148,19 @@ def over_state(found: Evidence, unit: str) -> list[Chart]:
             panels.append(Panel(f"{when} ({unit})", lines, _around(panels[0].lines if panels else lines), 130))
         middle = 0.5 * (edges[:-1] + edges[1:])
         charts.append(Chart(f"The error over {title}", reading, label, middle, panels))
-    edges = edges_of(found.rate_n_per_s[found.judged])
-    lines = [
-        _line(when, colour, binned(found.rate_n_per_s[found.judged], residual[found.judged], edges))
-        for when, colour, residual in _residuals(found)
-    ]
+    rate = found.rate_n_per_s[found.judged]
+    x, lines = _means(found, rate, edges_of(rate))
     charts.append(Chart("The error over the rate of loading", "Mean and band of one sd; unloading is negative.",
-                        "rate (N/s)", 0.5 * (edges[:-1] + edges[1:]),
-                        [Panel(f"measured − simulated ({unit})", lines)]))  # fmt: skip
+                        "rate (N/s)", x, [Panel(f"measured − simulated ({unit})", lines)]))  # fmt: skip
     return charts
+
+
+def _means(found: Evidence, x: Array, edges: Array) -> tuple[Array, list[Line]]:
+    """The judged error's means before and after over ``x`` (judged samples,), where there are samples."""
+    each = [(when, colour, binned(x, residual[found.judged], edges)) for when, colour, residual in _residuals(found)]
+    filled = np.isfinite(each[0][2].mean)
+    kept = [(when, colour, Binned(*(v[filled] for v in (one.x, one.mean, one.sd)))) for when, colour, one in each]
+    return kept[0][2].x, [_line(*one) for one in kept]
 
 
 def over_cycles(found: Evidence, unit: str) -> Chart | None:
@@ -165,13 +169,9 @@ def over_cycles(found: Evidence, unit: str) -> Chart | None:
     if np.ptp(cycle) == 0:
         return None
     edges = np.asarray(np.arange(cycle.min(), cycle.max() + 2) + 0.5, dtype=np.float64)
-    lines = [
-        _line(when, colour, binned(cycle.astype(np.float64) + 1.0, residual[found.judged], edges))
-        for when, colour, residual in _residuals(found)
-    ]
+    x, lines = _means(found, cycle.astype(np.float64) + 1.0, edges)
     return Chart("The error over load cycles", "Mean and band of one sd; what comes and goes with use shows here.",
-                 "load cycle (number)", 0.5 * (edges[:-1] + edges[1:]),
-                 [Panel(f"measured − simulated ({unit})", lines)])  # fmt: skip
+                 "load cycle (number)", x, [Panel(f"measured − simulated ({unit})", lines)])  # fmt: skip
 
 
 def over_frequency(found: Evidence, unit: str) -> Chart | None:
