@@ -24,10 +24,11 @@ _DESCRIPTOR = re.compile(r"/dev/std(out|err)|(/dev|/proc/(self|thread-self))/fd/
 
 
 @contextmanager
-def replacing(path: Path | str) -> Iterator[Path]:
+def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
     """Yield a temporary path; when the block ends without an error its file takes the place of ``path``.
 
     The content is on disk before the name is: an error, a kill or a pulled plug leaves ``path`` as it was, or whole.
+    Without ``durable`` nothing waits for the disk: a kill still does no harm, a pulled plug may leave an empty file.
     A symbolic link to a file stays, and the file that it leads to is replaced. A device or a pipe (``/dev/null``,
     ``/dev/stdout``) is never replaced: the content is written to it when it is whole. Raises `UsageError` where
     nothing can be written, a full disk within the block included.
@@ -54,9 +55,11 @@ def replacing(path: Path | str) -> Iterator[Path]:
         if streamed:
             _write_through(temporary, target)
         else:
-            _to_disk(temporary)
+            if durable:
+                _to_disk(temporary)
             temporary.replace(named)
-            sync_folder(named.parent)
+            if durable:
+                sync_folder(named.parent)
     except SmartShoeError:
         raise
     except BrokenPipeError:
@@ -151,9 +154,9 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def write_text(path: Path | str, text: str) -> None:
-    """Write ``text`` as UTF-8 to ``path``, whole or not at all."""
-    with replacing(path) as temporary:
+def write_text(path: Path | str, text: str, durable: bool = True) -> None:
+    """Write ``text`` as UTF-8 to ``path``, whole or not at all, as `replacing` does."""
+    with replacing(path, durable) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 

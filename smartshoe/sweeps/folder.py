@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from smartshoe.atomic import json_text, make_folder, write_text
+from smartshoe.atomic import json_text, make_folder, replacing, write_text
 from smartshoe.errors import InputError, UsageError
 from smartshoe.sweeps.design import design_of
 from smartshoe.sweeps.plan import Plan
@@ -92,9 +90,21 @@ class SweepFolder:
                     Path(entry.path).unlink(missing_ok=True)
 
     def done(self) -> set[str]:
-        """The names of the cases that are there."""
+        """The names of the cases that are there; an empty file, as a pulled plug leaves it, is none."""
         with os.scandir(self.cases) as entries:
-            return {e.name[:-5] for e in entries if e.name.endswith(".json") and not e.name.startswith(".")}
+            cases = (e for e in entries if e.name.endswith(".json") and not e.name.startswith("."))
+            return {e.name[:-5] for e in cases if e.stat().st_size > 0}
+
+    def put(self, name: str, text: str) -> None:
+        """Write a case, whole or not at all. It does not wait for the disk: what a pulled plug takes is done again."""
+        write_text(self.cases / f"{name}.json", text, durable=False)
+
+    def holds(self, name: str) -> bool:
+        """Whether a case is there."""
+        try:
+            return (self.cases / f"{name}.json").stat().st_size > 0
+        except FileNotFoundError:
+            return False
 
     def read(self, name: str) -> dict[str, Any]:
         """A case's JSON; raises `InputError` where it is damaged."""
@@ -127,45 +137,30 @@ def _plain(content: dict[str, Any]) -> dict[str, Any]:
     return dict(json.loads(json.dumps(content, default=str)))
 
 
-def results_text(plan: Plan, folder: SweepFolder) -> str:
-    """The table of all cases, in the design's order, as CSV text."""
+def write_results(plan: Plan, folder: SweepFolder) -> Path:
+    """Write ``results.csv``: a row a case, in the design's order. One case is read at a time, twice: header first."""
     keys = [axis.key for axis in plan.design.axes]
     figures: dict[str, None] = {}
-    rows: list[tuple[tuple[str, ...], list[Any]]] = []
-    shapes: dict[tuple[str, ...], tuple[str, ...]] = {}
-    for number in range(len(plan)):
-        name = plan.name(number)
-        case = folder.read(name)
-        shape = tuple(case["figures"])
-        if shape not in shapes:
-            shapes[shape] = shape
-            figures.update(dict.fromkeys(shape))
-        values = plan.design.values(number)
-        begin = [_cell(values[key]) for key in keys]
-        end = [case["status"], case["says"] or "", name]
-        rows.append((shapes[shape], [*begin, plan.design.seed(number), *case["figures"].values(), *end]))
-    header = [*keys, "seed", *figures, "status", "says", "case"]
-    return "".join(_lines(header, _full(rows, len(keys) + 1, list(figures))))
-
-
-def _full(rows: Iterable[tuple[tuple[str, ...], list[Any]]], before: int, figures: list[str]) -> Iterator[list[Any]]:
-    """Each row with an empty cell for each figure that it has not."""
-    everything = tuple(figures)
-    for shape, cells in rows:
-        if shape == everything:
-            yield [*cells[:before], *map(_cell, cells[before : before + len(shape)]), *cells[-3:]]
-            continue
-        own = dict(zip(shape, cells[before : before + len(shape)], strict=True))
-        yield [*cells[:before], *(_cell(own.get(name)) for name in figures), *cells[-3:]]
-
-
-def _lines(header: list[str], rows: Iterable[list[Any]]) -> Iterator[str]:
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow(row)
-    yield buffer.getvalue()
+    for name in plan.names():
+        figures.update(dict.fromkeys(folder.read(name)["figures"]))
+    target = folder.path / "results.csv"
+    with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*keys, "seed", *figures, "status", "says", "case"])
+        for number, name in enumerate(plan.names()):
+            case, values = folder.read(name), plan.design.values(number)
+            own = case["figures"]
+            writer.writerow(
+                [
+                    *(_cell(values[key]) for key in keys),
+                    plan.design.seed(number),
+                    *(_cell(own.get(figure)) for figure in figures),
+                    case["status"],
+                    case["says"] or "",
+                    name,
+                ]
+            )
+    return target
 
 
 def _cell(value: Any) -> Any:

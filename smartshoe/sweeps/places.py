@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from smartshoe.atomic import write_text
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.sweeps.case import computed
+from smartshoe.sweeps.folder import SweepFolder
 from smartshoe.sweeps.plan import Case
 
 Done = Callable[[], None]
@@ -22,23 +21,22 @@ AHEAD = "4*n_jobs"  # cases handed out ahead of the workers
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A case, and the folder that takes it where this process can write there."""
+    """A case, and the sweep's folder, which takes it where this process can write there."""
 
     case: Case
-    folder: str
+    folder: SweepFolder
     compute: Compute = computed
 
     def __call__(self) -> tuple[str, str | None]:
         """The case's name, and its text where somebody else has to write it.
 
-        A case is on the disk before anybody hears of it, so that no kill costs more than what was being computed.
+        A case is in the folder before anybody hears of it, so that no kill costs more than what was being computed.
         """
-        folder = Path(self.folder)
-        if (folder / f"{self.case.name}.json").is_file():
+        if self.folder.holds(self.case.name):
             return self.case.name, None
         text = self.compute(self.case)
-        if folder.is_dir():
-            write_text(folder / f"{self.case.name}.json", text)
+        if self.folder.cases.is_dir():
+            self.folder.put(self.case.name, text)
             return self.case.name, None
         return self.case.name, text
 

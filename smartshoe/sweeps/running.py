@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smartshoe.atomic import replacing, write_text
+from smartshoe.atomic import replacing
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.sweeps import places
 from smartshoe.sweeps.case import computed
-from smartshoe.sweeps.folder import SweepFolder, results_text
+from smartshoe.sweeps.folder import SweepFolder, write_results
 from smartshoe.sweeps.places import Compute, Task, WorkerLostError
 from smartshoe.sweeps.plan import Plan, read_plan
 
@@ -151,14 +151,15 @@ def _compute_all(
 ) -> int:
     """Compute what is not there; how many that were."""
     to_do = _to_do(plan, folder, mine)
+    there = SweepFolder(folder.path.resolve())  # for workers in another folder
     whole = len(to_do)
     counted = lost = 0
     while to_do:
         before = counted
         try:
-            for name, text in place(Task(plan.case(number), str(folder.cases), compute) for number in to_do):
+            for name, text in place(Task(plan.case(number), there, compute) for number in to_do):
                 if text is not None:
-                    write_text(folder.cases / f"{name}.json", text)
+                    folder.put(name, text)
                 counted += 1
                 if progress is not None:
                     progress(counted, whole)
@@ -193,8 +194,7 @@ def _concluded(plan: Plan, folder: SweepFolder, count: int) -> SweepResult:
     from smartshoe.sweeps.page import write_page
 
     folder.claim(plan)  # of two sweeps that took the folder at the same moment, the first to end sees it here
-    results = folder.path / "results.csv"
-    write_text(results, results_text(plan, folder))
+    results = write_results(plan, folder)
     report = folder.path / "sweep.html"
     result = SweepResult(plan, folder.path, len(plan), count, 0, 0, results, report)
     table = result.table()

@@ -175,6 +175,15 @@ def test_a_damaged_case_is_named(tmp_path: Path) -> None:
         sweep_plan(plan, tmp_path / "out", compute=empty)
 
 
+def test_a_case_that_a_power_cut_left_empty_is_computed_again(tmp_path: Path) -> None:
+    plan = read_plan(write_scenario(tmp_path))
+    calm = sweep_plan(plan, tmp_path / "out", compute=empty).results.read_bytes()
+    (tmp_path / "out" / "cases" / f"{plan.name(1)}.json").write_text("")
+    again = sweep_plan(plan, tmp_path / "out", compute=empty)
+    assert again.computed == 1
+    assert again.results.read_bytes() == calm
+
+
 def test_a_full_disk_ends_the_sweep_with_a_sentence_and_no_half_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
