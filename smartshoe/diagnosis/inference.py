@@ -120,6 +120,10 @@ def infer(
         best = search(evidence, tuple(m for m in best.members if m != worst), refused)
     likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
     extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
+    while (beyond := _extrapolates(sessions, extended.model, thresholds)) is not None:
+        refused.append(beyond)
+        best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
+        extended = fit(likelihood, extended.model.without(beyond), LAST_STEPS)
     if not extended.model.parts:
         extended = plain
     progress("weighing alternatives")
@@ -324,6 +328,25 @@ def _worse(evidence: Evidence, best: Posterior) -> int | None:
     gains = {member: _validated(evidence, best, member) for member in best.members}
     worst = min(gains, key=lambda member: gains[member], default=None)
     return worst if worst is not None and gains[worst] < CERTAIN else None
+
+
+def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
+    """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide."""
+    for part in model.parts:
+        moved: list[float] = []
+        for chosen in (lambda session: session.fitted, lambda session: session.usable & session.held_out):
+            square, count = 0.0, 0
+            for session in sessions:
+                seen = chosen(session)
+                if seen.any():
+                    without = model.without(part.name).simulate(session.conditions)
+                    by = (model.simulate(session.conditions) - without)[seen]
+                    square += float(np.sum((by - by.mean()) ** 2))
+                    count += by.size
+            moved.append(math.sqrt(square / max(count, 1)))
+        if moved[1] > thresholds.extrapolates * max(moved[0], thresholds.material):
+            return part.name
+    return None
 
 
 def _validated(evidence: Evidence, best: Posterior, member: int) -> float:

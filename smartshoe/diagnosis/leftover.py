@@ -47,10 +47,11 @@ class Leftover:
 
     @property
     def _found(self) -> list[float]:
-        noise, switches = (False, False) if self.wander is None else (self.wander.is_noise, self.wander.switches)
-        looks = [self.repeating] if noise else [self.repeating, self.slow]
-        found = [one.rms for one in looks if one.z > SIGNIFICANT_Z]
-        return [*found, self.wander.rms] if self.wander is not None and switches else found
+        if self.wander is not None and self.wander.is_noise:
+            return [self.repeating.rms] if self.repeating.z > SIGNIFICANT_Z else []
+        found = [one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z]
+        # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
+        return found if self.wander is None else [*found, self.wander.rms]
 
 
 def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Leftover:

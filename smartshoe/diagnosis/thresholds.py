@@ -53,6 +53,12 @@ class Thresholds:
         "structure that small imperfections of a good unit add up to",
         "three effects of 0.08 % each: 0.14 %",
     )
+    extrapolates: float = threshold(
+        10.0,
+        "ratio",
+        "of an effect in what is held out to that in what is fitted, beyond which it is no knowledge",
+        "an order of magnitude",
+    )
     alike: float = threshold(
         3.0, "times material", "two models whose readings differ by less are one, and the simpler is taken", "judgement"
     )
