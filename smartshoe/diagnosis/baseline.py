@@ -14,6 +14,7 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
+USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
 POLES_PER_S = np.geomspace(0.01, 20.0, 31)
 LEAST_RELAXING, MOST_RELAXING = -0.9, 5.0
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.blas import on_one_thread
+from smartshoe.diagnosis.baseline import USUAL
 from smartshoe.diagnosis.sensitivity import Linearised, linearised
 from smartshoe.diagnosis.session import Scale, prepare, thinning
 from smartshoe.diagnosis.thresholds import Thresholds
@@ -22,8 +23,6 @@ from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
-
-UNIT = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four (Table 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ def design(
     noise_percent: float = 0.1,
     strength_percent: float = 0.3,
     sample_rate_hz: float = 100.0,
-    unit: ExtendedModel = UNIT,
+    unit: ExtendedModel = USUAL,
     thresholds: Thresholds | None = None,
 ) -> Design:
     """Which effects the protocols, run once each, would show and tell apart.

@@ -38,7 +38,6 @@ Array = NDArray[np.float64]
 Members = tuple[int, ...]
 
 OWN_SD = 10.0
-FOLDS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +226,7 @@ class Evidence:
     def left_out_errors(self, members: Members) -> Array:
         """(folds,) squared errors of each recording when the set is fitted to all others.
 
-        A single recording is cut into blocks of its cycles. Its nuisances are marginalised over the recording.
+        A single recording is cut into its cycles. Its nuisances are marginalised over the recording.
         """
         given, limits = self.given, self.thresholds
         columns = [*range(1, 1 + given.own), *(c for m in members for c in given.candidates[m].columns)]
@@ -250,16 +249,13 @@ class Evidence:
         if len(given.sessions) > 1:
             return list(given.gram().sessions)
         session = given.sessions[0]
-        cycles = np.unique(session.cycle[session.fitted])
-        blocks = np.array_split(cycles, min(FOLDS, cycles.size))
         return [
             marginal(
                 given.rows[0],
-                replace(session, usable=session.usable & np.isin(session.cycle, block)),
+                replace(session, usable=session.usable & (session.cycle == cycle)),
                 given.model,
             )
-            for block in blocks
-            if block.size
+            for cycle in np.unique(session.cycle[session.fitted])
         ]
 
     def _amplitudes(self, mean: Array, members: Members) -> list[float]:

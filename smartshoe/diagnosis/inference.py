@@ -14,11 +14,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.baseline import USUAL
 from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis.held_out import residual_of
 from smartshoe.diagnosis.likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis.noise import correlated_sd
-from smartshoe.diagnosis.search import additions, allowed, search, step
+from smartshoe.diagnosis.search import BREADTH, additions, allowed, search, step
 from smartshoe.diagnosis.sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.diagnosis.thresholds import Thresholds
@@ -31,15 +32,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 ROUNDS = 6
-STEPS_A_ROUND = 6
-STEPS_WITHOUT = 4
-LAST_STEPS = 25
-STEPS_A_RATE = 4
-FITTED_RIVALS = 2
-RATES_PER_S = (0.05, 0.3, 2.0)
-CERTAIN = 0.8  # standard errors of a gain over what is left out, by which it must lie above zero
-SHARE = 0.08  # that relaxes, of the units of the paper's Table 1
-FEWEST_INDEPENDENT = 2  # of recordings or cycles: within one, nothing validates anything
+FEW_STEPS = 6  # of a fit that only has to be compared with others
+RIVALS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +97,7 @@ def infer(
     plain = least_squares(start, sessions, thresholds)
     given, evidence, best = _searched(plain.model, sessions, thresholds)
     screening = _screening(evidence)
-    can_validate = independent(sessions) >= FEWEST_INDEPENDENT
+    can_validate = independent(sessions) > 1  # within one, nothing validates anything
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, (), can_validate)
@@ -119,11 +113,11 @@ def infer(
         refused.append(given.candidates[worst].name)
         best = search(evidence, tuple(m for m in best.members if m != worst), refused)
     likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
-    extended = fit(likelihood, _with(given, best, extended.model), LAST_STEPS)
+    extended = fit(likelihood, _with(given, best, extended.model))
     while (beyond := _extrapolates(sessions, extended.model, thresholds)) is not None:
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
-        extended = fit(likelihood, extended.model.without(beyond), LAST_STEPS)
+        extended = fit(likelihood, extended.model.without(beyond))
     if not extended.model.parts:
         extended = plain
     progress("weighing alternatives")
@@ -134,7 +128,7 @@ def infer(
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
     """The best predictor of the form of ``start``: output error, each correlation time of what is left counted once."""
     residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
-    return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start, LAST_STEPS)
+    return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +189,7 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
         likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = min(
-            (fit(likelihood, _with(state.given, one, state.fit.model), STEPS_A_ROUND) for one in _promising(state)),
+            (fit(likelihood, _with(state.given, one, state.fit.model), FEW_STEPS) for one in _promising(state)),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
         state = _State(*_searched(found.model, sessions, thresholds), found)
@@ -216,7 +210,7 @@ def _promising(state: _State) -> list[Posterior]:
         for k, one in enumerate(state.given.candidates)
         if one.effect.is_flexible and one.effect.is_memoryless and one.slot not in taken
     ]
-    tried = {*additions(state.evidence, start, FITTED_RIVALS), *flexible}
+    tried = {*additions(state.evidence, start, RIVALS), *flexible}
     return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
 
 
@@ -239,10 +233,10 @@ def _with_laws(state: _State, sessions: Sequence[Session], thresholds: Threshold
         for part in bare.parts:
             if part.effect.is_memoryless:
                 bare = bare.without(part.name)
-        nothing = fit(likelihood, bare, STEPS_A_RATE)
+        nothing = fit(likelihood, bare, FEW_STEPS)
         flexible = likelihood.cost(state.fit.model)
         laws = [e for e in catalogue().values() if e.is_memoryless]
-        fits = [fit(likelihood, nothing.model.with_part(law, law.begun(law.shapes[0])), STEPS_A_RATE) for law in laws]
+        fits = [fit(likelihood, nothing.model.with_part(law, law.begun(law.shapes[0])), FEW_STEPS) for law in laws]
         best = min((one for one in fits if not _is_stretched(one.model)), key=lambda one: one.cost, default=nothing)
         if best.cost - flexible < thresholds.law_departure**2 * max(nothing.cost - flexible, 0.0):
             state = _State(*_searched(best.model, sessions, thresholds), best)
@@ -268,8 +262,9 @@ def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: T
     for part in bare.parts:
         if isinstance(part.effect, CoreEffect):
             bare = bare.without(part.name)
-    starts = [replace(bare, relaxation_rate_per_s=rate, relaxing_share=SHARE) for rate in RATES_PER_S]
-    best = min((fit(likelihood, one, STEPS_A_RATE) for one in starts), key=lambda one: one.cost)
+    share = USUAL.relaxing_share
+    starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in thresholds.memory_s]
+    best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
     return _State(*_searched(best.model, sessions, thresholds), best)
 
 
@@ -301,7 +296,7 @@ def _screening(evidence: Evidence) -> tuple[tuple[str, float], ...]:
     nothing = evidence.posterior(()).score
     found = [
         (evidence.given.candidates[k].name, nothing - evidence.posterior((k,)).score)
-        for k in additions(evidence, (), breadth=10)
+        for k in additions(evidence, (), 2 * BREADTH)
     ]
     return tuple(sorted(found, key=lambda one: -one[1]))
 
@@ -327,26 +322,24 @@ def _worse(evidence: Evidence, best: Posterior) -> int | None:
     """
     gains = {member: _validated(evidence, best, member) for member in best.members}
     worst = min(gains, key=lambda member: gains[member], default=None)
-    return worst if worst is not None and gains[worst] < CERTAIN else None
+    return worst if worst is not None and gains[worst] < evidence.thresholds.validated else None
 
 
 def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
     """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide."""
     for part in model.parts:
-        moved: list[float] = []
-        for chosen in (lambda session: session.fitted, lambda session: session.usable & session.held_out):
-            square, count = 0.0, 0
-            for session in sessions:
-                seen = chosen(session)
-                if seen.any():
-                    without = model.without(part.name).simulate(session.conditions)
-                    by = (model.simulate(session.conditions) - without)[seen]
-                    square += float(np.sum((by - by.mean()) ** 2))
-                    count += by.size
-            moved.append(math.sqrt(square / max(count, 1)))
-        if moved[1] > thresholds.extrapolates * max(moved[0], thresholds.material):
+        less = model.without(part.name)
+        by = [model.simulate(one.conditions) - less.simulate(one.conditions) for one in sessions]
+        within = _spread(by, [one.fitted for one in sessions])
+        if _spread(by, [one.judged for one in sessions]) > thresholds.extrapolates * max(within, thresholds.material):
             return part.name
     return None
+
+
+def _spread(signals: Sequence[Array], seen: Sequence[NDArray[np.bool_]]) -> float:
+    """Rms of ``signals``, (n,) each, where ``seen``, each about its own mean."""
+    parts = [signal[mask] - signal[mask].mean() for signal, mask in zip(signals, seen, strict=True) if mask.any()]
+    return math.sqrt(sum(float(one @ one) for one in parts) / max(sum(one.size for one in parts), 1))
 
 
 def _validated(evidence: Evidence, best: Posterior, member: int) -> float:
@@ -363,7 +356,7 @@ def _members(
     made = []
     for member, departed in zip(best.members, best.departed, strict=True):
         one = evidence.given.candidates[member]
-        less = fit(likelihood, extended.model.without(one.name), STEPS_WITHOUT)
+        less = fit(likelihood, extended.model.without(one.name), FEW_STEPS)
         size = apart(likelihood.sessions, less.model, extended.model)
         others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
         near = alternatives(evidence, best, member, refused)
@@ -381,7 +374,7 @@ def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit
             continue
         starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
         best = min(starts, key=likelihood.cost)
-        found.append(Alternative(law.name, fit(likelihood, best, STEPS_WITHOUT).cost - extended.cost))
+        found.append(Alternative(law.name, fit(likelihood, best, FEW_STEPS).cost - extended.cost))
     return tuple(sorted(found, key=lambda a: a.margin))
 
 
@@ -399,7 +392,7 @@ def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequ
     """What could stand in a member's place: every other effect at its best shape, and nothing."""
     less = tuple(m for m in best.members if m != member)
     found = [Alternative(None, evidence.posterior(less).score - best.score)]
-    for k in additions(evidence, less, 10, refused):
+    for k in additions(evidence, less, 2 * BREADTH, refused):
         one = evidence.given.candidates[k]
         if one.name == evidence.given.candidates[member].name or one.effect.is_flexible:
             continue

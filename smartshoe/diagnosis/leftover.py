@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis.denoise import noise_sd
 from smartshoe.diagnosis.remainder import Look, repeating, slow
 from smartshoe.diagnosis.session import Session
 from smartshoe.diagnosis.wander import Wander, wander_of
@@ -22,13 +23,15 @@ SIGNIFICANT_Z = 5.0
 class Leftover:
     """``rms`` of the structure in a residual (shares of full scale), by two looks; ``says`` where it is largest.
 
-    ``wander`` is what its slow part is made of: where that is noise, it is no structure, however slow.
+    ``wander`` is what its slow part is made of: where that is noise, it is no structure, however slow. ``size`` is all
+    that is beyond white noise.
     """
 
     repeating: Look
     slow: Look
     wander: Wander | None
     says: str
+    size: float
 
     @property
     def rms(self) -> float:
@@ -41,6 +44,11 @@ class Leftover:
         return bool(self._found)
 
     @property
+    def how(self) -> str:
+        """What the largest part does: it repeats with the load's cycles, or it wanders."""
+        return "repeats" if self.repeating.z > SIGNIFICANT_Z and self.repeating.rms >= self.rms else "wanders"
+
+    @property
     def is_noise(self) -> bool:
         """Whether nothing is left but noise, slow or not."""
         return self.wander is not None and self.wander.is_noise and not self.significant
@@ -51,7 +59,7 @@ class Leftover:
             return [self.repeating.rms] if self.repeating.z > SIGNIFICANT_Z else []
         found = [one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z]
         # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
-        return found if self.wander is None else [*found, self.wander.rms]
+        return found if self.wander is None else [*found, min(self.wander.rms, self.size)]
 
 
 def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Leftover:
@@ -60,7 +68,25 @@ def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Left
     says = where(sessions, residuals)
     if wander is not None and wander.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * wander.tau_s:.2g} s; {says}"
-    return Leftover(repeating(sessions, residuals), slow(sessions, residuals, BLOCK_S), wander, says)
+    return Leftover(
+        repeating(sessions, residuals),
+        slow(sessions, residuals, BLOCK_S),
+        wander,
+        says,
+        beyond_noise(sessions, residuals),
+    )
+
+
+def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array]) -> float:
+    """Rms of ``residuals``, (n,) a session, over what is fitted beyond white noise, whether it repeats or not."""
+    square, white, count = 0.0, 0.0, 0
+    for session, whole in zip(sessions, residuals, strict=True):
+        if session.fitted.any():
+            residual = whole[session.fitted]
+            square += float(residual @ residual)
+            white += noise_sd(residual) ** 2 * residual.size
+            count += residual.size
+    return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
 
 
 def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:

@@ -16,7 +16,7 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 10
+MOST_STEPS = 25
 SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 SHAPE_SD = 1.0  # of a shape's logarithm, or in sizes, about where it was begun

@@ -13,7 +13,6 @@ from smartshoe.diagnosis.aligned import aligned
 from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis.decay import decay_of
-from smartshoe.diagnosis.denoise import noise_sd
 from smartshoe.diagnosis.held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis.inference import Inference, Progress, infer
 from smartshoe.diagnosis.integrity import Integrity, examine
@@ -163,7 +162,7 @@ def _diagnosed(
     before = leftover_of(sessions, [residual_of(one, found.baseline.model) for one in sessions])
     after = leftover_of(sessions, [residual_of(one, extended) for one in sessions])
     left = after.rms if after.significant else 0.0
-    everything = max(left, _unexplained(sessions, extended))
+    everything = max(left, after.size)
     silent = given.is_no_unit or not found.can_validate
     names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings, thresholds))
@@ -185,7 +184,7 @@ def _diagnosed(
     force = force_rmse_n(fine, extended)
     return Diagnosis(
         verdict,
-        _sentence(verdict, causes, baseline, best, left, thresholds),
+        _sentence(verdict, causes, baseline, best, after, thresholds),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
@@ -211,18 +210,6 @@ def _diagnosed(
     )
 
 
-def _unexplained(sessions: Sequence[Session], model: ExtendedModel) -> float:
-    """Rms of what the model leaves of the fitted samples beyond white noise, whether it repeats or not."""
-    square, white, count = 0.0, 0.0, 0
-    for session in sessions:
-        if session.fitted.any():
-            residual = residual_of(session, model)[session.fitted]
-            square += float(residual @ residual)
-            white += noise_sd(residual) ** 2 * residual.size
-            count += residual.size
-    return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
-
-
 def _is_within_a_sample(
     name: Name, model: ExtendedModel, recordings: Sequence[Recording], thresholds: Thresholds
 ) -> bool:
@@ -244,12 +231,13 @@ def _verdict(causes: Sequence[Cause], before: Leftover, after: Leftover, thresho
 
 
 def _sentence(
-    verdict: Verdict, causes: Sequence[Cause], baseline: Errors, best: Errors, left: float, thresholds: Thresholds
+    verdict: Verdict, causes: Sequence[Cause], baseline: Errors, best: Errors, after: Leftover, thresholds: Thresholds
 ) -> str:
     names = [cause.name.replace("_", " ") for cause in causes]
     named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
-    rest = f"{100 * left:.2g} % repeats and is not explained"
+    left = after.rms if after.significant else 0.0
+    rest = f"{100 * left:.2g} % {after.how} and is not explained"
     if verdict == "adequate":
         return good if left <= thresholds.material else f"{good}; {rest}"
     if verdict == "unexplained":

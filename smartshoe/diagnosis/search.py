@@ -9,7 +9,6 @@ from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
 MOST_MEMBERS = 7
 BREADTH = 5
 SWAPS = 3
-CANCELLING = 4.0
 
 
 def allowed(evidence: Evidence, found: Posterior) -> bool:
@@ -17,7 +16,7 @@ def allowed(evidence: Evidence, found: Posterior) -> bool:
 
     Members that are each far larger than all of them together fit by their difference, which is neither's.
     """
-    if sum(size**2 for size in found.sizes) > CANCELLING * found.together**2:
+    if sum(size**2 for size in found.sizes) > (evidence.thresholds.clear * found.together) ** 2:
         return False
     return all(
         evidence.given.candidates[m].has_sign_of(s)

@@ -59,6 +59,9 @@ class Thresholds:
         "of an effect in what is held out to that in what is fitted, beyond which it is no knowledge",
         "an order of magnitude",
     )
+    validated: float = threshold(
+        0.8, "standard errors", "by which an effect must better what is left out", "four to one, one-sided"
+    )
     alike: float = threshold(
         3.0, "times material", "two models whose readings differ by less are one, and the simpler is taken", "judgement"
     )
