@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -111,3 +112,25 @@ def by_rate(found: list[Cycle]) -> dict[float, list[Cycle]]:
         else:
             groups.append([cycle])
     return {float(f"{np.mean([c.rate_n_per_s for c in group]):.2g}"): group for group in groups}
+
+
+def rate_range(courses: Iterable[tuple[Array, Array]]) -> tuple[float, float]:
+    """Slowest and fastest loading in N/s: where 5 % and 95 % of all rise of load are done, over tenths of a second.
+
+    ``courses`` are pairs of time in s and load in N, each (n,), one a recording. By load, not by time: a fast triangle
+    is over before it makes a hundredth of a session's samples. (0, 0) where no load rises.
+    """
+    slopes, rises = [], []
+    for time_s, load_n in courses:
+        stride = max(round(0.1 / float(np.median(np.diff(time_s)))), 1) if time_s.size > 1 else 1
+        rise = np.diff(load_n[::stride])
+        slopes.append(rise / np.diff(time_s[::stride]))
+        rises.append(rise)
+    slope, rise = np.concatenate(slopes), np.concatenate(rises)
+    rising = slope > 0.02 * max(float(np.max(slope, initial=0.0)), 1e-12)
+    if not rising.any():
+        return 0.0, 0.0
+    order = np.argsort(slope[rising])
+    done = np.cumsum(rise[rising][order])
+    low, high = slope[rising][order][np.searchsorted(done, [0.05 * done[-1], 0.95 * done[-1]])]
+    return float(low), float(high)

@@ -149,8 +149,8 @@ def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, st
 def _save_calibration(path: str, found: Diagnosis, recordings: list[Recording], unit: str | None) -> None:
     import datetime
 
-    found.calibration(
-        unit=unit or recordings[0].unit or "",
-        sample_rate_hz=1.0 / recordings[0].sample_time_s,
-        created=datetime.datetime.now(datetime.UTC).date().isoformat(),
-    ).save(path)
+    from smartshoe.compensation.provenance import calibrated_on
+
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    calibration = found.calibration(unit=unit or recordings[0].unit or "", created=today)
+    calibrated_on(calibration, recordings).save(path)

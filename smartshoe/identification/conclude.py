@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification.estimator import Fit
-from smartshoe.identification.experiment import Array, Experiment, kept_of
+from smartshoe.identification.experiment import Array, kept_of
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.parametrisation import GreyBox
 from smartshoe.identification.prediction_error import LARGEST_DELAY_S
 from smartshoe.identification.uncertainty import CURVED, Function, profile_interval, t_quantile
+from smartshoe.loading import rate_range
 from smartshoe.models import X_OVER_NRT, Parameter
 from smartshoe.units import Unit
 
@@ -112,7 +112,7 @@ def conclude(fit: Fit, choice: Choice, where: str) -> Identification:
         n_samples=problem.count,
         n_missing=sum(experiment.n_missing for experiment in experiments),
         load_range_n=(min(float(load.min()) for load in loads), max(float(load.max()) for load in loads)),
-        rate_range_n_per_s=_rate_range(experiments),
+        rate_range_n_per_s=rate_range((one.time_s, one.load_n) for one in experiments),
         sources=choice.sources,
         remarks=tuple(note for note in notes if note),
         fit=fit,
@@ -231,24 +231,3 @@ def _require_determined(where: str, fit: Fit, values: Array, sd: Array, spread: 
             f"{where}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be told from these data:"
             " record more triangles, at several rates, with rests between"
         )
-
-
-def _rate_range(experiments: Sequence[Experiment]) -> tuple[float, float]:
-    """Slowest and fastest loading in N/s: where 5 % and 95 % of all rise of load are done, over tenths of a second.
-
-    By load, not by time: a fast triangle is over before it makes a hundredth of a session's samples.
-    """
-    slopes, rises = [], []
-    for experiment in experiments:
-        stride = max(round(0.1 / experiment.sample_time_s), 1)
-        rise = np.diff(experiment.load_n[::stride])
-        slopes.append(rise / np.diff(experiment.time_s[::stride]))
-        rises.append(rise)
-    slope, rise = np.concatenate(slopes), np.concatenate(rises)
-    rising = slope > 0.02 * max(float(np.max(slope, initial=0.0)), 1e-12)
-    if not rising.any():
-        return 0.0, 0.0
-    order = np.argsort(slope[rising])
-    done = np.cumsum(rise[rising][order])
-    low, high = slope[rising][order][np.searchsorted(done, [0.05 * done[-1], 0.95 * done[-1]])]
-    return float(low), float(high)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from smartshoe.compensation import Calibration, Compensator
+from smartshoe.compensation.provenance import sha256_of
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification.consistency import ConsistencyTest, consistency_test
@@ -261,7 +260,7 @@ class Identification(Summarised):
             load_range_n=self.load_range_n,
             rate_range_n_per_s=self.rate_range_n_per_s,
             sample_rate_hz=self.sample_rate_hz,
-            sources=tuple({"name": source, "sha256": _sha256(source)} for source in self.sources),
+            sources=tuple({"name": source, "sha256": sha256_of(source)} for source in self.sources),
             created=created,
             smartshoe_version=__version__,
         )
@@ -316,11 +315,3 @@ def fit_percent(y: Array, error: Array) -> float:
     """100 (1 - ||error||/||y - mean y||), as MATLAB's compare has it."""
     spread = float(np.linalg.norm(y - y.mean())) if y.size else 0.0
     return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0 else float("nan")
-
-
-def _sha256(source: str) -> str | None:
-    path = Path(source)
-    if not source or not path.is_file():
-        return None
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import smartshoe
 from smartshoe.atomic import make_folder, write_text
+from smartshoe.compensation.provenance import calibrated_on
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.report.calibration.judgement import headline, judge
 from smartshoe.report.trial import TrialSection
 from smartshoe.report.wording import sentence
-from smartshoe.scenario.run import ScenarioResult, UnitResult
+from smartshoe.scenario.run import ScenarioResult, UnitResult, diagnosed_on
 
 
 def _publish_diagnosis(
@@ -19,15 +20,14 @@ def _publish_diagnosis(
     """The unit's diagnosis in a folder of its own, and its extended calibration beside the plain one."""
     from smartshoe.report.diagnosis.folder import publish_diagnosis
 
-    found = unit.diagnosis
-    if found is None:
+    found, settings = unit.diagnosis, result.scenario.diagnose
+    if found is None or settings is None:
         return None
     own = make_folder(folder / "diagnosis" / unit.name)
     facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "smartshoe": smartshoe.__version__}
     page = publish_diagnosis(own, found, unit.name, facts, figures)["report"]
     if found.model is not None:
-        rate_hz = next(iter(unit.recordings.values())).sample_rate_hz
-        saved = found.calibration(unit=unit.name, sample_rate_hz=rate_hz)
+        saved = calibrated_on(found.calibration(unit=unit.name), diagnosed_on(unit.recordings, settings))
         saved.save(folder / "calibrations" / f"{unit.name}_extended.json")
     left_n = found.to_dict()["extended"].get("force_rmse_n")
     return DiagnosisLink(found.says, page.relative_to(folder).as_posix(), left_n)

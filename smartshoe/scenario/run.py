@@ -200,13 +200,18 @@ def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str
     return names or tuple(recordings)
 
 
+def diagnosed_on(recordings: dict[str, Recording], settings: DiagnoseTable) -> list[Recording]:
+    """The recordings that a diagnosis is fitted to: those in use, or all that are not held out."""
+    kept = set(settings.hold_out)
+    used = settings.use or tuple(name for name in recordings if name not in kept)
+    return [recordings[name] for name in used if name in recordings]
+
+
 def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Diagnosis:
     from smartshoe.diagnosis import diagnose
 
-    kept = set(settings.hold_out)
-    used = settings.use or tuple(name for name in recordings if name not in kept)
     return diagnose(
-        [recordings[name] for name in used if name in recordings],
+        diagnosed_on(recordings, settings),
         hold_out=[recordings[name] for name in settings.hold_out if name in recordings],
         material=settings.material_percent / 100.0,
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import smartshoe
 from smartshoe.atomic import json_text, make_folder, write_text
+from smartshoe.compensation.provenance import calibrated_on
 from smartshoe.logs import write
 from smartshoe.recording import Recording
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
@@ -120,8 +121,7 @@ def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | N
     own = make_folder(folder / "diagnosis")
     page = publish_diagnosis(own, found, plan.unit, {"smartshoe": smartshoe.__version__})["report"]
     if found.model is not None:
-        first = next(iter(result.recordings.values()))
-        extended = found.calibration(unit=plan.unit, sample_rate_hz=first.sample_rate_hz, created=plan.created)
-        extended.save(folder / f"{plan.unit}_extended.json")
+        extended = found.calibration(unit=plan.unit, created=plan.created)
+        calibrated_on(extended, list(result.recordings.values())).save(folder / f"{plan.unit}_extended.json")
     left_n = found.to_dict()["extended"].get("force_rmse_n")
     return DiagnosisLink(found.says, page.relative_to(folder).as_posix(), left_n)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import tomllib
 from pathlib import Path
@@ -94,6 +95,12 @@ def test_one_command_writes_page_result_and_calibration(
     saved = json.loads(calibration.read_text())
     assert saved["unit"] == "toe <b>"
     assert found["causes"][0]["effect"] in saved["extended"]["effects"]
+    sha256 = hashlib.sha256(files[0].read_bytes()).hexdigest()
+    assert saved["sources"] == [{"name": str(files[0]), "sha256": sha256}]
+    fitted = smartshoe.read(files[0])
+    assert saved["load_range_n"] == [fitted.force_n.min(), fitted.force_n.max()]
+    assert saved["rate_range_n_per_s"] == list(smartshoe.identify([fitted]).rate_range_n_per_s)
+    assert saved["sample_rate_hz"] == round(fitted.sample_rate_hz, 6)
     estimate = tmp_path / "force.csv"
     assert run_command(["compensate", str(files[1]), "--calibration", str(calibration), "--out", str(estimate)]) == 0
     force_n = smartshoe.read(estimate).channels["force_estimate"].si
