@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import click
 
 from smartshoe.cli.inputs import column_options, read_all
+
+if TYPE_CHECKING:
+    from smartshoe.recording import Recording
+
+PLAIN = (".csv", ".txt")
+# What the plain table names beside each other; of each quantity the first is what anything else becomes.
+KEPT_UNITS = {"force": ("N",), "pressure": ("mbar", "Pa", "kPa", "bar"), "length": ("mm",), "temperature": ("°C",)}
 
 
 @click.command("convert", epilog="Example: smartshoe convert Specimen_RawData_1.csv left_toe.h5")
@@ -16,8 +27,30 @@ def command(
 ) -> None:
     """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
     from smartshoe.logs import write
+    from smartshoe.logs.picks import listed
 
     (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)
+    if Path(target).suffix.casefold() in PLAIN:
+        recording = in_contract_units(recording)
     write(recording, target)
-    names = ", ".join(f"{c.name} [{c.unit.symbol}]" for c in recording.channels.values())
+    names = listed([f"{c.name} [{c.unit.symbol}]" for c in recording.channels.values()])
     click.echo(f"{target}: {len(recording)} samples over {recording.duration_s:g} s of {names}")
+
+
+def in_contract_units(recording: Recording) -> Recording:
+    """The recording in the units of the plain table's columns (``force_n``, ``pressure_mbar``, ``displacement_mm``)."""
+    from smartshoe.units import find_unit
+
+    for channel in list(recording.channels.values()):
+        kept = KEPT_UNITS.get(channel.unit.quantity, (channel.unit.symbol,))
+        wanted = find_unit(kept[0])
+        if channel.unit.symbol in kept or wanted is None:
+            continue
+        values = channel.unit.convert(channel.values, wanted)
+        values.flags.writeable = False
+        ranged = channel.range_ and tuple(channel.unit.convert(list(channel.range_), wanted).tolist())
+        resolution = channel.resolution and channel.resolution * channel.unit.scale / wanted.scale
+        recording = recording.with_channel(
+            replace(channel, values=values, unit=wanted, range_=ranged, resolution=resolution)
+        )
+    return recording

@@ -78,7 +78,7 @@ def command(
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
     from smartshoe.atomic import make_folder
     from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
-    from smartshoe.cli.inputs import units_of, with_units
+    from smartshoe.cli.inputs import say_what_strikes, units_of, with_units
     from smartshoe.cli.output import emit_json, progress, show_notes
     from smartshoe.gait.analysis import analyse
     from smartshoe.gait.coverage import Coverage
@@ -108,6 +108,7 @@ def command(
     chosen = units_of(sensors)
     recordings = [] if streamed else [with_units(read(file, time=time), chosen) for file in files]
     show_notes(recordings)
+    say_what_strikes(recordings)
     calibrations = []
     if calibration_paths:
         from smartshoe.cli.inputs import load_calibrations

@@ -13,7 +13,7 @@ from smartshoe.recording import UNITS_OF_A_SHOE, Recording
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
 
-MOST_NAMES = 10  # of columns in an error
+MISSING_SHARE = 0.05  # of a signal's samples, from which on a person is told
 BEYOND = 1.1  # of the largest load that a calibration has seen
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -30,7 +30,11 @@ def column_options(command: _F) -> _F:
             metavar="COLUMN",
             help="A sensor's column (repeatable): '6[bar]'.",
         ),
-        click.option("--force", metavar="COLUMN", help="The reference load's column: '7[N]', 'Load[kN]'."),
+        click.option(
+            "--force",
+            metavar="COLUMN",
+            help="The reference load's column: '7[N]', 'Load[kN]'; '-7[N]' where compression is negative.",
+        ),
         click.option(
             "--time",
             metavar="COLUMN",
@@ -54,15 +58,40 @@ def read_all(
         try:
             return read(file, time=time, force=force, sensors=list(sensors), unit=unit)
         except MissingChannelError:
+            if len(files) == 1:
+                raise
             # One of two logs of a test may hold the load only, or the reading only.
             half = read(file, time=time, force=force, sensors=list(sensors), unit=unit, partly=True)
-            if len(files) == 1 or bool(half.of_role("load")) == bool(half.sensors):
+            if bool(half.of_role("load")) == bool(half.sensors):
                 raise
             return half
 
     recordings = join_pairs([one(file) for file in files])
     show_notes(recordings)
+    say_what_strikes(recordings)
     return recordings
+
+
+def say_what_strikes(recordings: Sequence[Recording]) -> None:
+    """A warning on stderr for each load that looks negated, and for each signal that lacks much of its samples."""
+    from smartshoe.logs.columns import is_negative
+
+    for recording in recordings:
+        for channel in (*recording.of_role("load"), *recording.sensors):
+            share = 0.0 if channel.missing is None else float(channel.missing.mean())
+            if share > MISSING_SHARE:
+                click.echo(
+                    f"warning: {recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}: they are"
+                    " left out",
+                    err=True,
+                )
+            if channel.role == "load" and is_negative(channel):
+                low, high = channel.values.min(), channel.values.max()
+                click.echo(
+                    f"warning: the load of {recording.label} goes from {low:.4g} to {high:.4g} {channel.unit.symbol}:"
+                    " compression is positive here; if it is compression, turn it with --force '-COLUMN'",
+                    err=True,
+                )
 
 
 def units_of(choices: Sequence[str]) -> dict[str, str]:
@@ -81,15 +110,13 @@ def units_of(choices: Sequence[str]) -> dict[str, str]:
 def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
     """The recording with the named columns as the units' readings; raises `MissingChannelError` for one not there."""
     from smartshoe.errors import MissingChannelError
+    from smartshoe.logs.picks import listed
 
     for unit, column in columns.items():
         channel = recording.channels.get(column)
         if channel is None:
-            names = list(recording.channels)
-            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-            raise MissingChannelError(
-                f"{recording.label} has no column {column!r} for {unit}; it has {', '.join(names[:MOST_NAMES])}{more}"
-            )
+            names = listed(list(recording.channels))
+            raise MissingChannelError(f"{recording.label} has no column {column!r} for {unit}; it has {names}")
         recording = recording.without(column).with_channel(replace(channel, name=unit, role="sensor"))
     return recording
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from smartshoe.errors import InputError
 from smartshoe.logs.picks import Pick, names_a_column, need_quantity, need_unit, pick, titles, unit_in_file
 from smartshoe.logs.sheet import Column, Sheet
-from smartshoe.logs.times import check_increasing, time_of
+from smartshoe.logs.times import check_increasing, counts_rows, time_of
 from smartshoe.recording import (
     COMMAND_NAME,
     LOAD_NAME,
@@ -102,11 +102,13 @@ def _unique(names: list[str]) -> list[str]:
     return names
 
 
-def _compression_positive(load: Channel) -> Channel:
-    """The load with compression positive where a machine logged it negative."""
+def is_negative(load: Channel) -> bool:
+    """Whether the load goes far below zero and hardly above: compression, logged as negative."""
     values = load.values[load.present]
-    if values.size == 0 or not -values.min() > _NEGATIVE_SHARE * max(values.max(), 0.0):
-        return load
+    return bool(values.size and -values.min() > _NEGATIVE_SHARE * max(values.max(), 0.0))
+
+
+def _turned(load: Channel) -> Channel:
     turned = 0.0 - load.values
     turned.flags.writeable = False
     return replace(load, values=turned)
@@ -137,9 +139,12 @@ class _Assignment:
     roles: list[Role | None]
     notes: list[str]
     chosen: set[int] = field(default_factory=set)
+    is_turned: bool = False
 
     def choose_load(self, force: str) -> None:
-        """The reference load is the column that the user names."""
+        """The reference load is the column that the user names; a minus before it turns its sign."""
+        self.is_turned = force.startswith("-") and not names_a_column(self.sheet, force)
+        force = force[1:] if self.is_turned else force
         found = pick(self.sheet, force, "--force")
         in_unit = need_unit(self.sheet, found, "--force", "N")
         if in_unit.quantity == "pressure":
@@ -201,13 +206,19 @@ class _Assignment:
             channel = _channel(self.sheet, name, column, unit_, role, self.notes)
             if channel is None:
                 continue
-            if channel.role == "load" and column.role is None and self.sheet.format in _MACHINE_LOGS:
-                turned = _compression_positive(channel)
-                if turned is not channel:
-                    self.notes.append(f"Column {column.name} logs compression as negative load; its sign was turned.")
-                    channel = turned
+            if channel.role == "load":
+                channel = self._signed(channel, column)
             channels[channel.name] = channel
         return channels
+
+    def _signed(self, load: Channel, column: Column) -> Channel:
+        """The load with compression positive, as far as user or machine say that it is not."""
+        if self.is_turned:
+            return _turned(load)
+        if column.role is None and self.sheet.format in _MACHINE_LOGS and is_negative(load):
+            self.notes.append(f"Column {column.name} logs compression as negative load; its sign was turned.")
+            return _turned(load)
+        return load
 
 
 def _without_first_row(sheet: Sheet) -> Sheet:
@@ -238,7 +249,8 @@ def recording_from(
         raise InputError(f"{sheet.path} holds no samples below its header: give a file with data rows")
     sensors_chosen = bool(sensors)
     if partly:
-        time, force = (choice if choice and names_a_column(sheet, choice) else None for choice in (time, force))
+        time = time if time and (counts_rows(time) or names_a_column(sheet, time)) else None
+        force = force if force and names_a_column(sheet, force.removeprefix("-")) else None
         sensors = [choice for choice in sensors if names_a_column(sheet, choice)]
     units = [unit_in_file(column) for column in sheet.columns]
     at_time, time_s = time_of(sheet, units, time)
@@ -268,4 +280,4 @@ def recording_from(
     )
 
 
-__all__ = ["recording_from", "roles_of"]
+__all__ = ["is_negative", "recording_from", "roles_of"]

@@ -10,6 +10,7 @@ from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.logs.sheet import Column, Sheet
 from smartshoe.units import Unit, declared, find_unit
 
+MOST_NAMES = 10  # of columns in an error
 _CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
 
 
@@ -31,7 +32,13 @@ def unit_in_file(column: Column) -> Unit | None:
 
 def titles(sheet: Sheet) -> str:
     """The sheet's columns as a person reads them."""
-    return ", ".join(column.label or column.name or "''" for column in sheet.columns)
+    return listed([column.label or column.name or "''" for column in sheet.columns])
+
+
+def listed(names: Sequence[str]) -> str:
+    """The names, at most `MOST_NAMES` of them, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def _titled(columns: Sequence[Column], wanted: str) -> list[int]:

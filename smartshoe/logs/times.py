@@ -44,6 +44,12 @@ def time_of(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> t
     return counting, _complete(sheet, sheet.columns[counting]) / rate_hz
 
 
+def counts_rows(choice: str) -> bool:
+    """Whether a user's choice of time is the rows themselves, at a rate, and no column."""
+    at_rate = _AT_A_RATE.fullmatch(choice)
+    return at_rate is not None and at_rate["base"].casefold() in _ROWS
+
+
 def _time_column(sheet: Sheet, units: Sequence[Unit | None], choice: str | None) -> Pick:
     if choice is not None:
         return pick(sheet, choice, "--time")

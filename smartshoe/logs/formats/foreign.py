@@ -11,6 +11,7 @@ import numpy as np
 
 from smartshoe.errors import FormatError, InputError
 from smartshoe.gate import require_columns
+from smartshoe.logs.moments import is_moment, seconds_of
 from smartshoe.logs.numbers import is_missing, is_number, numbers_of
 from smartshoe.logs.sheet import Column, Format, Sheet
 from smartshoe.logs.text import even_rows, is_text, read_lines, split_cells
@@ -91,7 +92,8 @@ def _said(lines: Sequence[str], delimiter: str | None) -> dict[str, str]:
                 break
         else:
             key, value = f"line {number}", [text]
-        metadata[key.strip().rstrip(":")] = value[0].strip().strip(delimiter or "")
+        key, text = key.strip().rstrip(":"), value[0].strip().strip(delimiter or "")
+        metadata[key] = f"{metadata[key]}\n{text}" if key in metadata else text
     return metadata
 
 
@@ -122,7 +124,7 @@ def read(path: Path) -> Sheet:
     numbers = [number for number, _ in numbered]
     rows = even_rows(path, split_cells([line for _, line in numbered], delimiter), numbers, width)
 
-    has_header = any(not is_number(cell) and not is_missing(cell) for cell in rows[0])
+    has_header = any(not (is_number(cell) or is_missing(cell) or is_moment(cell)) for cell in rows[0])
     names, units = [str(index + 1) for index in range(width)], [""] * width
     labels = [""] * width
     if has_header:
@@ -136,19 +138,26 @@ def read(path: Path) -> Sheet:
     if not rows:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
 
-    kept = []
+    kept, clocks = [], {}
     for index in range(width):
         column = [row[index] for row in rows]
-        if any(map(is_number, column)) or all(map(is_missing, column)):
+        if is_moment(column[0]) and not is_number(column[0]):
+            clocks[index] = Column(
+                names[index], "s", seconds_of(path, names[index], column, numbers), label=labels[index]
+            )
+            said.setdefault(f"start of {names[index]}", column[0])
+        elif any(map(is_number, column)) or all(map(is_missing, column)):
             kept.append(index)
         else:
             notes.append(f"Column {names[index]} holds text and was left out.")
     if len(kept) < width:
         rows = [[row[index] for index in kept] for row in rows]
     table = numbers_of(path, [names[index] for index in kept], rows, numbers)
+    read_ = dict(zip(kept, table.columns, strict=True))
     columns = [
-        Column(names[index], units[index], values, label=labels[index])
-        for index, values in zip(kept, table.columns, strict=True)
+        clocks.get(index) or Column(names[index], units[index], read_[index], label=labels[index])
+        for index in range(width)
+        if index in clocks or index in read_
     ]
     return Sheet(
         path,
