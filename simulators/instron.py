@@ -18,6 +18,7 @@ from simulators.effects.room import Neighbour, Room
 from simulators.sensor import SimulatedHdiSensor
 from smartshoe.devices.base import ChannelDescription, Shoe, TestMachine
 from smartshoe.errors import LimitError
+from smartshoe.gate import limits
 from smartshoe.protocol import MachineLimits, Protocol
 from smartshoe.recording import Channel, Recording, Role
 from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
@@ -150,6 +151,13 @@ class SimulatedInstron(TestMachine):
         return tuple(described)
 
     def _check_internal(self, protocol: Protocol) -> None:
+        p, most = self.parameters, limits().samples
+        rate_hz = max(p.fine_rate_hz, p.bluehill_rate_hz, self.daq.parameters.sample_rate_hz)
+        if protocol.duration_s * rate_hz > most:
+            raise LimitError(
+                f"protocol {protocol.name} lasts {protocol.duration_s:g} s, at {rate_hz:g} Hz more than {most} samples:"
+                f" shorten it, or raise the limit with --limit samples={protocol.duration_s * rate_hz:.0f}"
+            )
         expected_pa = self.specimen.bladder.parameters.nominal_pressure_pa(protocol.peak_load_n)
         proof_pa = self.specimen.sensor.proof_pressure_pa
         if expected_pa > proof_pa:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from simulators import presets
 from simulators.bladder import X_OVER_NRT, BladderParameters
@@ -23,6 +23,7 @@ from simulators.instron import InstronParameters
 from simulators.profiles import Gait
 from simulators.sensor import HdiParameters
 from simulators.shoe import ShoeParameters
+from smartshoe.gate import limits
 
 MBAR_PA = 100.0
 
@@ -41,6 +42,12 @@ AbsoluteError = Annotated[
     PlainValidator(_absolute_error),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"const": "drawn"}]}),
 ]
+
+
+def _within_limits(duration_s: float) -> float:
+    if duration_s > limits().duration_s:
+        raise ValueError(f"give {limits().duration_s} s at most, or raise the limit with --limit duration_s=...")
+    return duration_s
 
 
 class _Options(BaseModel):
@@ -151,9 +158,9 @@ class ShoeOptions(_Options):
 
     side: Literal["left", "right", "both"] = "left"
     units: dict[str, UnitOptions] = Field(default_factory=dict)
-    sample_rate_hz: Annotated[float, Field(gt=0, le=2000)] = 200.0
-    duration_s: Positive = 60.0
-    block_samples: Annotated[int, Field(ge=1)] = 20
+    sample_rate_hz: Annotated[float, Field(ge=1, le=2000)] = 200.0
+    duration_s: Annotated[Positive, AfterValidator(_within_limits)] = 60.0
+    block_samples: Annotated[int, Field(ge=1, le=100_000)] = 20
     adc_bits: Annotated[int, Field(ge=4, le=24)] = 12
     clock_skew_ppm: Annotated[float, Field(ge=-1000, le=1000)] | None = None
     clock_offset_s: NotNegative | None = None

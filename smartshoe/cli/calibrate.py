@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from smartshoe.cli.ranges import FiniteRange
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
 @click.option("--yes", is_flag=True, help="Ask nothing: confirm every step, repeat what is faulty.")
 @click.option("--repeats", type=click.IntRange(min=0), default=2, show_default=True,
               help="How often a faulty experiment is pressed again.")  # fmt: skip
-@click.option("--wait", "wait_s", type=click.FloatRange(min=0.0), default=900.0, show_default=True, metavar="SECONDS",
+@click.option("--wait", "wait_s", type=FiniteRange(min=0.0), default=900.0, show_default=True, metavar="SECONDS",
               help="How long a log is waited for, beyond the test's duration.")  # fmt: skip
 @click.option("--diagnose/--no-diagnose", "diagnosed", default=True, show_default=True,
               help="Say what the model gets wrong.")  # fmt: skip
@@ -62,6 +64,7 @@ def command(
         folder = _begun(out_folder, resume, options)
         target = folder.path
     with folder:
+        _require_own_store(folder, options["store"])
         for note in folder.notes:
             click.echo(f"note: {folder.path}: {note}", err=True)
         if replay is None:
@@ -97,6 +100,15 @@ def command(
         click.echo(f"{name}: {path}")
 
 
+def _require_own_store(folder: SessionFolder, store: str | None) -> None:
+    """A session folder may come from anybody: it never makes a store where there is none, nor a calibration in it."""
+    named = folder.plan.store
+    if store is not None and store != named:
+        folder.plan = replace(folder.plan, store=store)
+    elif store is None and named is not None and not Path(named).is_dir():
+        raise UsageError(f"{folder.path} names the store {named}, which is not there: say with --store which to use")
+
+
 def _replayed(replay: str, resume: str | None, options: dict[str, Any]) -> SessionFolder:
     from smartshoe.session import SessionFolder
 
@@ -107,6 +119,7 @@ def _replayed(replay: str, resume: str | None, options: dict[str, Any]) -> Sessi
 
 
 def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) -> SessionFolder:
+    from smartshoe.atomic import make_folder
     from smartshoe.session import SessionFolder
 
     if resume is None:
@@ -115,7 +128,10 @@ def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) 
                 raise UsageError(f"--{name} is missing: give --shoe, --machine, --protocol, --unit and --out")
         if out_folder is None:
             raise UsageError("--out is missing: give a new folder for the session's data and results")
-        return SessionFolder.begin(out_folder, _plan(options))
+        folder = SessionFolder.begin(out_folder, _plan(options))
+        if options["store"] is not None:
+            make_folder(options["store"])  # what cannot be written to is told before anything is pressed
+        return folder
     given = [name for name in ("shoe", "machine", "unit", "protocols") if options[name]]
     if given or out_folder is not None:
         name = "out" if out_folder is not None else given[0].removesuffix("s")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from smartshoe.cli.ranges import FiniteRange
+
 if TYPE_CHECKING:
     from smartshoe.field import Finding
     from smartshoe.field.examination import Examination
@@ -20,11 +22,11 @@ if TYPE_CHECKING:
     "--calibration", "calibration_paths", multiple=True, metavar="C.json", help="Of a unit, or a folder (repeatable)."
 )
 @click.option(
-    "--body-weight", "body_weight_n", type=click.FloatRange(min=0.0, min_open=True), metavar="N",
+    "--body-weight", "body_weight_n", type=FiniteRange(min=0.0, min_open=True), metavar="N",
     help="Check the mean total force against it.",
 )  # fmt: skip
 @click.option(
-    "--coverage", type=click.FloatRange(0.0, 1.0, min_open=True), default=1.0, show_default=True, metavar="SHARE",
+    "--coverage", type=FiniteRange(0.0, 1.0, min_open=True), default=1.0, show_default=True, metavar="SHARE",
     help="The share of the load that passes through the units.",
 )  # fmt: skip
 @click.option("--time", metavar="COLUMN", help="The time column, by name or 1-based number: '1[ms]'.")

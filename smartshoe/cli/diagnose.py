@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from smartshoe.cli.inputs import column_options, read_all
 from smartshoe.cli.output import figures_option
+from smartshoe.cli.ranges import FiniteRange
 
 if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--material",
-    type=click.FloatRange(min=0.0, max=50.0, min_open=True),
+    type=FiniteRange(min=0.0, max=50.0, min_open=True),
     default=0.02,
     show_default=True,
     metavar="PERCENT",
@@ -79,7 +79,7 @@ def command(
         raise UsageError("diagnose needs FILES: name one experiment at least, or ask --design SCENARIO.toml")
     if figures is not None and out_folder is None:
         raise UsageError("--figures writes into --out DIR: give --out as well")
-    _check(files, held_out, material)
+    _check(files, held_out)
     recordings = read_all(files, unit=unit, **columns)
     others = read_all(held_out, unit=unit, **columns) if held_out else []
     folder = make_folder(out_folder) if out_folder is not None else None
@@ -122,11 +122,9 @@ def _design(path: str, json_path: str | None) -> None:
         print_design(found)
 
 
-def _check(files: tuple[str, ...], held_out: tuple[str, ...], material: float) -> None:
+def _check(files: tuple[str, ...], held_out: tuple[str, ...]) -> None:
     from smartshoe.errors import UsageError
 
-    if not math.isfinite(material):
-        raise UsageError(f"--material is {material:g}: give a number of percent, for example 0.02")
     fitted = {Path(file).resolve() for file in files}
     for file in held_out:
         if Path(file).resolve() in fitted:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from smartshoe.cli.ranges import FiniteRange
 from smartshoe.errors import UsageError
 
 LONG_S = 4 * 3600.0  # of a simulated walk, where its address does not say
@@ -21,7 +22,7 @@ LONG_S = 4 * 3600.0  # of a simulated walk, where its address does not say
 @click.option("--host", metavar="HOST", help="Serve beyond this computer, at this address; needs --token.")
 @click.option("--token", metavar="TOKEN", help="The word that every request must bring; needs --host.")
 @click.option("--record", metavar="FILE", help="Record from the start to a new plain table.")
-@click.option("--speed", type=click.FloatRange(0.01, 1000.0), default=1.0, show_default=True,
+@click.option("--speed", type=FiniteRange(0.01, 1000.0), default=1.0, show_default=True,
               help="How fast a replayed or simulated shoe goes.")  # fmt: skip
 @click.option("--lsl", is_flag=True, help="Send the samples to the Lab Streaming Layer too (extra lsl).")
 def command(

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from smartshoe.cli.ranges import FiniteRange
+
 if TYPE_CHECKING:
     from smartshoe.devices.base import Shoe
     from smartshoe.session.streaming import Forces
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--shoe", "url", required=True, metavar="URL", help="serial:///dev/rfcomm0, replay:FILE, sim:walk.")
 @click.option("--calibration", "calibrations", multiple=True, metavar="C.json",
               help="A unit's calibration: its force is shown and written (repeatable).")  # fmt: skip
-@click.option("--duration", "duration_s", type=click.FloatRange(min=0.0, min_open=True), metavar="S",
+@click.option("--duration", "duration_s", type=FiniteRange(min=0.0, min_open=True), metavar="S",
               help="Stop after this long (default: the stream's end, or Ctrl-C).")  # fmt: skip
 @click.option("--out", metavar="FILE", help="Write every sample to a new plain table.")
 def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, out: str | None) -> None:

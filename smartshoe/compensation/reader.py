@@ -58,6 +58,8 @@ class Reader:
         value = self._get(found, key, above)
         if not isinstance(value, str):
             raise self.fault(above + key, f"is {value!r}, not a text")
+        if not value.isprintable():
+            raise self.fault(above + key, f"is {value!r}, which cannot be printed")
         return value
 
     def mapping(self, found: Mapping[str, Any], key: str, above: str = "") -> Mapping[str, Any]:

@@ -18,8 +18,9 @@ class Limits:
 
     ``values`` are samples times channels of one file; ``expansion`` is how many times larger than its file the
     content of a compressed one may be (what unpacks to less than `FREELY_UNPACKED` bytes is not asked).
-    ``json_bytes`` and ``json_depth`` hold for calibrations, plans, events and indices. ``duration_s``, ``samples``
-    and ``segments`` are those of a protocol or a simulated trial.
+    ``json_bytes`` and ``json_depth`` hold for calibrations, plans, events and indices. ``segments`` are those of a
+    protocol, ``duration_s`` is its time or a simulated stream's. ``samples`` are those that a simulated pressing
+    computes at its fine step, about 170 bytes each; ``cases`` those of a sweep.
     """
 
     file_bytes: int = 4 << 30
@@ -29,8 +30,9 @@ class Limits:
     json_bytes: int = 64 << 20
     json_depth: int = 100
     duration_s: int = 7 * 24 * 3600
-    samples: int = 50_000_000
+    samples: int = 5_000_000
     segments: int = 100_000
+    cases: int = 1_000_000
 
 
 FREELY_UNPACKED = 32 << 20

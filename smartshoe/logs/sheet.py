@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
+from unicodedata import category
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,10 +85,20 @@ class Format:
     is_text: bool = False
 
 
+def printable(text: str) -> str:
+    """``text`` with blanks for what breaks a line, and an escape for what else a terminal would obey."""
+    if text.isprintable():
+        return text
+    return "".join(
+        letter if category(letter) != "Cc" else " " if letter.isspace() else repr(letter)[1:-1] for letter in text
+    )
+
+
 def require_sound(sheet: Sheet) -> None:
     """Raise `FormatError` or `InputError` where a reader's sheet is not what `Sheet` promises.
 
-    A file may store anything where names, units, roles and numbers belong, and a reader may come from elsewhere.
+    A file may store anything where names, units, roles and numbers belong, and a reader may come from elsewhere. Its
+    texts are printable from here on: they go to terminals.
     """
     require_columns(sheet.path, len(sheet.columns))
     require_values(sheet.path, sum(np.size(column.values) for column in sheet.columns))
@@ -115,3 +126,10 @@ def require_sound(sheet: Sheet) -> None:
     if not all(isinstance(text, str) for text in texts):
         wrong = next(text for text in texts if not isinstance(text, str))
         raise FormatError(f"{sheet.path} holds {wrong!r} where a text belongs: write the file again")
+    sheet.metadata = {printable(key): printable(value) for key, value in sheet.metadata.items()}
+    sheet.notes = [printable(note) for note in sheet.notes]
+    sheet.recording_name, sheet.unit_name = (
+        None if name is None else printable(name) for name in (sheet.recording_name, sheet.unit_name)
+    )
+    for column in sheet.columns:
+        column.name, column.unit, column.label = printable(column.name), printable(column.unit), printable(column.label)

@@ -107,6 +107,8 @@ class CalibrationStore:
         """From ``date`` on the unit sits at ``position`` ("left_toe"); whichever sat there has left."""
         if not position.strip():
             raise UsageError("no position is given: name where the unit sits, for example left_toe")
+        if not position.isprintable():
+            raise UsageError(f"position {position!r} holds what cannot be printed: name it like left_toe")
         return self._happened("placed", serial_number, date, position, note)
 
     def repair(self, serial_number: str, date: When, note: str = "") -> Event:

@@ -35,6 +35,8 @@ def folder_name(serial_number: str) -> str:
     """
     if not serial_number.strip():
         raise UsageError("the calibration has no serial number: give one with --serial-number, as on the unit's label")
+    if not serial_number.isprintable():
+        raise UsageError(f"serial number {serial_number!r} holds what cannot be printed: write it as on the label")
     if len(serial_number) > LONGEST_SERIAL:
         raise UsageError(f"serial number {serial_number[:20]}... is longer than {LONGEST_SERIAL} letters: shorten it")
     quoted = quote(serial_number, safe="")

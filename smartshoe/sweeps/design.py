@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import ScenarioError
+from smartshoe.gate import limits
 
 Path = tuple[str | int, ...]
 Refuse = Callable[[Path, str], ScenarioError]
@@ -105,10 +106,13 @@ def design_of(table: Any, scenario_seed: int, refuse: Refuse) -> Design:
                     ("sweep", "vary", axis.key),
                     'a range is drawn from in a random design only: list the values, or give design = "random"',
                 )
-        return Design(axes, seeds, "grid", math.prod(len(axis.values) for axis in axes), 0)
+        count = math.prod(len(axis.values) for axis in axes)
+        _bounded(count * len(seeds), ("sweep", "vary"), refuse)
+        return Design(axes, seeds, "grid", count, 0)
     if not axes:
         raise refuse(("sweep", "vary"), "a random design needs keys to draw: add them")
-    count = _whole(table.get("count"), ("sweep", "count"), 1, refuse)
+    count = _counted(table.get("count"), ("sweep", "count"), refuse)
+    _bounded(count * len(seeds), ("sweep", "count"), refuse)
     return Design(axes, seeds, "random", count, _whole(table.get("draw", 0), ("sweep", "draw"), 0, refuse))
 
 
@@ -118,12 +122,22 @@ def _whole(given: Any, path: Path, least: int, refuse: Refuse) -> int:
     return given
 
 
+def _counted(given: Any, path: Path, refuse: Refuse) -> int:
+    return _bounded(_whole(given, path, 1, refuse), path, refuse)
+
+
+def _bounded(count: int, path: Path, refuse: Refuse) -> int:
+    if count > limits().cases:
+        raise refuse(path, f"more than {limits().cases} cases: give fewer, or raise the limit with --limit cases=N")
+    return count
+
+
 def _seeds(given: Any, refuse: Refuse) -> tuple[int, ...]:
     path: Path = ("sweep", "seeds")
     if isinstance(given, dict):
         if set(given) != {"from", "count"}:
             raise refuse(path, f"give a list, or {{from = 0, count = 100}} (it is {given!r})")
-        first, count = _whole(given["from"], path, 0, refuse), _whole(given["count"], path, 1, refuse)
+        first, count = _whole(given["from"], path, 0, refuse), _counted(given["count"], path, refuse)
         return tuple(range(first, first + count))
     if not isinstance(given, list) or not given:
         raise refuse(path, f"give a list of whole numbers, or {{from = 0, count = 100}} (it is {given!r})")
@@ -172,7 +186,7 @@ def _number(given: Any) -> bool:
 def _spaced(given: Mapping[str, Any], path: Path, refuse: Refuse) -> tuple[Any, ...]:
     """``count`` values from ``from`` to ``to``, evenly; whole numbers stay whole where the step is."""
     first, last = given["from"], given["to"]
-    count = _whole(given["count"], path, 1, refuse)
+    count = _counted(given["count"], path, refuse)
     if not (_number(first) and _number(last)):
         raise refuse(path, f"from and to must be numbers (they are {first!r} and {last!r})")
     if count == 1 and first != last:

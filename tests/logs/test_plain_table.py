@@ -15,7 +15,7 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.units import unit
 
 finite = st.floats(-1e30, 1e30)  # beyond it a number is no measurement and is refused
-texts = st.text(st.characters(codec="utf-8", exclude_categories=("Cs",)), max_size=12)
+texts = st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc")), max_size=12)  # a terminal obeys Cc
 keys = texts.filter(lambda key: key not in ("name", "unit", "note") and not key.startswith("role "))
 names = st.text(string.ascii_lowercase, min_size=1, max_size=6)
 

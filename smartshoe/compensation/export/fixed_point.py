@@ -87,7 +87,10 @@ class FixedPoint:
         most = 2**width - 1
         input_lsb = _power_of_two(HEADROOM[fixed] * reading / most)
         output_lsb = _power_of_two(HEADROOM[fixed] * load_n / most)
-        tried = (cls._at(model, width, input_lsb, output_lsb, fraction) for fraction in range(PRODUCT_BITS - width))
+        try:
+            tried = [cls._at(model, width, input_lsb, output_lsb, fraction) for fraction in range(PRODUCT_BITS - width)]
+        except OverflowError:  # a coefficient near the end of float64
+            tried = []
         found = min((one for one in tried if one is not None), key=lambda one: one.rounding_n, default=None)
         if found is None or not found.error_bound_n <= WORST_SHARE * load_n:
             says = "" if found is None else f", the error would be up to {found.error_bound_n:.3g} N"
