@@ -32,7 +32,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 ROUNDS = 6
-FEW_STEPS = 6  # of a fit that only has to be compared with others
+ROUND_STEPS = 6  # of a fit that is linearised anew anyway
+FEW_STEPS = 4  # of a fit that only has to be compared with others
 RIVALS = 2
 
 
@@ -189,7 +190,7 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
         likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = min(
-            (fit(likelihood, _with(state.given, one, state.fit.model), FEW_STEPS) for one in _promising(state)),
+            (fit(likelihood, _with(state.given, one, state.fit.model), ROUND_STEPS) for one in _promising(state)),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
         state = _State(*_searched(found.model, sessions, thresholds), found)
