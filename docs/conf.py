@@ -30,6 +30,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
     "commands",
+    "stored",
 ]
 exclude_patterns = ["examples", "**/sg_execution_times.rst", "sg_execution_times.rst"]
 default_role = "py:obj"
