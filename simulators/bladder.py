@@ -33,11 +33,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.bounds import STRICT_KEYS, Finite, NotNegative, Positive
-from simulators.effects.contact import Contact
-from simulators.effects.damage import PermanentSet
-from simulators.effects.friction import BoucWen, StickSlip
+from simulators.effects.contact import ContactParameters
+from simulators.effects.damage import PermanentSetParameters
+from simulators.effects.friction import BoucWenParameters, StickSlipParameters
 from simulators.effects.outside import Odd
-from simulators.effects.relaxation import PowerLawCreep, SecondRelaxation
+from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
 from smartshoe.devices.base import Bladder
 from smartshoe.errors import UsageError
 
@@ -53,7 +53,7 @@ BESSEL_ZEROS = np.array([2.404826, 5.520078, 8.653728, 11.791534, 14.930918, 18.
 
 
 @dataclass(frozen=True, slots=True)
-class Hysteresis:
+class HysteresisParameters:
     """Rate-independent friction of wall and contact (`simulators.preisach`).
 
     ``strength`` is half of the major loop's greatest height, as a fraction of full-scale load; the relays' half width
@@ -68,7 +68,7 @@ class Hysteresis:
 
 
 @dataclass(frozen=True, slots=True)
-class Leak:
+class LeakParameters:
     """Air that leaves the tube: ``linear_per_s`` at p/p0 each, ``orifice_per_s`` at sqrt(p/p0) (turbulent).
 
     Or by compressible flow: ``capillary_per_s`` through a narrow channel (Poiseuille, ((1 + p)^2 - 1)/2 for p/p0),
@@ -83,7 +83,7 @@ class Leak:
 
 
 @dataclass(frozen=True, slots=True)
-class GasHeat:
+class GasHeatParameters:
     """Heat of compression that has not yet left the air: ``fraction`` of the adiabatic rise, ``time_constant_s``.
 
     ``modes`` above one conduct it away through a cylinder of air: Fourier's series with the Bessel function's zeros
@@ -103,7 +103,7 @@ class GasHeat:
 
 
 @dataclass(frozen=True, slots=True)
-class Temperature:
+class TemperatureParameters:
     """Temperature of the sealed air above that of the reset: a drift, and a warming that settles."""
 
     __pydantic_config__ = STRICT_KEYS
@@ -113,7 +113,7 @@ class Temperature:
 
 
 @dataclass(frozen=True, slots=True)
-class Softening:
+class SofteningParameters:
     """Mullins softening (after Ogden and Roxburgh 1999): below the largest deformation so far the wall is softer.
 
     The loading that sets a new maximum follows the virgin curve. k1 is multiplied by 1 - ``strength``
@@ -126,7 +126,7 @@ class Softening:
 
 
 @dataclass(frozen=True, slots=True)
-class Conditioning:
+class ConditioningParameters:
     """Gain that settles over load cycles: 1 + ``gain`` (1 - exp(-n/``cycles``)), n the cycles completed."""
 
     __pydantic_config__ = STRICT_KEYS
@@ -154,19 +154,19 @@ class BladderParameters:
     gas: Literal["linear", "boyle"] = "linear"
     static_exponent: Annotated[float, Field(gt=0.2, lt=5)] = 1.0
     wall_hardening: Annotated[float, Field(gt=-0.3, lt=10)] = 0.0
-    hysteresis: Hysteresis = field(default_factory=Hysteresis)
-    leak: Leak = field(default_factory=Leak)
-    gas_heat: GasHeat = field(default_factory=GasHeat)
-    temperature: Temperature = field(default_factory=Temperature)
-    softening: Softening = field(default_factory=Softening)
-    conditioning: Conditioning = field(default_factory=Conditioning)
+    hysteresis: HysteresisParameters = field(default_factory=HysteresisParameters)
+    leak: LeakParameters = field(default_factory=LeakParameters)
+    gas_heat: GasHeatParameters = field(default_factory=GasHeatParameters)
+    temperature: TemperatureParameters = field(default_factory=TemperatureParameters)
+    softening: SofteningParameters = field(default_factory=SofteningParameters)
+    conditioning: ConditioningParameters = field(default_factory=ConditioningParameters)
     wall_stiffening: Annotated[float, Field(ge=0, le=6)] = 0.0
-    second_relaxation: SecondRelaxation = field(default_factory=SecondRelaxation)
-    power_law_creep: PowerLawCreep = field(default_factory=PowerLawCreep)
-    stick_slip: StickSlip = field(default_factory=StickSlip)
-    bouc_wen: BoucWen = field(default_factory=BoucWen)
-    permanent_set: PermanentSet = field(default_factory=PermanentSet)
-    contact: Contact = field(default_factory=Contact)
+    second_relaxation: SecondRelaxationParameters = field(default_factory=SecondRelaxationParameters)
+    power_law_creep: PowerLawCreepParameters = field(default_factory=PowerLawCreepParameters)
+    stick_slip: StickSlipParameters = field(default_factory=StickSlipParameters)
+    bouc_wen: BoucWenParameters = field(default_factory=BoucWenParameters)
+    permanent_set: PermanentSetParameters = field(default_factory=PermanentSetParameters)
+    contact: ContactParameters = field(default_factory=ContactParameters)
     odd: Odd = field(default_factory=Odd)
 
     @property

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from simulators.bladder import TUBE_DIAMETER_M, SimulatedBladder
 from simulators.daq import MyRioParameters, SimulatedMyRio, sampled
-from simulators.effects.room import Neighbour, Room
+from simulators.effects.room import NeighbourUnit, Room
 from simulators.sensor import SimulatedHdiSensor
 from smartshoe.devices.base import ChannelDescription, Shoe, TestMachine
 from smartshoe.errors import LimitError
@@ -58,7 +58,7 @@ class InstronParameters:
     bluehill_clock_offset_s: float = 0.35
     load_cell_tare_n: float = 0.0
     room: Room = field(default_factory=Room)
-    neighbour: Neighbour = field(default_factory=Neighbour)
+    neighbour: NeighbourUnit = field(default_factory=NeighbourUnit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,9 @@ from simulators.bladder import X_OVER_NRT, BladderParameters
 from simulators.bounds import Finite, NotNegative, Positive
 from simulators.daq import LARGEST_ERROR_V, MyRioParameters
 from simulators.effects.logging import ReadingChannel
-from simulators.effects.outside import Wander
-from simulators.effects.room import Neighbour, Room
-from simulators.effects.sensing import Curve, Drift, Limit, Noise
+from simulators.effects.outside import SensorOddities
+from simulators.effects.room import NeighbourUnit, Room
+from simulators.effects.sensing import Curve, Limit, Noise, OutputDrift
 from simulators.gait.person import BODY_WEIGHT_N
 from simulators.instron import InstronParameters
 from simulators.profiles import Gait
@@ -67,10 +67,10 @@ class SensorOptions(_Options):
     bidirectional: bool = False
     second_lag_s: NotNegative = 0.0
     curve: Curve = Curve()
-    drift: Drift = Drift()
+    drift: OutputDrift = OutputDrift()
     limit: Limit = Limit()
     noise: Noise = Noise()
-    wander: Wander = Wander()
+    wander: SensorOddities = SensorOddities()
 
     def parameters(self) -> HdiParameters:
         """The same in SI."""
@@ -127,7 +127,7 @@ class MachineOptions(_Options):
     bluehill_clock_offset_s: NotNegative = 0.35
     load_cell_tare_n: Finite = 0.0
     room: Room = Room()
-    neighbour: Neighbour = Neighbour()
+    neighbour: NeighbourUnit = NeighbourUnit()
 
     def parameters(self) -> InstronParameters:
         """The machine's own part."""

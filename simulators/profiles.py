@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simulators.gait.person import BODY_WEIGHT_N, Activity, Part, Person, Run, Stand, Tiptoe, Walk
-from simulators.gait.plan import Plan, plan
+from simulators.gait.plan import GaitPlan, plan
 from simulators.gait.shape import Outside
 from simulators.gait.speed import WALK_RATIO_M_MIN
 
@@ -64,7 +64,7 @@ class Gait:
             self.turning,
         )
 
-    def plan(self, profile: str, duration_s: float, rng: np.random.Generator) -> Plan:
+    def plan(self, profile: str, duration_s: float, rng: np.random.Generator) -> GaitPlan:
         """The plan of ``duration_s``; raises `UsageError` for what nobody can do."""
         return plan(
             self.person,

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.effects.outside import Wander
-from simulators.effects.sensing import Curve, Drift, Limit, Noise
+from simulators.effects.outside import SensorOddities
+from simulators.effects.sensing import Curve, Limit, Noise, OutputDrift
 from smartshoe.devices.base import ChannelDescription, Sensor
 from smartshoe.units import VOLT
 
@@ -41,10 +41,10 @@ class HdiParameters:
     bidirectional: bool = False
     second_lag_s: float = 0.0
     curve: Curve = field(default_factory=Curve)
-    drift: Drift = field(default_factory=Drift)
+    drift: OutputDrift = field(default_factory=OutputDrift)
     limit: Limit = field(default_factory=Limit)
     noise: Noise = field(default_factory=Noise)
-    wander: Wander = field(default_factory=Wander)
+    wander: SensorOddities = field(default_factory=SensorOddities)
 
     @property
     def unloaded_v(self) -> float:

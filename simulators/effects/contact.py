@@ -25,7 +25,7 @@ RATE_EXPONENT = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class ContactParameters:
     """What stands between the plate and the tube; every effect is off by default.
 
     ``saturation`` is full-scale load over F0. ``gap_n`` is the load at which the windings touch on average, spread
@@ -54,7 +54,9 @@ class ContactState:
     turned: Array = field(default_factory=lambda: np.zeros(0))
 
 
-def through_contact(contact: Contact, load_n: Array, rate_hz: float, full_scale_n: float, state: ContactState) -> Array:
+def through_contact(
+    contact: ContactParameters, load_n: Array, rate_hz: float, full_scale_n: float, state: ContactState
+) -> Array:
     """The load (n,) in N that reaches the tube, from the plate's (n,) at ``rate_hz``; ``state`` carries on."""
     acting = load_n
     if contact.gap_n > 0:

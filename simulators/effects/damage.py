@@ -15,7 +15,7 @@ from simulators.bounds import STRICT_KEYS
 
 
 @dataclass(frozen=True, slots=True)
-class PermanentSet:
+class PermanentSetParameters:
     """``rate_per_s`` is the set gained in a second of full-scale load, in units of the full-scale deformation."""
 
     __pydantic_config__ = STRICT_KEYS

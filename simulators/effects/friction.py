@@ -24,7 +24,7 @@ SlipShare = Annotated[float, Field(gt=1e-3, lt=1)]
 
 
 @dataclass(frozen=True, slots=True)
-class StickSlip:
+class StickSlipParameters:
     """Sliders that together hold ``strength`` of full-scale load once all slip.
 
     They begin to slip between ``first_slip`` and ``last_slip`` of the full-scale deformation after a reversal.
@@ -45,7 +45,7 @@ class StickSlip:
 
 
 @dataclass(frozen=True, slots=True)
-class BoucWen:
+class BoucWenParameters:
     """Friction up to ``strength`` of full-scale load, reached over about ``width`` of the full-scale deformation.
 
     ``gamma`` and beta = 1 - gamma part what slows the slide from what the reversal adds; passive up to a half.

@@ -114,7 +114,7 @@ def strike(odd: Odd, load_n: Array, rate_hz: float, full_scale_n: float, state: 
 
 
 @dataclass(frozen=True, slots=True)
-class Wander:
+class SensorOddities:
     """Oddities of the sensor, in percent of reading (gain) or of its range (zero), by the session's own clock."""
 
     __pydantic_config__ = STRICT_KEYS

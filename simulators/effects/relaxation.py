@@ -25,7 +25,7 @@ SHORTEST_S, LONGEST_S = 5e-3, 1e5
 
 
 @dataclass(frozen=True, slots=True)
-class SecondRelaxation:
+class SecondRelaxationParameters:
     """A second arm of stiffness ``k3`` in N/m.
 
     ``eyring_width`` is the strain, in units of the full-scale deformation, at which its dashpot begins to thin.
@@ -38,7 +38,7 @@ class SecondRelaxation:
 
 
 @dataclass(frozen=True, slots=True)
-class PowerLawCreep:
+class PowerLawCreepParameters:
     """A spring-pot: relaxation modulus ``stiffness`` (t/1 s)^-``exponent`` in N/m."""
 
     __pydantic_config__ = STRICT_KEYS

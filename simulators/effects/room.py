@@ -36,7 +36,7 @@ class Room:
 
 
 @dataclass(frozen=True, slots=True)
-class Neighbour:
+class NeighbourUnit:
     """A second unit whose load has nothing to do with the machine's, logged as ``neighbour``.
 
     Its pressure comes and goes in pushes of random size about ``period_s`` apart, the largest to ``highest_mbar``.

@@ -46,7 +46,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Drift:
+class OutputDrift:
     """Gain that grows by ``gain_percent_per_s``, and what the room's temperature does to gain and zero.
 
     ``warm_up_percent`` of the range is added once the sensor has warmed, within about ``warm_up_time_constant_s``.

@@ -8,14 +8,14 @@
 
 from simulators.gait.events import TrueEvent
 from simulators.gait.person import Person, Run, Stand, Tiptoe, Walk, move_at
-from simulators.gait.plan import Plan, plan
+from simulators.gait.plan import GaitPlan, plan
 from simulators.gait.plates import Measured, measured
 from simulators.gait.trial import Trial, blocks, trial
 
 __all__ = [
     "Measured",
     "Person",
-    "Plan",
+    "GaitPlan",
     "Run",
     "Stand",
     "Tiptoe",

@@ -20,7 +20,7 @@ from simulators.gait.moving import contacts, steps
 from simulators.gait.person import Activity, Move, Part, Person, Stand, Tiptoe
 from simulators.gait.shape import COLUMNS, COVERAGE, Outside
 from simulators.gait.stances import Stances
-from simulators.gait.standing import Lift, Standing, Sway
+from simulators.gait.standing import Lift, StandingStay, Sway
 from smartshoe.errors import UsageError
 
 Array = NDArray[np.float64]
@@ -34,13 +34,13 @@ LATE_BEGIN_S, LATE_END_S = 0.10, 0.45  # what a stance from or to standing lasts
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class GaitPlan:
     """What both feet do over ``duration_s``: contacts by chain, (left, right) each, and stays on both feet."""
 
     person: Person
     duration_s: float
     chains: tuple[tuple[Stances, Stances], ...]
-    stays: tuple[Standing, ...]
+    stays: tuple[StandingStay, ...]
 
     def loads_n(self, time_s: Array) -> Array:
         """True loads (n, 2, 5) in N at the increasing times (n,): left and right, columns as in `COLUMNS`."""
@@ -80,7 +80,7 @@ def plan(
     coverage: float = COVERAGE,
     outside: Outside = "midfoot",
     first_contact_s: float = 0.5,
-) -> Plan:
+) -> GaitPlan:
     """The plan of a trial that begins in the air and touches down at ``first_contact_s``.
 
     ``activity`` is one activity, or a sequence of (activity, seconds). ``coverage`` is the share of each activity's
@@ -91,7 +91,7 @@ def plan(
     parts, whole_s = parts_of(activity, duration_s)
     groups = [(moving, list(some)) for moving, some in groupby(parts, key=lambda part: isinstance(part[0], Move))]
     chains: list[tuple[Stances, Stances]] = []
-    stays: list[Standing] = []
+    stays: list[StandingStay] = []
     never = np.full((2, 2), np.inf)
     comes_s = np.array([[0.0, STEP_ON_S], [STEP_ON_APART_S, STEP_ON_APART_S + STEP_ON_S]]) + first_contact_s
     now = 0.0
@@ -106,7 +106,7 @@ def plan(
             chain, comes_s = _chain(person, some, begin_s, number > 0, not last, coverage, outside, rng)
             chains.append(chain)
         now = end_s
-    return Plan(person, whole_s, tuple(chains), tuple(stays))
+    return GaitPlan(person, whole_s, tuple(chains), tuple(stays))
 
 
 def _stay(
@@ -117,7 +117,7 @@ def _stay(
     leaves_s: Array,
     coverage: float,
     rng: np.random.Generator,
-) -> Standing:
+) -> StandingStay:
     sways = (Sway.drawn(rng), Sway.drawn(rng))
     lifts: list[Lift] = []
     sway_cv = next((a.sway_cv for a, _ in parts if isinstance(a, Stand)), Stand().sway_cv)
@@ -132,7 +132,7 @@ def _stay(
                 )
             lifts.append(Lift(up_s, down_s, activity.rise_s, activity.sway_cv))
         now += seconds
-    return Standing(person, coverage, sway_cv, sways, tuple(lifts), comes_s, leaves_s)
+    return StandingStay(person, coverage, sway_cv, sways, tuple(lifts), comes_s, leaves_s)
 
 
 def _chain(

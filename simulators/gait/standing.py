@@ -80,7 +80,7 @@ class Lift:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class StandingStay:
     """A stay on both feet. Left and right each come down within ``on_s`` (2, 2) and leave within ``off_s`` (2, 2)."""
 
     person: Person

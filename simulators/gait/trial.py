@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simulators.gait.events import TrueEvent, events_of
 from simulators.gait.person import Activity, Part, Person, Walk
-from simulators.gait.plan import FEET, Plan, plan
+from simulators.gait.plan import FEET, GaitPlan, plan
 from simulators.gait.plates import Measured
 from simulators.gait.shape import COVERAGE, Outside
 from smartshoe.errors import UsageError
@@ -97,7 +97,7 @@ def blocks(  # noqa: PLR0913 - a public verb
         raise UsageError(f"sample_rate_hz is {sample_rate_hz:g}: give a rate above 0 Hz")
     rng = rng if rng is not None else np.random.default_rng(0)
     plan_rng, unit_rng, noise_rng = rng.spawn(3)
-    made: Plan | Measured
+    made: GaitPlan | Measured
     if isinstance(activity, Measured):
         made, coverage = activity, activity.coverage
     else:
@@ -167,4 +167,4 @@ def _drifting(
     return given
 
 
-__all__ = ["Plan", "Trial", "blocks", "trial"]
+__all__ = ["GaitPlan", "Trial", "blocks", "trial"]

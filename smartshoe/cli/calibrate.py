@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from smartshoe.devices.base import Block
-    from smartshoe.session import Plan, SessionFolder
+    from smartshoe.session import SessionFolder, SessionPlan
     from smartshoe.session.checks import PressingFault
 
 
@@ -139,17 +139,17 @@ def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) 
     return SessionFolder.resume(resume)
 
 
-def _plan(options: dict[str, Any]) -> Plan:
+def _plan(options: dict[str, Any]) -> SessionPlan:
     import datetime
 
     import smartshoe
-    from smartshoe.session import Plan, protocols_named
+    from smartshoe.session import SessionPlan, protocols_named
 
     if options["store"] is not None and not options["serial_number"]:
         raise UsageError("--store needs --serial-number: the store keeps units by their serial number")
     if options["valid_for_days"] is not None and not options["serial_number"]:
         raise UsageError("--valid-for-days needs --serial-number: the store keeps units by their serial number")
-    return Plan(
+    return SessionPlan(
         shoe=options["shoe"],
         machine=options["machine"],
         unit=options["unit"],

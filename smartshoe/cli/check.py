@@ -9,7 +9,7 @@ import click
 from smartshoe.cli.ranges import FiniteRange
 
 if TYPE_CHECKING:
-    from smartshoe.field import Finding
+    from smartshoe.field import CheckResult
     from smartshoe.field.examination import Examination
 
 
@@ -71,7 +71,7 @@ def _print(found: Examination) -> None:
 
     table = table_of(f"{found.name}: {found.verdict}", ["check", "unit", "verdict"])
     table.add_column("what is found", justify="left")
-    well: dict[str, list[Finding]] = {}
+    well: dict[str, list[CheckResult]] = {}
     for finding in found.findings:
         if finding.verdict == "ok":
             well.setdefault(finding.kind, []).append(finding)

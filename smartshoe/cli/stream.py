@@ -16,7 +16,7 @@ from smartshoe.cli.ranges import FiniteRange
 
 if TYPE_CHECKING:
     from smartshoe.devices.base import Shoe
-    from smartshoe.session.streaming import Forces
+    from smartshoe.session.streaming import StreamedForces
 
 
 @click.command("stream", epilog="Example: smartshoe stream --shoe sim:walk --calibration left_heel.json --out walk.csv")
@@ -31,15 +31,15 @@ def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, o
     from smartshoe.cli.inputs import load_calibrations
     from smartshoe.devices import open_shoe
     from smartshoe.errors import UsageError
-    from smartshoe.session.streaming import Forces
+    from smartshoe.session.streaming import StreamedForces
 
     loaded = load_calibrations(calibrations)
     if out is not None and Path(out).exists():
         raise UsageError(f"{out} is there already and is not overwritten: choose another name for --out")
-    run = _Run(out)
+    run = _StreamRun(out)
     try:
         with _interrupts(run), open_shoe(url) as shoe:
-            run.until(shoe, Forces(loaded, shoe), duration_s)
+            run.until(shoe, StreamedForces(loaded, shoe), duration_s)
     except KeyboardInterrupt:
         run.is_stopped = True
     finally:
@@ -47,7 +47,7 @@ def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, o
 
 
 @contextmanager
-def _interrupts(run: _Run) -> Iterator[None]:
+def _interrupts(run: _StreamRun) -> Iterator[None]:
     """Ctrl-C, or a request to end from outside, ends the run after the block it is at, or before the first."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -66,7 +66,7 @@ def _interrupts(run: _Run) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-class _Run:
+class _StreamRun:
     """Counts and the table of one call."""
 
     def __init__(self, out: str | None) -> None:
@@ -77,7 +77,7 @@ class _Run:
         self._table: StreamTable | None = None
         self._samples = self._told = 0
 
-    def until(self, shoe: Shoe, forces: Forces, duration_s: float | None) -> None:
+    def until(self, shoe: Shoe, forces: StreamedForces, duration_s: float | None) -> None:
         """Read until ``duration_s`` of the device's time have passed, or the stream ends."""
         from smartshoe.errors import DeviceError
         from smartshoe.session.streaming import StreamTable, last_of

@@ -86,7 +86,7 @@ class LoggedMachine(TestMachine):
         return self.recording
 
 
-class _Provider:
+class _LogProvider:
     """``log:FILE?daq=FILE&time=...&force=...&sensor=...``."""
 
     def open_machine(
@@ -103,4 +103,4 @@ class _Provider:
         return LoggedMachine(Path(target), Path(logger) if logger else None, **columns)
 
 
-provider = _Provider()
+provider = _LogProvider()

@@ -91,7 +91,7 @@ class RecordedBladder(Bladder):
         return pressure_pa
 
 
-class _Provider:
+class _ReplayProvider:
     """``replay:FILE?block_samples=20&time=...``."""
 
     def open_shoe(
@@ -110,4 +110,4 @@ class _Provider:
         return ReplayedShoe(read(Path(target), **columns), count)
 
 
-provider = _Provider()
+provider = _ReplayProvider()

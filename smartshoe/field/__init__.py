@@ -1,16 +1,16 @@
 """Checks in the field: zero before use, auto-zero in swing, body weight, units that do not answer, temperature."""
 
-from smartshoe.field.at_rest import Zero, check_zero, zero
+from smartshoe.field.at_rest import ZeroReading, check_zero, zero
 from smartshoe.field.body_weight import check_body_weight
-from smartshoe.field.finding import Finding
+from smartshoe.field.finding import CheckResult
 from smartshoe.field.silence import check_units
 from smartshoe.field.swing_zero import SwingZero
 from smartshoe.field.temperature import sealed_air_pa_per_k, temperature_of_zeros, temperature_sensitivity
 
 __all__ = [
-    "Finding",
+    "CheckResult",
     "SwingZero",
-    "Zero",
+    "ZeroReading",
     "check_body_weight",
     "check_units",
     "check_zero",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.errors import RefusedError, UsageError
-from smartshoe.field.finding import Array, Finding, Verdict, white_noise
+from smartshoe.field.finding import Array, CheckResult, Verdict, white_noise
 
 SHORTEST_S = 1.0
 FEWEST = 20
@@ -22,7 +22,7 @@ TOLD = 0.05  # of full scale: from there on a common shift is worth a word
 
 
 @dataclass(frozen=True, slots=True)
-class Zero:
+class ZeroReading:
     """A unit's reading at no load: ``reading`` with ``sd`` (of the mean), ``noise`` a sample, ``drift_per_s``.
 
     ``verdict`` "ok" or "warning": it can be used; "fault": the shoe is loaded, moves or settles, as ``says`` tells.
@@ -42,10 +42,10 @@ class Zero:
         """Whether the reading may be taken as the zero."""
         return self.verdict in ("ok", "warning")
 
-    def finding(self) -> Finding:
+    def finding(self) -> CheckResult:
         """The same as a finding."""
         numbers = {"reading": self.reading, "sd": self.sd, "noise": self.noise, "drift_per_s": self.drift_per_s}
-        return Finding("zero", self.verdict, self.says, self.unit, self.span_s, numbers)
+        return CheckResult("zero", self.verdict, self.says, self.unit, self.span_s, numbers)
 
 
 def check_zero(
@@ -56,7 +56,7 @@ def check_zero(
     full_scale: ArrayLike,
     expected: ArrayLike = 0.0,
     symbol: str = "",
-) -> tuple[Zero, ...]:
+) -> tuple[ZeroReading, ...]:
     """What each unit reads while nobody stands in the shoe, and whether that is so.
 
     ``time_s`` (n,), ``readings`` (n, units) of a second at least; ``full_scale`` and ``expected`` (the calibration's
@@ -77,7 +77,7 @@ def check_zero(
         says = (
             f"{span[1] - span[0]:.2g} s at rest are too short for a zero: keep the shoe unloaded for {SHORTEST_S:g} s"
         )
-        return tuple(Zero(name, np.nan, np.nan, np.nan, np.nan, "unknown", says, span) for name in names)
+        return tuple(ZeroReading(name, np.nan, np.nan, np.nan, np.nan, "unknown", says, span) for name in names)
     there = np.isfinite(values)
     means = np.where(there, values, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     shift = means - np.asarray(expected, dtype=float)
@@ -110,13 +110,13 @@ def zero(
 
 def _zero_of(
     name: str, time: Array, values: Array, scale: float, shift: float, shared: float, common: float, symbol: str
-) -> Zero:
+) -> ZeroReading:
     span = (float(time[0]), float(time[-1]))
     there = np.isfinite(values)
     at, y = time[there], values[there]
     if y.size < FEWEST:
         says = f"{name} sent {y.size} samples of {values.size} at rest: look at its cable"
-        return Zero(name, np.nan, np.nan, np.nan, np.nan, "fault", says, span)
+        return ZeroReading(name, np.nan, np.nan, np.nan, np.nan, "fault", says, span)
     noise = white_noise(y)
     slope, level = np.polyfit(at - at.mean(), y, 1)
     left = y - level - slope * (at - at.mean())
@@ -144,4 +144,4 @@ def _zero_of(
         says = f"{reading}, with the others {100 * shift / scale:.2g} % of full scale from zero, as warm air would"
     else:
         verdict, says = "ok", f"{reading} at no load, still within {100 * max(sway, noise) / scale:.2g} % of full scale"
-    return Zero(name, float(level), sd, noise, drift, verdict, says, span)
+    return ZeroReading(name, float(level), sd, noise, drift, verdict, says, span)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.errors import UsageError
-from smartshoe.field.finding import Array, Finding, Verdict
+from smartshoe.field.finding import Array, CheckResult, Verdict
 from smartshoe.field.swing_zero import WINDOW_S
 from smartshoe.field.swings import swings
 from smartshoe.masks import runs_of
@@ -47,7 +47,7 @@ def check_body_weight(
     *,
     coverage: float = 1.0,
     tolerance: float = TOLERANCE,
-) -> Finding:
+) -> CheckResult:
     """Whether the mean total force over whole strides (or of standing) is ``coverage`` times ``body_weight_n``.
 
     ``time_s`` (n,) on an even time base, ``feet_n`` by foot (n,), each foot's units summed. "ok" where the 95 %
@@ -70,7 +70,7 @@ def check_body_weight(
     if samples is None:
         samples, span, how = _standing(total, rate_hz, body_weight_n)
     if samples is None:
-        return Finding(
+        return CheckResult(
             "body_weight", "unknown", "neither three whole strides nor 15 s of standing: body weight cannot be checked"
         )
     from scipy.stats import t
@@ -87,7 +87,7 @@ def check_body_weight(
     if len(feet) == 1:
         (foot,) = feet
         says = f"{seen} under the {foot} foot alone, {100 * mean / expected:.3g} % of what both bear: give both shoes"
-        return Finding("body_weight", "unknown", says, "", where, numbers)
+        return CheckResult("body_weight", "unknown", says, "", where, numbers)
     seen += f", {100 * mean / expected:.4g} % of the {expected:.4g} N expected"
     near, far = (1.0 - tolerance) * expected, (1.0 + tolerance) * expected
     verdict: Verdict = "ok" if near <= low and high <= far else "fault" if high < near or low > far else "warning"
@@ -96,7 +96,7 @@ def check_body_weight(
         "warning": f": whether it keeps within {100 * tolerance:g} % is not sure yet, walk on",
         "fault": ": look for a unit that does not answer, a calibration of another unit, or another coverage",
     }
-    return Finding("body_weight", verdict, seen + ends[verdict], "", where, numbers)
+    return CheckResult("body_weight", verdict, seen + ends[verdict], "", where, numbers)
 
 
 def _whole_strides(

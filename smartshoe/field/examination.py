@@ -13,7 +13,7 @@ from smartshoe.compensation import Calibration, compensate
 from smartshoe.errors import InputError, MissingChannelError, UsageError
 from smartshoe.field.at_rest import SHORTEST_S, check_zero
 from smartshoe.field.body_weight import check_body_weight
-from smartshoe.field.finding import Array, Finding, Verdict, white_noise
+from smartshoe.field.finding import Array, CheckResult, Verdict, white_noise
 from smartshoe.field.silence import check_units
 from smartshoe.field.swing_zero import SwingZero
 from smartshoe.field.temperature import temperature_of_zeros
@@ -38,7 +38,7 @@ class Examination:
     """
 
     name: str
-    findings: tuple[Finding, ...]
+    findings: tuple[CheckResult, ...]
 
     @property
     def verdict(self) -> Verdict:
@@ -46,7 +46,7 @@ class Examination:
         said = {finding.verdict for finding in self.findings}
         return next((verdict for verdict in ("fault", "warning", "ok") if verdict in said), "unknown")
 
-    def of_kind(self, kind: str) -> tuple[Finding, ...]:
+    def of_kind(self, kind: str) -> tuple[CheckResult, ...]:
         """The findings of one kind."""
         return tuple(finding for finding in self.findings if finding.kind == kind)
 
@@ -76,7 +76,7 @@ def examine(
     if len(recording) < 2:
         raise InputError(f"{recording.label} holds one sample: record a few seconds at least")
     by_unit = _named(units, calibrations)
-    found: list[Finding] = []
+    found: list[CheckResult] = []
     for group in _same_kind(units):
         readings = np.column_stack([channel.with_nan() for channel in group.values()])
         scale = np.array([_full_scale(name, channel, by_unit) for name, channel in group.items()])
@@ -229,7 +229,7 @@ def _at_rest(
     scale: Array,
     expected: Array,
     by_unit: Mapping[str, Calibration],
-) -> list[Finding]:
+) -> list[CheckResult]:
     """The zero of the stretch before somebody steps in, where there is one."""
     held = np.column_stack([channel.values for channel in group.values()])  # missing samples repeat the last one
     first = np.median(held[: max(2, int(0.2 / np.median(np.diff(time_s))))], axis=0)
@@ -241,7 +241,7 @@ def _at_rest(
             f"nobody stepped in, and no range or calibration says how much a reading of {', '.join(unscaled)} is: the"
             " zero is not checked, give --calibration"
         )
-        return [Finding("zero", "unknown", says, ", ".join(group))]
+        return [CheckResult("zero", "unknown", says, ", ".join(group))]
     on = int(np.argmax(moved.any(axis=1))) if moved.any() else time_s.size
     end_s = float(time_s[on] - BEFORE_S) if on < time_s.size else float(time_s[-1])
     stop = int(np.searchsorted(time_s, min(end_s, float(time_s[0]) + REST_LONGEST_S), side="right"))
@@ -249,7 +249,7 @@ def _at_rest(
         says = (
             f"no rest of {SHORTEST_S:g} s before the first step: the zero is not checked, stand off for 2 s next time"
         )
-        return [Finding("zero", "unknown", says, ", ".join(group))]
+        return [CheckResult("zero", "unknown", says, ", ".join(group))]
     symbol = next(iter(group.values())).unit.symbol
     span = slice(0, stop)
     zeros = check_zero(
@@ -285,7 +285,9 @@ def _feet(forces: Mapping[str, Array]) -> dict[str, list[str]]:
     return feet
 
 
-def _in_swing(recording: Recording, forces: Mapping[str, Array], by_unit: Mapping[str, Calibration]) -> list[Finding]:
+def _in_swing(
+    recording: Recording, forces: Mapping[str, Array], by_unit: Mapping[str, Calibration]
+) -> list[CheckResult]:
     """How far each unit's zero lies off in swing at the end, and what warming that would be."""
     names = list(forces)
     follower = SwingZero(len(names), sample_rate_hz=recording.sample_rate_hz, slew_per_s=1.0)
@@ -298,7 +300,7 @@ def _in_swing(recording: Recording, forces: Mapping[str, Array], by_unit: Mappin
         says = f"{name} shows {zero_n:.2g} N in swing at the end"
         says += ": zero it in swing, or before use" if large else ", as good as nothing"
         found.append(
-            Finding("swing_zero", "warning" if large else "ok", says, name, None, {"zero_n": float(zero_n)})
+            CheckResult("swing_zero", "warning" if large else "ok", says, name, None, {"zero_n": float(zero_n)})
         )  # fmt: skip
     warm = [name for name in names if name in by_unit and by_unit[name].reading_unit.quantity == "pressure"]
     if len(warm) == len(names) and len(warm) > 1:
@@ -316,7 +318,7 @@ def _body_weight(
     feet: Mapping[str, Sequence[str]],
     body_weight_n: float,
     coverage: float,
-) -> Finding:
+) -> CheckResult:
     finding = _not_weighable(recording, units, forces)
     if finding is not None:
         return finding
@@ -324,13 +326,17 @@ def _body_weight(
     return check_body_weight(recording.time_s, totals, body_weight_n, coverage=coverage)
 
 
-def _not_weighable(recording: Recording, units: Mapping[str, Channel], forces: Mapping[str, Array]) -> Finding | None:
+def _not_weighable(
+    recording: Recording, units: Mapping[str, Channel], forces: Mapping[str, Array]
+) -> CheckResult | None:
     """Why the forces cannot be weighed, None where they can."""
     without = [name for name in units if name not in forces]
     if without:
         many = "has" if len(without) == 1 else "have"
         says = f"{', '.join(without)} {many} no force: give --calibration for each unit"
-        return Finding("body_weight", "unknown", says)
+        return CheckResult("body_weight", "unknown", says)
     if not recording.is_uniform:
-        return Finding("body_weight", "unknown", "the steps of time are uneven: body weight is checked on even ones")
+        return CheckResult(
+            "body_weight", "unknown", "the steps of time are uneven: body weight is checked on even ones"
+        )
     return None

@@ -1,4 +1,4 @@
-"""`Finding`: what a check in the field has to say of a shoe or a unit, typed, with one sentence."""
+"""`CheckResult`: what a check in the field has to say of a shoe or a unit, typed, with one sentence."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Verdict = Literal["ok", "warning", "fault", "unknown"]
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class CheckResult:
     """``kind`` of check, its ``verdict``, the ``unit`` (or foot; '' for all), ``span_s`` of time, ``numbers`` by name.
 
     "unknown" is a check that the data cannot carry out; ``says`` tells why.

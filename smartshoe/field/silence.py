@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.errors import UsageError
-from smartshoe.field.finding import Array, Finding, Mask, white_noise
+from smartshoe.field.finding import Array, CheckResult, Mask, white_noise
 from smartshoe.masks import runs_of
 
 UP, DOWN = 0.6, 0.4  # of a unit's own rise: a press goes above the one after it was below the other
@@ -27,7 +27,7 @@ def check_units(
     *,
     full_scale: ArrayLike,
     range_high: ArrayLike | None = None,
-) -> tuple[Finding, ...]:
+) -> tuple[CheckResult, ...]:
     """Faults of units in ``readings`` (n, units), NaN where a sample is missing; () where all answer.
 
     Kinds: ``no_samples`` (a gap of half a second and more), ``stuck`` (one value while the neighbours are pressed
@@ -45,7 +45,7 @@ def check_units(
     rises = np.array([_rise(filled[:, k]) for k in range(len(names))])
     moves = np.array([rises[k] > MOVES * white_noise(filled[:, k]) and rises[k] > 0.0 for k in range(len(names))])
     presses = [_presses(filled[:, k], rises[k]) if moves[k] else np.empty(0, dtype=np.intp) for k in range(len(names))]
-    found: list[Finding] = []
+    found: list[CheckResult] = []
     for k, name in enumerate(names):
         found += _gaps(time, there[:, k], name)
         others = [j for j in range(len(names)) if j != k and moves[j] and presses[j].size >= CYCLES]
@@ -83,14 +83,14 @@ def _runs(at: Mask) -> list[tuple[int, int]]:
     return list(zip(first.tolist(), (after - 1).tolist(), strict=True))
 
 
-def _gaps(time: Array, there: Mask, name: str) -> list[Finding]:
+def _gaps(time: Array, there: Mask, name: str) -> list[CheckResult]:
     long = [(a, b) for a, b in _runs(~there) if time[min(b + 1, time.size - 1)] - time[a] >= GAP_S]
     if not long:
         return []
     total = sum(float(time[min(b + 1, time.size - 1)] - time[a]) for a, b in long)
     says = f"{name} sent nothing for {total:.3g} s in {len(long)} gaps: look at its cable and the radio"
     return [
-        Finding(
+        CheckResult(
             "no_samples", "fault", says, name, (float(time[long[0][0]]), float(time[long[-1][1]])), {"gap_s": total}
         )
     ]
@@ -99,7 +99,7 @@ def _gaps(time: Array, there: Mask, name: str) -> list[Finding]:
 def _stuck_or_dead(
     time: Array, values: Array, name: str, rises: Array, scale: Array, k: int, others: list[int],
     presses: list[np.ndarray[tuple[int], np.dtype[np.intp]]],
-) -> list[Finding]:  # fmt: skip
+) -> list[CheckResult]:  # fmt: skip
     def sat_out(first: int, last: int) -> int:
         return int(np.median([np.count_nonzero((presses[j] > first) & (presses[j] <= last)) for j in others]))
 
@@ -112,7 +112,9 @@ def _stuck_or_dead(
             f"{name} is stuck at {values[a]:.4g} from {time[a]:.3g} to {time[b]:.3g} s while its neighbours are pressed"
             f" {missed} times: look at its sensor"
         )
-        return [Finding("stuck", "fault", says, name, (float(time[a]), float(time[b])), {"value": float(values[a])})]
+        return [
+            CheckResult("stuck", "fault", says, name, (float(time[a]), float(time[b])), {"value": float(values[a])})
+        ]
     usual = float(np.median([rises[j] / scale[j] for j in others]))
     if rises[k] / scale[k] < DEAD * usual:
         missed = sat_out(0, values.size - 1)
@@ -120,11 +122,11 @@ def _stuck_or_dead(
             f"{name} answers with {100 * rises[k] / scale[k] / usual:.2g} % of what its neighbours do, over {missed}"
             " presses: look for a leak or a tube that came off"
         )
-        return [Finding("dead", "fault", says, name, (float(time[0]), float(time[-1])), {"rise": float(rises[k])})]
+        return [CheckResult("dead", "fault", says, name, (float(time[0]), float(time[-1])), {"rise": float(rises[k])})]
     return []
 
 
-def _saturated(time: Array, values: Array, name: str, high: float | None, rise: float) -> list[Finding]:
+def _saturated(time: Array, values: Array, name: str, high: float | None, rise: float) -> list[CheckResult]:
     top = float(values.max())
     if rise <= 0.0 or (high is not None and top < 0.995 * high):
         return []
@@ -138,7 +140,7 @@ def _saturated(time: Array, values: Array, name: str, high: float | None, rise: 
         " measured"
     )
     return [
-        Finding(
+        CheckResult(
             "saturated", "warning", says, name, (float(time[runs[0][0]]), float(time[runs[-1][1]])), {"share": share}
         )
     ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.errors import UsageError
-from smartshoe.field.finding import Finding, Verdict
+from smartshoe.field.finding import CheckResult, Verdict
 
 ATMOSPHERE_PA = 101_325.0
 ROOM_K = 295.0
@@ -33,7 +33,7 @@ def temperature_of_zeros(
     absolute_pressure_pa: float = ATMOSPHERE_PA,
     temperature_k: float = ROOM_K,
     when: str = "",
-) -> Finding:
+) -> CheckResult:
     """The warming that ``changes_pa`` (units,) of the zeros, with ``sd_pa``, mean if all of it is sealed air.
 
     Warm air raises every sealed unit alike; units that disagree beyond their sd (and a tenth of the change, for walls
@@ -62,17 +62,17 @@ def temperature_of_zeros(
             f"{when}the zeros have moved apart, {names[furthest]} by {changes[furthest] / 100:.3g} mbar against"
             f" {np.median(changes) / 100:.3g} mbar: warm air moves all alike, look for a leak or a load there"
         )
-        return Finding("temperature", "unknown", says, names[furthest], None, numbers)
+        return CheckResult("temperature", "unknown", says, names[furthest], None, numbers)
     if abs(delta_k) <= 2.0 * sd_k:
         says = f"{when}no warming shows in the zeros ({delta_k:.2g} K, sd {sd_k:.1g})"
-        return Finding("temperature", "ok", says, "", None, numbers)
+        return CheckResult("temperature", "ok", says, "", None, numbers)
     verdict: Verdict = "warning" if abs(delta_k) > LARGE_K else "ok"
     says = (
         f"{when}the zeros have moved together by {change / 100:.3g} mbar, as sealed air does that"
         f" {'warms' if change >= 0.0 else 'cools'} by {abs(delta_k):.2g} K (sd {sd_k:.1g})"
     )
     ending = ": zero again before use" if verdict == "warning" else ""
-    return Finding("temperature", verdict, says + ending, "", None, numbers)
+    return CheckResult("temperature", verdict, says + ending, "", None, numbers)
 
 
 def temperature_sensitivity(
@@ -80,7 +80,7 @@ def temperature_sensitivity(
     zeros_pa: ArrayLike,
     *,
     absolute_pressure_pa: float = ATMOSPHERE_PA,
-) -> Finding:
+) -> CheckResult:
     """How a unit's ``zeros_pa`` (n,) follow a measured ``temperature_k`` (n,), against the p/T of sealed air.
 
     ``numbers``: pa_per_k with low and high (95 %), sealed_pa_per_k, share of it. A share near 1 is a sealed rigid
@@ -91,7 +91,7 @@ def temperature_sensitivity(
         raise UsageError("give a temperature and a zero a moment, three moments at least")
     if float(np.ptp(warm)) < 0.5:
         says = f"the temperature moved by {float(np.ptp(warm)):.2g} K only: what it does to the zero cannot be told"
-        return Finding("temperature_sensitivity", "unknown", says)
+        return CheckResult("temperature_sensitivity", "unknown", says)
     from scipy.stats import linregress, t
 
     line = linregress(warm, zeros)
@@ -107,4 +107,4 @@ def temperature_sensitivity(
         f"the zero follows the temperature with {slope / 100:.3g} mbar/K {range_},"
         f" {100 * slope / sealed:.2g} % of sealed air's {sealed / 100:.3g} mbar/K"
     )
-    return Finding("temperature_sensitivity", "ok", says, "", None, numbers)
+    return CheckResult("temperature_sensitivity", "ok", says, "", None, numbers)

@@ -50,7 +50,7 @@ def pieces(
     """
     size = max(1, round(piece_s * rate_hz))
     number = 0
-    run: _Run | None = None
+    run: _EvenRun | None = None
     units: list[Unit] = []
     for block in blocks:
         time_s, values, missing = _rows(block, names)
@@ -72,7 +72,7 @@ def pieces(
                 number, run = number + 1, None
             if first == stop:
                 continue
-            run = run or _Run(number, float(time_s[first]), rate_hz)
+            run = run or _EvenRun(number, float(time_s[first]), rate_hz)
             run.push(time_s[first:stop], values[first:stop], missing[first:stop])
             yield from run.taken(size, at_end=False)
     if run is not None:
@@ -94,7 +94,7 @@ def _rows(block: Recording, names: tuple[str, ...]) -> tuple[Array, Array, Mask]
     return block.time_s[there], values[there], missing[there]
 
 
-class _Run:
+class _EvenRun:
     """One run of recording: rows go in, even rows come out once what is missing in them is bridged."""
 
     def __init__(self, number: int, start_s: float, rate_hz: float) -> None:

@@ -24,7 +24,7 @@ MOST = 16 * LONGEST  # events: a file's parameters hold 128 kB
 DIGITS = 3  # of the rate: beyond, two clocks' rates differ by chance
 
 
-class Signal(NamedTuple):
+class C3dSignal(NamedTuple):
     """A column of the forces' table: ``values`` (n,) in ``unit``, NaN where nothing is known."""
 
     label: str
@@ -32,7 +32,7 @@ class Signal(NamedTuple):
     values: Array
 
 
-def analog_signals(found: GaitResult) -> tuple[Array, list[Signal]]:
+def analog_signals(found: GaitResult) -> tuple[Array, list[C3dSignal]]:
     """The trial's time (n,) in s and its units, feet, total and centre of pressure, as exchange formats name them."""
     table = found.columns()
     time_s = table.pop("time_s")
@@ -42,7 +42,7 @@ def analog_signals(found: GaitResult) -> tuple[Array, list[Signal]]:
         label, _, suffix = name.rpartition("_")
         if suffix != "phase":
             unit = {"n": "N", "percent": "%"}.get(suffix, symbol)
-            signals.append(Signal(label, unit, np.asarray(values, dtype=float)))
+            signals.append(C3dSignal(label, unit, np.asarray(values, dtype=float)))
     return time_s, signals
 
 

@@ -16,7 +16,7 @@ from smartshoe.gait.coverage import Coverage
 from smartshoe.gait.flag import Flag, where_text
 from smartshoe.gait.indices import POINTS, deviations, overlaid, sequence_errors
 from smartshoe.gait.result import FootCourse, Forces
-from smartshoe.gait.stretch import Stretch
+from smartshoe.gait.stretch import AnalysisWindow
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import Activity, activity_by_time
 from smartshoe.gait.sums import BlockMeans, Moments, StrideSums, weighted_mean
@@ -74,7 +74,7 @@ class DaySums:
         self._means = {own: Moments() for own in (True, False)}
         self._standing = BlockMeans(max(1, round(SWAY_S * feet[first].rate_hz)))
         self._standing_s = 0.0
-        self._flags: dict[tuple[str, str | None, str | None], tuple[Flag, int, Stretch]] = {}
+        self._flags: dict[tuple[str, str | None, str | None], tuple[Flag, int, AnalysisWindow]] = {}
         self._ends_s: dict[tuple[str, str | None, str | None], float] = {}
         self._stretches: Counter[str] = Counter()
         self._runs: list[tuple[float, float]] = []
@@ -114,7 +114,7 @@ class DaySums:
         self._end_s = end_s
         self.recorded_s += end_s - start_s
 
-    def add(self, stretch: Stretch) -> None:
+    def add(self, stretch: AnalysisWindow) -> None:
         """One more stretch."""
         courses = stretch.courses
         seen = {**self.last_courses, **courses}
@@ -138,7 +138,7 @@ class DaySums:
             self._total(stretch)
         self._flagged(stretch)
 
-    def _load(self, own: _FootSums, stretch: Stretch, course: FootCourse) -> None:
+    def _load(self, own: _FootSums, stretch: AnalysisWindow, course: FootCourse) -> None:
         load = course.load[inside := stretch.own(course.time_s)]
         own.samples += len(load)
         own.load += load.sum(axis=0)
@@ -161,7 +161,7 @@ class DaySums:
             own.abnormality += float(course.abnormality[first:last].sum())
             own.inside += int(last - first)
 
-    def _total(self, stretch: Stretch) -> None:
+    def _total(self, stretch: AnalysisWindow) -> None:
         forces = {n: course.force_n for n, course in stretch.courses.items() if course.force_n is not None}
         time_s, total_n = total_of(stretch.feet, forces)
         if time_s.size < 2:
@@ -186,7 +186,7 @@ class DaySums:
             kept |= (time_s >= start_s + SETTLED_S) & (time_s <= end_s - SETTLED_S)
         self._standing.add(total_n[kept & ~missing & stretch.own(time_s)])
 
-    def _flagged(self, stretch: Stretch) -> None:
+    def _flagged(self, stretch: AnalysisWindow) -> None:
         self._stretches["all"] += 1
         self._stretches["stepping"] += bool(stretch.strides)
         seen = set()

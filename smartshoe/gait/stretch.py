@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class AnalysisWindow:
     """What was found from ``start_s`` on and before ``end_s``; ``feet``, ``courses`` and ``contacts`` reach beyond.
 
     ``strides`` begin in it; ``spans`` are of standing, whole ones.
@@ -50,7 +50,7 @@ def look(
     peaks: Mapping[str, MutableSequence[Array]],
     coverage: Coverage,
     body_weight_n: float | None,
-) -> Stretch:
+) -> AnalysisWindow:
     """The stretch from ``start_s`` to ``end_s`` of feet seen through ``windows`` that reach some seconds beyond it.
 
     ``peaks`` are each foot's units' peaks (r,) in the stances so far, to which this stretch's are added.
@@ -75,7 +75,7 @@ def look(
     flags = checks.all_of(
         feet, courses, strides, spans, Forces(None, None, None, None), loaded, coverage.share, body_weight_n
     )
-    return Stretch(start_s, end_s, feet, courses, strides, spans, loaded, tuple(flags))
+    return AnalysisWindow(start_s, end_s, feet, courses, strides, spans, loaded, tuple(flags))
 
 
 def peaks_of(time_s: Array, load: Array, contacts: Contacts, start_s: float, end_s: float) -> list[Array]:

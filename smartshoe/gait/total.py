@@ -36,7 +36,7 @@ class BodyWeight:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StandingForce:
     """The mean total of standing in N, its sd by its own wander, and how long it was seen in s."""
 
     mean_n: float
@@ -135,7 +135,7 @@ def stride_means(time_s: Array, total_n: Array, missing: Mask, strides: Sequence
 
 def standing_mean(
     time_s: Array, total_n: Array, missing: Mask, spans: Sequence[tuple[float, float]]
-) -> Standing | None:
+) -> StandingForce | None:
     """The total over the standing stretches, half a second left out at either end; None where nothing is left."""
     kept = np.zeros(time_s.size, dtype=bool)
     for start, end in spans:
@@ -149,7 +149,7 @@ def standing_mean(
     size = max(1, round(SWAY_S / step))
     blocks = kept_n[: kept_n.size // size * size].reshape(-1, size).mean(axis=1)
     sd_n = float(blocks.std(ddof=1) / np.sqrt(blocks.size)) if blocks.size > 1 else WIDE_SD * mean_n
-    return Standing(mean_n, sd_n, length_s)
+    return StandingForce(mean_n, sd_n, length_s)
 
 
 def body_weight_of(
@@ -157,7 +157,7 @@ def body_weight_of(
     courses: Mapping[str, FootCourse],
     stride_n: Array,
     stride_s: Array,
-    standing: Standing | None,
+    standing: StandingForce | None,
     given_n: float | None,
     coverage: float,
 ) -> BodyWeight | None:

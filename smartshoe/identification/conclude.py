@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.estimator import Fit
+from smartshoe.identification.estimator import ParameterFit
 from smartshoe.identification.experiment import Array, kept_of
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.parametrisation import GreyBox
@@ -35,7 +35,7 @@ class Choice:
     sources: tuple[str, ...]
 
 
-def conclude(fit: Fit, choice: Choice, where: str) -> Identification:
+def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
     """Parameters with covariance (delta method, or likelihood profile) at the fit's theta."""
     problem, theta = fit.problem, fit.theta
     settings, experiments = problem.settings, problem.experiments
@@ -119,7 +119,7 @@ def conclude(fit: Fit, choice: Choice, where: str) -> Identification:
     )
 
 
-def _parameters(fit: Fit, choice: Choice, theta: Array | None = None) -> tuple[Array, Array, float]:
+def _parameters(fit: ParameterFit, choice: Choice, theta: Array | None = None) -> tuple[Array, Array, float]:
     """(a1, b0, b1, k1, k2, c), their derivative (6, size) over theta, and the scale."""
     problem = fit.problem
     theta = fit.theta if theta is None else theta
@@ -136,7 +136,7 @@ def _parameters(fit: Fit, choice: Choice, theta: Array | None = None) -> tuple[A
     return np.concatenate([coefficients, solid]), slope, scale
 
 
-def _function(fit: Fit, choice: Choice, index: int) -> Function:
+def _function(fit: ParameterFit, choice: Choice, index: int) -> Function:
     def parameter(theta: Array) -> tuple[float, Array]:
         values, slope, _ = _parameters(fit, choice, theta)
         return float(values[index]), slope[index]
@@ -167,7 +167,7 @@ def solid_of(coefficients: Array, newtons: float | None) -> tuple[Array, Array, 
 
 
 def _offsets(
-    fit: Fit, choice: Choice, static: float, slope: Array, quantile: float
+    fit: ParameterFit, choice: Choice, static: float, slope: Array, quantile: float
 ) -> tuple[dict[str, Parameter], dict[str, Parameter]]:
     """Per recording the reading at no load and the load cell's zero.
 
@@ -203,7 +203,7 @@ def _offsets(
     return readings, loads
 
 
-def _spread_of_output(fit: Fit) -> float:
+def _spread_of_output(fit: ParameterFit) -> float:
     """Sum of squares of the output about its mean, over all samples that count."""
     outputs = [kept_of(y, kept) for y, kept in zip(fit.problem.outputs, fit.problem.kept, strict=True)]
     count = sum(output.size for output in outputs)
@@ -211,12 +211,12 @@ def _spread_of_output(fit: Fit) -> float:
     return sum(float(np.dot(output - mean, output - mean)) for output in outputs)
 
 
-def _plain_cost(fit: Fit) -> float:
+def _plain_cost(fit: ParameterFit) -> float:
     errors = [fit.problem.model_error(fit.theta, index)[kept] for index, kept in enumerate(fit.problem.kept)]
     return sum(float(error @ error) for error in errors)
 
 
-def _require_determined(where: str, fit: Fit, values: Array, sd: Array, spread: float) -> None:
+def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array, spread: float) -> None:
     """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself."""
     static = values[2] / values[0]
     gain_sd = float(np.sqrt(max(fit.covariance[fit.problem.shape_size - 1, fit.problem.shape_size - 1], 0.0)))

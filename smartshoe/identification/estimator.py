@@ -26,7 +26,7 @@ WEAK = 4.0  # standard errors by instruments over those of the plain fit
 
 
 @dataclass(frozen=True)
-class Limits:
+class Termination:
     """When a fit ends: at a relative change of theta, or after so many iterations."""
 
     tolerance: float
@@ -34,7 +34,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ParameterFit:
     """theta of ``problem`` with its covariance, and how it was come by."""
 
     problem: PredictionError
@@ -62,12 +62,12 @@ def estimate(
     prefilter_rad_s: float,
     tolerance: float,
     max_iterations: int,
-) -> Fit:
+) -> ParameterFit:
     """The fit by the ``estimator`` asked for, or by the one that the data ask for.
 
     ``noise`` holds the standard deviations of load (N) and reading, None where they are to be estimated.
     """
-    limits = Limits(tolerance, max_iterations)
+    limits = Termination(tolerance, max_iterations)
     fit = _output_error(problem, method, prefilter_rad_s, limits)
     if not np.isfinite(fit.theta).all() or not np.isfinite(fit.cost):
         return fit
@@ -103,7 +103,7 @@ def _noise(problem: PredictionError, noise: Mapping[str, float | None]) -> dict[
     return {"load": load, "reading": reading}
 
 
-def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float, limits: Limits) -> Fit:
+def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float, limits: Termination) -> ParameterFit:
     theta = start(problem, prefilter_rad_s)
     solver = "gn" if method == "srivc" else method
     if method != "srivc" or problem.delay_at is not None:
@@ -132,7 +132,7 @@ def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float,
     return _settle(problem, theta, seen, iterations, converged, "output_error")
 
 
-def _minimise(problem: PredictionError, theta: Array, method: str, limits: Limits) -> Minimum:
+def _minimise(problem: PredictionError, theta: Array, method: str, limits: Termination) -> Minimum:
     return minimise(
         problem, theta, cast(Solver, method), tolerance=limits.tolerance, max_iterations=limits.max_iterations
     )
@@ -140,17 +140,17 @@ def _minimise(problem: PredictionError, theta: Array, method: str, limits: Limit
 
 def _settle(
     problem: PredictionError, theta: Array, seen: Evaluation, iterations: int, converged: bool, estimator: str
-) -> Fit:
+) -> ParameterFit:
     degrees = problem.count - problem.size
     inverse, degenerate = inverse_normal(seen.normal)
     variance = seen.cost / max(degrees, 1)
-    return Fit(
+    return ParameterFit(
         problem, theta, variance * inverse, variance, degrees, seen.cost, degenerate, iterations, converged,
         estimator, {}, seen,
     )  # fmt: skip
 
 
-def _concern(fit: Fit, input_sd: float) -> str:
+def _concern(fit: ParameterFit, input_sd: float) -> str:
     """What the input's noise does to the fit, in one clause; '' where it does not matter."""
     if input_sd == 0.0 or fit.degrees < 1 or fit.degenerate or fit.evaluation is None:
         return ""
@@ -179,7 +179,9 @@ def _has_command(problem: PredictionError) -> bool:
     return True
 
 
-def _errors_in_variables(fit: Fit, method: str, noise: Mapping[str, float | None], limits: Limits) -> Fit:
+def _errors_in_variables(
+    fit: ParameterFit, method: str, noise: Mapping[str, float | None], limits: Termination
+) -> ParameterFit:
     problem, inverse = fit.problem, fit.problem.settings.direction == "inverse"
     input_sd, output_sd = (fit.noise["reading"], noise["load"]) if inverse else (fit.noise["load"], noise["reading"])
     theta, iterations, converged = fit.theta.copy(), 0, fit.converged
@@ -229,7 +231,7 @@ def _best_delay(problem: PredictionError, theta: Array, sample_time_s: float) ->
     return min(found, key=lambda minimum: minimum.evaluation.cost).theta
 
 
-def _is_weak(instrumental: Fit, fit: Fit) -> bool:
+def _is_weak(instrumental: ParameterFit, fit: ParameterFit) -> bool:
     """Whether the instruments leave the response several times less certain than the plain fit does."""
     shape = fit.problem.shape_size
     return bool(np.any(np.diag(instrumental.covariance)[:shape] > WEAK**2 * np.diag(fit.covariance)[:shape]))
@@ -240,7 +242,9 @@ def _mean_square(problem: PredictionError, theta: Array) -> float:
     return sum(float(error @ error) for error in errors) / max(problem.count - problem.size, 1)
 
 
-def _instrumental(fit: Fit, source: Source, recordings: Sequence[Recording], limits: Limits) -> Fit:
+def _instrumental(
+    fit: ParameterFit, source: Source, recordings: Sequence[Recording], limits: Termination
+) -> ParameterFit:
     readings = None
     if source == "cycles":
         from smartshoe.identification.cycles import averaged_reading

@@ -14,7 +14,7 @@ from smartshoe.compensation.provenance import sha256_of
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification.consistency import ConsistencyTest, consistency_test
-from smartshoe.identification.estimator import Fit
+from smartshoe.identification.estimator import ParameterFit
 from smartshoe.identification.experiment import Array, Direction
 from smartshoe.identification.residual_tests import ResidualTest, residual_tests
 from smartshoe.models import Parameter, StandardLinearSolid, discretise
@@ -66,7 +66,7 @@ class Identification(Summarised):
     rate_range_n_per_s: tuple[float, float]
     sources: tuple[str, ...]
     remarks: tuple[str, ...]
-    fit: Fit = field(repr=False)
+    fit: ParameterFit = field(repr=False)
 
     # -- what is left ----------------------------------------------------------------------------------------
     @cached_property

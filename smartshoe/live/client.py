@@ -9,7 +9,7 @@ from typing import Any
 
 from smartshoe.errors import SmartShoeError
 from smartshoe.live.desk import Desk
-from smartshoe.live.frames import View, head_bytes, shoe_bytes, view_of
+from smartshoe.live.frames import PageView, head_bytes, shoe_bytes, view_of
 
 MOST_ANSWERS = 16
 ALL = -(1 << 62)
@@ -20,7 +20,7 @@ class Client:
 
     def __init__(self, desk: Desk) -> None:
         self._desk, self._session = desk, desk.session
-        self.view = View()
+        self.view = PageView()
         self.wake = asyncio.Event()
         self.answers: deque[dict[str, Any]] = deque(maxlen=MOST_ANSWERS)
         self.is_paused = False

@@ -7,7 +7,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from smartshoe.live.battery import Battery
-from smartshoe.live.frames import Reduction, View
+from smartshoe.live.frames import PageView, Reduction
 from smartshoe.live.session import LiveSession
 
 if TYPE_CHECKING:
@@ -24,13 +24,13 @@ class Desk:
         self.session = session
         self.clients: set[Client] = set()
         self.battery = Battery(session)
-        self._reductions: dict[View, list[Reduction]] = {}
+        self._reductions: dict[PageView, list[Reduction]] = {}
         self._state = ""
         self._state_due_s = -1.0
         self._stop = threading.Event()
         self._checking: threading.Thread | None = None
 
-    def reductions(self, view: View) -> list[Reduction]:
+    def reductions(self, view: PageView) -> list[Reduction]:
         """Each shoe's traces in ``view``; those of views that no page has any more are let go."""
         if view not in self._reductions:
             wanted = {client.view for client in self.clients} | {view}
@@ -48,7 +48,7 @@ class Desk:
             self._state = json.dumps(whole, allow_nan=False)
         return self._state
 
-    def hello(self, view: View) -> dict[str, Any]:
+    def hello(self, view: PageView) -> dict[str, Any]:
         """What a page has to know before its first picture."""
         session = self.session
         return {

@@ -41,7 +41,7 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.live.pixel_columns import Columns, joined, reduced
+from smartshoe.live.pixel_columns import PixelColumns, joined, reduced
 from smartshoe.live.shoe import FootNow, LiveShoe
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ FEWEST_COLUMNS, MOST_COLUMNS = 100, 1600
 
 
 @dataclass(frozen=True)
-class View:
+class PageView:
     """What a page shows: the last ``seconds`` of the traces, in ``columns`` of pixels."""
 
     seconds: float = 20.0
@@ -66,13 +66,13 @@ class View:
         return self.seconds / self.columns
 
 
-def view_of(seconds: object, columns: object) -> View:
+def view_of(seconds: object, columns: object) -> PageView:
     """The view nearest to what a page asks for: there are few, so that what is reduced is shared."""
-    usual = View()
+    usual = PageView()
     wanted_s = float(seconds) if _is_number(seconds) else usual.seconds
     count = float(columns) if _is_number(columns) else usual.columns
     nearest = min(SECONDS, key=lambda each: abs(each - wanted_s))
-    return View(nearest, int(np.clip(100 * round(count / 100), FEWEST_COLUMNS, MOST_COLUMNS)))
+    return PageView(nearest, int(np.clip(100 * round(count / 100), FEWEST_COLUMNS, MOST_COLUMNS)))
 
 
 def _is_number(value: object) -> TypeGuard[float]:
@@ -82,12 +82,12 @@ def _is_number(value: object) -> TypeGuard[float]:
 class Reduction:
     """One shoe's traces in columns of one view, brought up to date as pages ask."""
 
-    def __init__(self, live: LiveShoe, view: View) -> None:
+    def __init__(self, live: LiveShoe, view: PageView) -> None:
         self._live, self._view = live, view
         self._place, self._zero = 0, live.zero
-        self._columns: Columns | None = None
+        self._columns: PixelColumns | None = None
 
-    def columns(self) -> Columns:
+    def columns(self) -> PixelColumns:
         """All columns of the view."""
         if self._columns is None or self._zero is not self._live.zero:
             self._place, self._columns, self._zero = 0, None, self._live.zero
@@ -97,7 +97,7 @@ class Reduction:
         return self._columns
 
 
-def shoe_bytes(columns: Columns, values: Array, feet: Sequence[FootNow]) -> bytes:
+def shoe_bytes(columns: PixelColumns, values: Array, feet: Sequence[FootNow]) -> bytes:
     """A shoe's part of a frame."""
     first = int(columns.place[0]) if len(columns) else 0
     of_feet = [(-1.0 if f.phase is None else float(f.phase), f.load, *f.centre) for f in feet]

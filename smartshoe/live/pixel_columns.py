@@ -12,7 +12,7 @@ Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class PixelColumns:
     """A signal's columns of pixels: ``place`` (n,), whose time is ``place`` times the columns' width.
 
     ``low`` and ``high`` (n, width) of the samples in it, NaN where all are missing. Columns without a sample are not
@@ -26,24 +26,24 @@ class Columns:
     def __len__(self) -> int:
         return int(self.place.size)
 
-    def since(self, place: int) -> Columns:
+    def since(self, place: int) -> PixelColumns:
         """From column ``place`` on."""
         first = int(np.searchsorted(self.place, place))
-        return Columns(self.place[first:], self.low[first:], self.high[first:])
+        return PixelColumns(self.place[first:], self.low[first:], self.high[first:])
 
 
-def reduced(time_s: Array, rows: Array, width_s: float) -> Columns:
+def reduced(time_s: Array, rows: Array, width_s: float) -> PixelColumns:
     """Rows (n, width) at rising times (n,), in columns of ``width_s``."""
     if not time_s.size:
-        return Columns(np.zeros(0, dtype=np.int64), np.zeros((0, rows.shape[1])), np.zeros((0, rows.shape[1])))
+        return PixelColumns(np.zeros(0, dtype=np.int64), np.zeros((0, rows.shape[1])), np.zeros((0, rows.shape[1])))
     places = np.floor(time_s / width_s).astype(np.int64)
     first = np.flatnonzero(np.diff(places, prepend=places[0] - 1))
-    return Columns(
+    return PixelColumns(
         places[first], np.fmin.reduceat(rows, first, axis=0), np.fmax.reduceat(rows, first, axis=0)
     )  # fmt: skip
 
 
-def joined(before: Columns, after: Columns, most: int) -> Columns:
+def joined(before: PixelColumns, after: PixelColumns, most: int) -> PixelColumns:
     """Consecutive columns as one, the last ``most`` places of them; a column that both have part of is made whole."""
     if not len(after):
         return before
@@ -52,7 +52,7 @@ def joined(before: Columns, after: Columns, most: int) -> Columns:
     if cut < len(before):
         low, high = low.copy(), high.copy()
         low[0], high[0] = np.fmin(before.low[-1], low[0]), np.fmax(before.high[-1], high[0])
-    whole = Columns(
+    whole = PixelColumns(
         np.concatenate([before.place[:cut], after.place]),
         np.concatenate([before.low[:cut], low]),
         np.concatenate([before.high[:cut], high]),

@@ -104,7 +104,7 @@ def _cut_to_whole_rows(path: Path) -> None:
             file.cut(file.size - torn)
 
 
-class Recording:
+class LiveRecording:
     """A recording under way. `samples` and `note` may be called from any thread and never wait for the disk.
 
     ``acknowledge(shoe, count)`` is called, from the writing thread, once samples are on disk; ``fail`` once where the

@@ -55,7 +55,7 @@ class LiveSession:
         self.shoes = [LiveShoe(url, shoe, _of(shoe, calibrations)) for url, shoe in shoes.items()]
         _require_all_used(self.shoes, calibrations)
         _require_distinct(self.shoes)
-        self.recording: recorder.Recording | None = None
+        self.recording: recorder.LiveRecording | None = None
         self.recorded: str | None = None  # what the last recording came to
         self._file = record
         self._outlets = [Outlet(live, clock()) for live in self.shoes] if lsl else []
@@ -221,7 +221,7 @@ class LiveSession:
             )
             for live, table in zip(self.shoes, recorder.table_paths(path, self._sides()), strict=True)
         ]
-        made = recorder.Recording(path, layouts, self._acknowledge, self._failed)
+        made = recorder.LiveRecording(path, layouts, self._acknowledge, self._failed)
         with self._lock:
             self.recording = made
 

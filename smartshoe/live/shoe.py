@@ -16,9 +16,9 @@ from smartshoe.devices.events import Dropped, Gap, ShoeEvent
 from smartshoe.gait.contact import LEAST_LOAD_N
 from smartshoe.gait.insole import PLACES, centre_of_pressure
 from smartshoe.live.ring import Ring
-from smartshoe.live.steps import Step, StepFollower
+from smartshoe.live.steps import GaitStep, StepFollower
 from smartshoe.recording import REGIONS, Channel, Recording
-from smartshoe.session.streaming import Forces
+from smartshoe.session.streaming import StreamedForces
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ USUAL_RANGE = 50.0  # mbar, where a device does not say its range
 
 
 @dataclass(frozen=True)
-class Foot:
+class LiveFoot:
     """``side`` ('left', 'right' or ''), the columns of its units in the shoe's samples and their regions."""
 
     side: str
@@ -37,7 +37,7 @@ class Foot:
     regions: tuple[str, ...]
 
 
-def feet_of(names: Sequence[str]) -> tuple[Foot, ...]:
+def feet_of(names: Sequence[str]) -> tuple[LiveFoot, ...]:
     """The feet whose units are among ``names``; a name that is no unit's of a shoe belongs to none."""
     by_side: dict[str, list[int]] = {}
     for column, name in enumerate(names):
@@ -45,7 +45,7 @@ def feet_of(names: Sequence[str]) -> tuple[Foot, ...]:
         if region in REGIONS and side in ("", "left", "right"):
             by_side.setdefault(side, []).append(column)
     return tuple(
-        Foot(side, tuple(columns), tuple(names[c].rpartition("_")[2] for c in columns))
+        LiveFoot(side, tuple(columns), tuple(names[c].rpartition("_")[2] for c in columns))
         for side, columns in by_side.items()
     )
 
@@ -73,7 +73,7 @@ class LiveShoe:
         self.unit = channels[0].unit
         self.rate_hz = round(float(shoe.sample_rate_hz), 6)
         self.calibrations = tuple(calibrations)
-        self.forces = Forces(self.calibrations, shoe)
+        self.forces = StreamedForces(self.calibrations, shoe)
         self.symbols = tuple("N" if name in self.forces.names else self.unit.symbol for name in self.names)
         self.ranges = tuple(channel.range_ for channel in channels)
         self.feet = feet_of(self.names)
@@ -99,13 +99,13 @@ class LiveShoe:
         sides = {foot.side for foot in self.feet}
         return sides.pop() if len(sides) == 1 else ""
 
-    def _least(self, foot: Foot) -> float:
+    def _least(self, foot: LiveFoot) -> float:
         if all(self.symbols[c] == "N" for c in foot.columns):
             return LEAST_LOAD_N
         ranges = [self.ranges[c] for c in foot.columns]
         return LEAST_SHARE * max([r[1] - r[0] for r in ranges if r is not None] or [USUAL_RANGE])
 
-    def take(self, block: Block, session_s: Array, force_n: dict[str, Array]) -> list[tuple[str, Step]]:
+    def take(self, block: Block, session_s: Array, force_n: dict[str, Array]) -> list[tuple[str, GaitStep]]:
         """Show a block's samples at ``session_s`` (n,); the steps in it, each with its foot's side."""
         columns = [
             force_n[name] if name in force_n else np.where(block.missing[:, k], np.nan, block.readings[:, k])

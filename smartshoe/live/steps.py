@@ -26,7 +26,7 @@ APART_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class GaitStep:
     """``event`` (heel_strike, foot_flat, heel_off, toe_off) of a foot at ``time_s``."""
 
     time_s: float
@@ -62,9 +62,9 @@ class StepFollower:
             return HEEL
         return PUSH if fore and self._heel and not heel else FLAT
 
-    def push(self, time_s: Array, loads: Array) -> list[Step]:
+    def push(self, time_s: Array, loads: Array) -> list[GaitStep]:
         """The events in the next ``loads`` (n, r), finite, at ``time_s`` (n,)."""
-        found: list[Step] = []
+        found: list[GaitStep] = []
         table = np.column_stack([loads, loads.sum(axis=1)]).tolist()
         for at, values in zip(time_s.tolist(), table, strict=True):
             self._follow(at, values)
@@ -85,7 +85,7 @@ class StepFollower:
             top = self._top[k]
             self._top[k] = value if value > top else top - (top - self._floor[k]) * passed_s / FORGET_S
 
-    def _judged(self, at: float, values: list[float]) -> list[Step]:
+    def _judged(self, at: float, values: list[float]) -> list[GaitStep]:
         assert self._floor is not None
         rise = self._top[-1] - self._floor[-1]
         share = (values[-1] - self._floor[-1]) / rise if rise >= max(self.least, 1e-9) else 0.0
@@ -96,17 +96,17 @@ class StepFollower:
         if at - self._changed_s >= APART_S and (share < OFF if self._is_down else share > ON):
             self._is_down, self._changed_s = not self._is_down, at
             self._was_flat = self._is_off = False
-            return [Step(at, "heel_strike" if self._is_down else "toe_off")]
+            return [GaitStep(at, "heel_strike" if self._is_down else "toe_off")]
         return self._within(at) if self._is_down else []
 
-    def _within(self, at: float) -> list[Step]:
+    def _within(self, at: float) -> list[GaitStep]:
         if not self._heel:
             return []
         phase = self.phase
         if phase == FLAT and not self._was_flat:
             self._was_flat = True
-            return [Step(at, "foot_flat")]
+            return [GaitStep(at, "foot_flat")]
         if phase == PUSH and self._was_flat and not self._is_off:
             self._is_off = True
-            return [Step(at, "heel_off")]
+            return [GaitStep(at, "heel_off")]
         return []

@@ -57,7 +57,7 @@ def _lines(found: list[int]) -> str:
     return f"line {found[0]}" if len(found) == 1 else f"lines {', '.join(map(str, found))}"
 
 
-class _Table:
+class _NumberTable:
     def __init__(self, path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[int]) -> None:
         self.path, self.names, self.lines = path, names, lines
         self.cells: list[Sequence[str]] = list(zip(*rows, strict=True))
@@ -179,7 +179,7 @@ def numbers_of(path: Path, names: Sequence[str], rows: Sequence[Sequence[str]], 
     One decimal mark holds for the whole file. Raises `FormatError` naming the lines where cells contradict each
     other, and the line and column of a cell that is no number.
     """
-    table = _Table(path, names, rows, lines)
+    table = _NumberTable(path, names, rows, lines)
     decimal = table.decimal()
     notes: list[str] = []
     columns = [table.convert(index, decimal, notes) for index in range(len(names))]

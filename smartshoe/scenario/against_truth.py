@@ -12,7 +12,7 @@ from smartshoe.recording import Recording
 
 if TYPE_CHECKING:
     from smartshoe.gait import GaitResult
-    from smartshoe.scenario.trial import TrueEvent, Truth
+    from smartshoe.scenario.trial import TrialEvent, TrialTruth
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,9 @@ ORDER = ("heel", "meta4", "meta1", "toe")
 EVENTS = ("heel_strike", "foot_flat", "heel_off", "toe_off")
 
 
-def compare(recording: Recording, truth: Truth, found: GaitResult, raw_foot_n: Mapping[str, Array]) -> dict[str, Any]:
+def compare(
+    recording: Recording, truth: TrialTruth, found: GaitResult, raw_foot_n: Mapping[str, Array]
+) -> dict[str, Any]:
     """Truth, raw (static gains) and corrected side by side; all forces in N, on the recording's times.
 
     ``standing_...`` and ``strides_...`` are mean forces over the stretches that the analysis found (None where there
@@ -76,7 +78,9 @@ def _on(time_s: Array, found: GaitResult, foot: str) -> Array:
     return np.asarray(np.interp(time_s, course.time_s, values))
 
 
-def _rmse_coils(time_s: Array, truth: Truth, found: GaitResult, raw_foot_n: Mapping[str, Array]) -> dict[str, float]:
+def _rmse_coils(
+    time_s: Array, truth: TrialTruth, found: GaitResult, raw_foot_n: Mapping[str, Array]
+) -> dict[str, float]:
     """Errors of the load on all coils: what the units get wrong, whatever passes beside them."""
     borne_n = truth.load_n.sum(axis=1)
     raw_n = found.coverage * np.sum([raw_foot_n[foot] for foot in truth.feet], axis=0)
@@ -96,7 +100,7 @@ def _means(totals: Mapping[str, Array], where: NDArray[np.bool_]) -> dict[str, f
     return {name: float(values[where].mean()) for name, values in totals.items()}
 
 
-def _stances(events: Sequence[TrueEvent], foot: str) -> list[tuple[float, float]]:
+def _stances(events: Sequence[TrialEvent], foot: str) -> list[tuple[float, float]]:
     """Begin and end in s of the foot's whole stances."""
     begun: float | None = None
     spans: list[tuple[float, float]] = []
@@ -120,7 +124,7 @@ def _mean_peak(time_s: Array, force_n: Array, stances: Sequence[tuple[float, flo
     return float(np.mean(peaks)) if peaks else None
 
 
-def _event_errors(truth: Truth, found: GaitResult, kind: str) -> dict[str, Any]:
+def _event_errors(truth: TrialTruth, found: GaitResult, kind: str) -> dict[str, Any]:
     """Errors of both feet's events of one kind: median and 95th percentile of their size, and how many are wrong."""
     end_s = float(truth.time_s[-1]) - EDGE_S
     errors: list[Array] = []
@@ -163,7 +167,7 @@ def onsets(time_s: Array, load_n: Array, level_n: float, stances: Sequence[tuple
 
 
 def _orders(
-    recording: Recording, truth: Truth, found: GaitResult, stances: Mapping[str, Sequence[tuple[float, float]]]
+    recording: Recording, truth: TrialTruth, found: GaitResult, stances: Mapping[str, Sequence[tuple[float, float]]]
 ) -> dict[str, Any] | None:
     names = [channel.name for channel in recording.sensors]
     level_n = CONTACT * truth.body_weight_n

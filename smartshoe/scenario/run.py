@@ -19,7 +19,7 @@ from smartshoe.identification import Identification, identify
 from smartshoe.logs import read
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
-from smartshoe.scenario.schema import DiagnoseTable, Scenario, Source
+from smartshoe.scenario.schema import DiagnoseTable, Scenario, ScenarioText
 from smartshoe.scenario.trial import RecordedTrial, TrialResult, analyse_trial, opened_shoe, record_trial
 from smartshoe.validation import Validation, validate
 
@@ -96,7 +96,7 @@ def _seed_of(scenario: Scenario, name: str) -> int:
     return int(np.random.SeedSequence([scenario.seed, zlib.crc32(name.encode())]).generate_state(1)[0])
 
 
-def protocols_of(scenario: Scenario, source: Source) -> dict[str, Protocol]:
+def protocols_of(scenario: Scenario, source: ScenarioText) -> dict[str, Protocol]:
     """The scenario's protocols by name; raises `ScenarioError` for one that exceeds its limits."""
     built: dict[str, Protocol] = {}
     for name, table in scenario.protocol.items():
@@ -108,7 +108,7 @@ def protocols_of(scenario: Scenario, source: Source) -> dict[str, Protocol]:
 
 
 def _record(
-    scenario: Scenario, source: Source, index: int, protocols: dict[str, Protocol], progress: Progress
+    scenario: Scenario, source: ScenarioText, index: int, protocols: dict[str, Protocol], progress: Progress
 ) -> dict[str, Recording]:
     unit = scenario.unit[index]
     if unit.recordings:
@@ -135,7 +135,7 @@ def _record(
     return recordings
 
 
-def _machine_of(scenario: Scenario, source: Source, index: int) -> TestMachine:
+def _machine_of(scenario: Scenario, source: ScenarioText, index: int) -> TestMachine:
     """The machine with the unit under it; raises `ScenarioError` for an option that is none."""
     unit = scenario.unit[index]
     options = _beside(source, {**scenario.machine.options, **unit.options})
@@ -146,7 +146,7 @@ def _machine_of(scenario: Scenario, source: Source, index: int) -> TestMachine:
         raise source.from_option(error, ("machine",) if in_machine else ("unit", index)) from error
 
 
-def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], source: Source) -> None:
+def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], source: ScenarioText) -> None:
     for name, protocol in protocols.items():
         try:
             machine.check(protocol)
@@ -154,7 +154,7 @@ def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], sourc
             raise source.error(("protocol", name), str(error)) from error
 
 
-def check_simulated(scenario: Scenario, source: Source) -> None:
+def check_simulated(scenario: Scenario, source: ScenarioText) -> None:
     """Open every simulated device of the scenario and check its protocols, and move nothing.
 
     So a misspelt option is told before the first experiment. Devices that are not simulated are left alone. Raises
@@ -171,7 +171,7 @@ def check_simulated(scenario: Scenario, source: Source) -> None:
             pass
 
 
-def _beside(source: Source, options: dict[str, Any]) -> dict[str, Any]:
+def _beside(source: ScenarioText, options: dict[str, Any]) -> dict[str, Any]:
     """``options`` with a twin's calibration taken from the scenario's folder, as recordings are."""
     bladder = options.get("bladder")
     if not isinstance(bladder, dict) or not isinstance(bladder.get("twin"), str):
@@ -179,7 +179,7 @@ def _beside(source: Source, options: dict[str, Any]) -> dict[str, Any]:
     return {**options, "bladder": {**bladder, "twin": str(source.path.parent / bladder["twin"])}}
 
 
-def simulate(scenario: Scenario, source: Source, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:
+def simulate(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:
     """Only the devices: recordings by unit and experiment."""
     protocols = protocols_of(scenario, source)
     return {
@@ -187,7 +187,7 @@ def simulate(scenario: Scenario, source: Source, progress: Progress = _silent) -
     }
 
 
-def simulate_trial(scenario: Scenario, source: Source, progress: Progress = _silent) -> RecordedTrial | None:
+def simulate_trial(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> RecordedTrial | None:
     """Only the shoes: what the scenario's trial recorded; None where there is no ``[trial]``."""
     if scenario.trial is None:
         return None
@@ -217,7 +217,7 @@ def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Dia
     )
 
 
-def run(scenario: Scenario, source: Source, progress: Progress = _silent) -> ScenarioResult:
+def run(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> ScenarioResult:
     """Devices, then identification, calibration and validation of each unit, then the trial.
 
     Raises what the steps raise, with the unit's name in front.

@@ -226,7 +226,7 @@ class ScenarioKeyError(ScenarioError):
     reason = ""
 
 
-class Source:
+class ScenarioText:
     """A scenario's text, to turn a path of keys into 'FILE, line N, key K'."""
 
     def __init__(self, path: Path, text: str) -> None:
@@ -267,7 +267,7 @@ class Source:
         return self.error(keys, message)
 
 
-def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, Source]:
+def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, ScenarioText]:
     """A TOML file's tables as they stand in it, and the file itself; raises `ScenarioError`.
 
     ``what`` says what the file should be.
@@ -278,12 +278,12 @@ def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, Sou
     except InputError as error:
         raise ScenarioError(str(error)) from error
     try:
-        return tomllib.loads(text), Source(file, text)
+        return tomllib.loads(text), ScenarioText(file, text)
     except (ValueError, RecursionError) as error:  # a number of 5000 digits is a ValueError of its own
         raise ScenarioError(f"{file} is not valid TOML: {error}") from error
 
 
-def load(path: Path | str, values: Mapping[str, Any] | None = None) -> tuple[Scenario, Source]:
+def load(path: Path | str, values: Mapping[str, Any] | None = None) -> tuple[Scenario, ScenarioText]:
     """Read and check a scenario file, with ``values`` by dotted key (`smartshoe.scenario.keys`) in its values' places.
 
     Raises `ScenarioError`: what is wrong, with line and key.
@@ -292,7 +292,7 @@ def load(path: Path | str, values: Mapping[str, Any] | None = None) -> tuple[Sce
     return checked(with_values(tables, values or {}), source), source
 
 
-def checked(tables: Tables, source: Source) -> Scenario:
+def checked(tables: Tables, source: ScenarioText) -> Scenario:
     """The scenario in ``tables``, whatever its ``[sweep]``; raises `ScenarioError`, which points into ``source``."""
     try:
         # A copy: kinds of protocols are filled in on the way.
@@ -319,4 +319,4 @@ def checked(tables: Tables, source: Source) -> Scenario:
     return scenario
 
 
-__all__ = ["Scenario", "ScenarioKeyError", "Source", "UnitTable", "checked", "load", "read_tables"]
+__all__ = ["Scenario", "ScenarioKeyError", "ScenarioText", "UnitTable", "checked", "load", "read_tables"]

@@ -14,7 +14,7 @@ from smartshoe.devices.base import Shoe
 from smartshoe.errors import OptionError, UsageError
 from smartshoe.recording import Channel, Recording
 from smartshoe.scenario.against_truth import compare
-from smartshoe.scenario.schema import Scenario, Source, TrialTable
+from smartshoe.scenario.schema import Scenario, ScenarioText, TrialTable
 from smartshoe.units import NEWTON
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 WORN = ("bladder", "sensor")  # of a unit's keys: the rest is the testing machine's
 
 
-class TrueEvent(Protocol):
+class TrialEvent(Protocol):
     """An event that truly was."""
 
     @property
@@ -42,7 +42,7 @@ class TrueEvent(Protocol):
         """What it was, in the words of `smartshoe.gait`."""
 
 
-class Truth(Protocol):
+class TrialTruth(Protocol):
     """What a simulated shoe knows beside its readings, as ``truth``; a real shoe has none.
 
     ``load_n`` (n, units) in the recording's order of units, ``foot_n`` (n, feet) with what passes beside the units.
@@ -65,7 +65,7 @@ class Truth(Protocol):
         """The feet, in the order of ``foot_n``."""
 
     @property
-    def events(self) -> Sequence[TrueEvent]:
+    def events(self) -> Sequence[TrialEvent]:
         """All events, in order."""
 
     @property
@@ -78,7 +78,7 @@ class RecordedTrial:
     """What the shoes recorded, and what truly was where they are simulated."""
 
     recording: Recording
-    truth: Truth | None
+    truth: TrialTruth | None
 
     def true_loads(self) -> Recording | None:
         """The true loads as a plain table: each unit's, and each foot's whole (``left_total``); None if unknown."""
@@ -138,7 +138,7 @@ class TrialResult:
         }
 
 
-def record_trial(scenario: Scenario, source: Source, seed: int) -> RecordedTrial:
+def record_trial(scenario: Scenario, source: ScenarioText, seed: int) -> RecordedTrial:
     """The scenario's trial on its shoe; raises `ScenarioError` for a shoe or an option that is none."""
     table = scenario.trial
     if table is None:
@@ -151,7 +151,7 @@ def record_trial(scenario: Scenario, source: Source, seed: int) -> RecordedTrial
     return RecordedTrial(recording, getattr(shoe, "truth", None))
 
 
-def opened_shoe(scenario: Scenario, source: Source, seed: int) -> Shoe:
+def opened_shoe(scenario: Scenario, source: ScenarioText, seed: int) -> Shoe:
     """The trial's shoe, not started yet; raises `ScenarioError` for a shoe or an option that is none."""
     table = scenario.trial or TrialTable()
     options = {"seed": seed, **table.options}
@@ -166,7 +166,7 @@ def opened_shoe(scenario: Scenario, source: Source, seed: int) -> Shoe:
         raise source.error(("trial", "shoe"), str(error)) from error
 
 
-def _beside(source: Source, shoe: str) -> str:
+def _beside(source: ScenarioText, shoe: str) -> str:
     """The shoe's address with a replayed file taken from the scenario's folder, as recordings are."""
     scheme, _, target = shoe.partition(":")
     return f"replay:{source.path.parent / target}" if scheme == "replay" else shoe

@@ -3,13 +3,13 @@
 from smartshoe.session.analysis import SessionResult, analyse
 from smartshoe.session.folder import SessionFolder
 from smartshoe.session.operator import Operator, Unattended
-from smartshoe.session.plan import Plan, protocols_named
+from smartshoe.session.plan import SessionPlan, protocols_named
 from smartshoe.session.procedure import conduct
 from smartshoe.session.publish import publish
 
 __all__ = [
     "Operator",
-    "Plan",
+    "SessionPlan",
     "SessionFolder",
     "SessionResult",
     "Unattended",

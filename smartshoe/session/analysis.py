@@ -13,7 +13,7 @@ from smartshoe.errors import InputError, NotIdentifiableError, SmartShoeError
 from smartshoe.identification import Identification, identify
 from smartshoe.recording import Recording
 from smartshoe.session.folder import Attempt, SessionFolder
-from smartshoe.session.plan import Plan
+from smartshoe.session.plan import SessionPlan
 from smartshoe.validation import Validation, validate
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def _silent(_: str) -> None:
 class SessionResult:
     """What came out of a session; ``recordings`` are load and reading on one time base, by experiment."""
 
-    plan: Plan
+    plan: SessionPlan
     attempts: tuple[Attempt, ...]
     recordings: dict[str, Recording]
     identification: Identification
@@ -84,7 +84,7 @@ class SessionResult:
         }
 
 
-def joined(plan: Plan, attempt: Attempt, *, to_fit: bool = False) -> Recording:
+def joined(plan: SessionPlan, attempt: Attempt, *, to_fit: bool = False) -> Recording:
     """Load and the unit's reading at the shoe's samples; raises `InputError` where the two do not match.
 
     ``to_fit``: at the samples of whichever is slower, so that noise stays white and error bars hold.

@@ -26,7 +26,7 @@ from smartshoe.journal import Journal, Record, read_journal
 from smartshoe.logs import read, write
 from smartshoe.recording import Channel, Recording
 from smartshoe.session import samples
-from smartshoe.session.plan import Plan
+from smartshoe.session.plan import SessionPlan
 from smartshoe.units import Unit, declared, find_unit
 
 EVENT, SAMPLES = 1, 2
@@ -97,7 +97,7 @@ def kept_on_disk(what: Path) -> Iterator[None]:
 class SessionFolder:
     """A session's folder, open for writing (`begin`, `resume`) or only read (`open`)."""
 
-    def __init__(self, path: Path, plan: Plan, journal: Journal | None) -> None:
+    def __init__(self, path: Path, plan: SessionPlan, journal: Journal | None) -> None:
         self.path, self.plan = path, plan
         self._journal = journal
         self.channels: tuple[ChannelDescription, ...] = ()
@@ -105,7 +105,7 @@ class SessionFolder:
 
     # -- opening -----------------------------------------------------------------------------------------------
     @classmethod
-    def begin(cls, path: Path | str, plan: Plan) -> Self:
+    def begin(cls, path: Path | str, plan: SessionPlan) -> Self:
         """A new session; raises `UsageError` where the folder holds one already in which anything was recorded."""
         folder = make_folder(path)
         make_folder(folder / RAW)
@@ -242,7 +242,7 @@ class SessionFolder:
         return {attempt.experiment: attempt for attempt in self.attempts() if attempt.state == "accepted"}
 
 
-def _plan_of(folder: Path) -> Plan:
+def _plan_of(folder: Path) -> SessionPlan:
     file = folder / PLAN
     try:
         found = parsed_json(read_text(file, "a session's plan"))
@@ -252,7 +252,7 @@ def _plan_of(folder: Path) -> Plan:
         raise UsageError(f"{folder} holds no session ({error}): give the --out of one") from error
     except ValueError as error:
         raise InputError(f"{file} is damaged ({error}): restore it from a copy") from error
-    return Plan.from_dict(found, str(file))
+    return SessionPlan.from_dict(found, str(file))
 
 
 def _channel(item: dict[str, Any]) -> ChannelDescription:

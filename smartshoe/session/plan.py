@@ -1,4 +1,4 @@
-"""`Plan`: what a session is to do, as it stands in the session's folder; and protocols by name or from a file."""
+"""`SessionPlan`: what a session is to do, as its folder holds it; and protocols by name or from a file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LARGEST_REPEATS = 100
 
 
 @dataclass(frozen=True)
-class Plan:
+class SessionPlan:
     """``shoe`` and ``machine`` are URLs, ``unit`` is the one to calibrate, each protocol is one experiment.
 
     The stream is recorded for ``zero_s`` before and ``tail_s`` after each test; from the second pressing on until the

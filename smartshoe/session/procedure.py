@@ -17,7 +17,7 @@ from smartshoe.session.checks import AS_IT_GOES, AT_THE_END, Pressing, PressingF
 from smartshoe.session.folder import Attempt, SessionFolder
 from smartshoe.session.machine_run import LOOK_EVERY_S, LogByHand, MachineSide, machine_at
 from smartshoe.session.operator import Operator, Unattended
-from smartshoe.session.plan import Plan
+from smartshoe.session.plan import SessionPlan
 
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
@@ -73,7 +73,7 @@ def _check_limits(machine: MachineSide, protocols: list[Protocol]) -> None:
         )
 
 
-def _check_range(plan: Plan, shoe: Shoe, protocols: list[Protocol], operator: Operator) -> None:
+def _check_range(plan: SessionPlan, shoe: Shoe, protocols: list[Protocol], operator: Operator) -> None:
     """Where an earlier calibration says how far the reading goes, refuse what the sensor's range does not hold."""
     channel = next(channel for channel in shoe.describe() if channel.name == plan.unit)
     earlier = _earlier(plan)
@@ -94,7 +94,7 @@ def _check_range(plan: Plan, shoe: Shoe, protocols: list[Protocol], operator: Op
         )
 
 
-def _earlier(plan: Plan) -> Calibration | None:
+def _earlier(plan: SessionPlan) -> Calibration | None:
     """The unit's last calibration in the store."""
     if not plan.serial_number:
         return None

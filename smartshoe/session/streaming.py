@@ -47,7 +47,7 @@ class StreamTable:
         self._file.close()
 
 
-class Forces:
+class StreamedForces:
     """The calibrated units' forces of a stream; lost samples are bridged, so that the filters keep their time."""
 
     def __init__(self, calibrations: Sequence[Calibration], shoe: Shoe) -> None:

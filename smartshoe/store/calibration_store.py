@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from smartshoe.errors import InputError, RefusedError, UsageError
 from smartshoe.store import files
 from smartshoe.store.dates import days_between, iso, moment
-from smartshoe.store.entry import Entry, Event, EventKind, Found
+from smartshoe.store.entry import Entry, EventKind, Found, HistoryEvent
 
 if TYPE_CHECKING:
     from smartshoe.compensation import Calibration
@@ -103,7 +103,7 @@ class CalibrationStore:
             **about, "fingerprint": files.fingerprint(kept)
         })  # fmt: skip
 
-    def place(self, serial_number: str, position: str, date: When, note: str = "") -> Event:
+    def place(self, serial_number: str, position: str, date: When, note: str = "") -> HistoryEvent:
         """From ``date`` on the unit sits at ``position`` ("left_toe"); whichever sat there has left."""
         if not position.strip():
             raise UsageError("no position is given: name where the unit sits, for example left_toe")
@@ -111,18 +111,18 @@ class CalibrationStore:
             raise UsageError(f"position {position!r} holds what cannot be printed: name it like left_toe")
         return self._happened("placed", serial_number, date, position, note)
 
-    def repair(self, serial_number: str, date: When, note: str = "") -> Event:
+    def repair(self, serial_number: str, date: When, note: str = "") -> HistoryEvent:
         """The unit was repaired: calibrations from before do not hold after, nor the other way."""
         return self._happened("repaired", serial_number, date, "", note)
 
-    def retire(self, serial_number: str, date: When, note: str = "") -> Event:
+    def retire(self, serial_number: str, date: When, note: str = "") -> HistoryEvent:
         """The unit is out of use from ``date`` on."""
         return self._happened("retired", serial_number, date, "", note)
 
-    def _happened(self, kind: EventKind, serial_number: str, at: When, position: str, note: str) -> Event:
+    def _happened(self, kind: EventKind, serial_number: str, at: When, position: str, note: str) -> HistoryEvent:
         files.folder_name(serial_number)
         before = [event for event in self.events(serial_number) if event.kind == kind]
-        event = Event(kind, serial_number, moment(at), position.strip(), note)
+        event = HistoryEvent(kind, serial_number, moment(at), position.strip(), note)
         for other in before:
             if replace(other, order=0) == event:
                 return other
@@ -131,14 +131,14 @@ class CalibrationStore:
         return numbered
 
     # -- what is in it -----------------------------------------------------------------------------------------
-    def _read(self) -> tuple[list[Entry], list[Event]]:
+    def _read(self) -> tuple[list[Entry], list[HistoryEvent]]:
         """Every entry and event; files that the index does not know, or knows otherwise, are read and indexed."""
         now = files.listing(self.folder)
         known = files.read_index(self.folder)
         items: dict[str, Any] = {}
         faults: list[str] = []
         entries: list[Entry] = []
-        events: list[Event] = []
+        events: list[HistoryEvent] = []
         for relative, state in now.items():
             kept = known.get(relative)
             fresh = isinstance(kept, dict) and kept.get("state") == list(state)
@@ -172,7 +172,7 @@ class CalibrationStore:
         """Every calibration, by serial number and date."""
         return tuple(self._read()[0])
 
-    def events(self, serial_number: str | None = None) -> tuple[Event, ...]:
+    def events(self, serial_number: str | None = None) -> tuple[HistoryEvent, ...]:
         """Every event, or those of one unit, by date."""
         return tuple(e for e in self._read()[1] if serial_number is None or e.serial_number == serial_number)
 
@@ -289,11 +289,11 @@ def _hash(entry: Entry) -> str:
     return entry.name.rpartition("_")[2]
 
 
-def _back_in_use(retired: Event, events: list[Event], at: datetime) -> bool:
+def _back_in_use(retired: HistoryEvent, events: list[HistoryEvent], at: datetime) -> bool:
     return any(e.kind == "placed" and retired.date < e.date <= at for e in events)
 
 
-def segment(events: Sequence[Event], at: datetime) -> tuple[datetime | None, datetime | None]:
+def segment(events: Sequence[HistoryEvent], at: datetime) -> tuple[datetime | None, datetime | None]:
     """The repairs before (or at) and after ``at`` among a unit's ``events``, None where there is none."""
     repairs = sorted(event.date for event in events if event.kind == "repaired")
     return (

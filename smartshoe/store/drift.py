@@ -16,7 +16,7 @@ from smartshoe.errors import UsageError
 from smartshoe.models.parameter import Parameter
 from smartshoe.store.calibration_store import CalibrationStore
 from smartshoe.store.dates import days_between, iso
-from smartshoe.store.entry import Entry, Event
+from smartshoe.store.entry import Entry, HistoryEvent
 from smartshoe.store.quantities import STATIC_GAIN, ZERO, quantities, require_one_reading_unit, top_load_n
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ LEAST_FREEDOM = 2  # calibrations beyond levels and slope, to judge a jump by
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class DriftStep:
     """A change at a moment: ``change`` (in the quantity's unit) at a repair, or between two calibrations."""
 
     date: datetime
@@ -63,8 +63,8 @@ class Trend:
     pieces: NDArray[np.intp]
     per_year: Parameter | None
     levels: Array
-    repairs: tuple[Step, ...]
-    jumps: tuple[Step, ...]
+    repairs: tuple[DriftStep, ...]
+    jumps: tuple[DriftStep, ...]
     scatter: float
     says: str
 
@@ -98,7 +98,7 @@ class Drift:
 
     serial_number: str
     entries: tuple[Entry, ...]
-    events: tuple[Event, ...]
+    events: tuple[HistoryEvent, ...]
     trends: dict[str, Trend]
     top_load_n: float
     says: str
@@ -151,7 +151,7 @@ def _followed(calibrations: Sequence[Calibration]) -> list[tuple[str, str, Array
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _TrendFit:
     """Weighted least squares: theta (p,), its covariance with the scatter in it, degrees of freedom, scatter."""
 
     theta: Array
@@ -170,7 +170,7 @@ class _Fit:
         return Parameter.from_sd(value, sd, unit, float(t.ppf(0.975, self.freedom)))
 
 
-def _fit(design: Array, values: Array, sds: Array) -> _Fit | None:
+def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
     """None where the design does not determine every coefficient.
 
     What the sds do not explain widens the error bars (Birge 1932: never narrows them): a calibration's sd knows
@@ -189,7 +189,7 @@ def _fit(design: Array, values: Array, sds: Array) -> _Fit | None:
     spread = max(math.sqrt(float(left @ left) / freedom), rounding) if freedom > 0 else math.nan
     widen = max(spread, 1.0) if known and freedom > 0 else spread if freedom > 0 else 1.0
     covariance = widen**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(size, size)
-    return _Fit(theta / size, covariance, freedom, spread if known else math.nan)
+    return _TrendFit(theta / size, covariance, freedom, spread if known else math.nan)
 
 
 def _trend(
@@ -200,7 +200,7 @@ def _trend(
     sds: Array,
     lives: NDArray[np.intp],
     entries: Sequence[Entry],
-    repairs: Sequence[Event],
+    repairs: Sequence[HistoryEvent],
 ) -> Trend:
     # Numbered without gaps: of two repairs with no calibration between, the last one counts.
     pieces = np.unique(lives, return_inverse=True)[1].astype(np.intp)
@@ -222,17 +222,17 @@ def _trend(
         if k in jumped:
             between = f"between {iso(entries[k - 1].date)} and {iso(entries[k].date)}"
             said = f"{_amount(name, change)} {between}, which no repair explains"
-            jumps.append(Step(entries[k].date, change, said))
+            jumps.append(DriftStep(entries[k].date, change, said))
         else:
             when = repairs[int(lives[k]) - 1].date
-            at_repairs.append(Step(when, change, f"{_amount(name, change)} at the repair of {iso(when)}"))
+            at_repairs.append(DriftStep(when, change, f"{_amount(name, change)} at the repair of {iso(when)}"))
     return Trend(
         name, unit, days, values, sds, pieces, slope, levels, tuple(at_repairs), tuple(jumps), found.scatter,
         _trend_says(name, slope, at_repairs, jumps, values),
     )  # fmt: skip
 
 
-def _fit_of(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) -> tuple[_Fit, Array | None]:
+def _fit_of(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) -> tuple[_TrendFit, Array | None]:
     """Levels of the pieces (at the mean day) and a slope that they share; the contrast of the slope per day.
 
     Where the slope is not determined (each piece has one date) the levels alone, and None.
@@ -292,7 +292,7 @@ def _amount(name: str, change: Parameter) -> str:
 
 
 def _trend_says(
-    name: str, slope: Parameter | None, repairs: Sequence[Step], jumps: Sequence[Step], values: Array
+    name: str, slope: Parameter | None, repairs: Sequence[DriftStep], jumps: Sequence[DriftStep], values: Array
 ) -> str:
     said = []
     if slope is None:

@@ -68,7 +68,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class HistoryEvent:
     """What happened to a unit: it was placed at a ``position`` (and whoever sat there left), repaired or retired."""
 
     kind: EventKind

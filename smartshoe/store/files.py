@@ -20,7 +20,7 @@ from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.errors import InputError, UsageError
 from smartshoe.gate import limits, parsed_json, read_bytes, read_text
 from smartshoe.store.dates import iso, moment
-from smartshoe.store.entry import EVENT_KINDS, Entry, Event
+from smartshoe.store.entry import EVENT_KINDS, Entry, HistoryEvent
 
 INDEX, UNITS, EVENTS = "index.json", "units", "events"
 INDEX_SCHEMA, EVENT_SCHEMA = "smartshoe.store.index/1", "smartshoe.store.event/1"
@@ -72,7 +72,7 @@ def write_calibration(root: Path, calibration: Mapping[str, Any], store: Mapping
     return _write_named(folder, store["date"], {**calibration, "store": dict(store)})
 
 
-def write_event(root: Path, event: Event) -> Path:
+def write_event(root: Path, event: HistoryEvent) -> Path:
     """Write an event; returns the path."""
     folder_name(event.serial_number)
     return _write_named(root / EVENTS, iso(event.date), {"schema": EVENT_SCHEMA, **event.to_dict()})
@@ -127,11 +127,11 @@ def entry_of(root: Path, relative: str, item: Mapping[str, Any]) -> Entry:
     )
 
 
-def event_of(item: Mapping[str, Any]) -> Event:
+def event_of(item: Mapping[str, Any]) -> HistoryEvent:
     """The event that the index's ``item`` describes."""
     if item["kind"] not in EVENT_KINDS:
         raise InputError(f"event {item['kind']!r} is not known: use a newer smartshoe")
-    return Event(
+    return HistoryEvent(
         item["kind"],
         item["serial_number"],
         moment(item["date"]),

@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
 
 from smartshoe.errors import ScenarioError
-from smartshoe.scenario.schema import Source, read_tables
+from smartshoe.scenario.schema import ScenarioText, read_tables
 
 
 class TrialEntry(BaseModel):
@@ -43,7 +43,7 @@ class StudyPlan(BaseModel):
         return list(dict.fromkeys(entry.condition for entry in self.trial))
 
 
-def read_study(path: Path | str) -> tuple[StudyPlan, Source]:
+def read_study(path: Path | str) -> tuple[StudyPlan, ScenarioText]:
     """Read and check a study's file; raises `ScenarioError`: what is wrong, with line and key."""
     tables, source = read_tables(path)
     try:
@@ -60,5 +60,5 @@ def read_study(path: Path | str) -> tuple[StudyPlan, Source]:
     return plan, source
 
 
-def _twice(source: Source, index: int, file: str) -> ScenarioError:
+def _twice(source: ScenarioText, index: int, file: str) -> ScenarioError:
     return source.error(("trial", index, "file"), f"{file} is there twice, which would count it twice: remove one")

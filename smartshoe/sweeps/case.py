@@ -11,7 +11,7 @@ from smartshoe.atomic import json_text
 from smartshoe.blas import on_one_thread
 from smartshoe.errors import DeviceError, SmartShoeError
 from smartshoe.scenario import checked, run
-from smartshoe.scenario.schema import Source
+from smartshoe.scenario.schema import ScenarioText
 from smartshoe.sweeps.plan import Case
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def computed(case: Case) -> str:
 # Sums over several threads come out in another order, and so in other last digits.
 @on_one_thread
 def _run(case: Case) -> ScenarioResult:
-    source = Source(Path(case.source), case.text)
+    source = ScenarioText(Path(case.source), case.text)
     return run(checked(case.tables, source), source)
 
 

@@ -49,7 +49,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Design:
+class SweepDesign:
     """All cases in order: the axes' grid (the last axis fastest) or random draws, each with every seed.
 
     A random design's first cases stay the same where its count grows.
@@ -84,7 +84,7 @@ class Design:
         return self.seeds[case % len(self.seeds)]
 
 
-def design_of(table: Any, scenario_seed: int, refuse: Refuse) -> Design:
+def design_of(table: Any, scenario_seed: int, refuse: Refuse) -> SweepDesign:
     """The design in a scenario's ``[sweep]`` table; ``refuse(path, reason)`` makes the error to raise."""
     if not isinstance(table, dict):
         raise refuse(("sweep",), "there is no [sweep] here: add one with seeds, and [sweep.vary] with keys to vary")
@@ -108,12 +108,12 @@ def design_of(table: Any, scenario_seed: int, refuse: Refuse) -> Design:
                 )
         count = math.prod(len(axis.values) for axis in axes)
         _bounded(count * len(seeds), ("sweep", "vary"), refuse)
-        return Design(axes, seeds, "grid", count, 0)
+        return SweepDesign(axes, seeds, "grid", count, 0)
     if not axes:
         raise refuse(("sweep", "vary"), "a random design needs keys to draw: add them")
     count = _counted(table.get("count"), ("sweep", "count"), refuse)
     _bounded(count * len(seeds), ("sweep", "count"), refuse)
-    return Design(axes, seeds, "random", count, _whole(table.get("draw", 0), ("sweep", "draw"), 0, refuse))
+    return SweepDesign(axes, seeds, "random", count, _whole(table.get("draw", 0), ("sweep", "draw"), 0, refuse))
 
 
 def _whole(given: Any, path: Path, least: int, refuse: Refuse) -> int:

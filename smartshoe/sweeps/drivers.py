@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smartshoe.sweeps.plan import Plan
+from smartshoe.sweeps.plan import SweepPlan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ class Driver:
     p_value: float
 
 
-def figures_in(table: pd.DataFrame, plan: Plan) -> list[str]:
+def figures_in(table: pd.DataFrame, plan: SweepPlan) -> list[str]:
     """The columns that hold figures that are numbers and not the same for all cases."""
     own = {axis.key for axis in plan.design.axes} | {"seed", "status", "says", "case"}
     import pandas as pd
@@ -42,13 +42,13 @@ def figures_in(table: pd.DataFrame, plan: Plan) -> list[str]:
     return [name for name in numeric if table[name].nunique() > 1]
 
 
-def main_figures(table: pd.DataFrame, plan: Plan) -> list[str]:
+def main_figures(table: pd.DataFrame, plan: SweepPlan) -> list[str]:
     """The figures that the page begins with: each unit's error after compensation, and the trial's."""
     there = figures_in(table, plan)
     return [name for name in there if name.endswith(MAIN)] or there[:1]
 
 
-def drivers_of(table: pd.DataFrame, plan: Plan, figures: list[str]) -> list[Driver]:
+def drivers_of(table: pd.DataFrame, plan: SweepPlan, figures: list[str]) -> list[Driver]:
     """One for each figure and key that take more than one value, the strongest first."""
     found: list[Driver] = []
     for figure in figures:

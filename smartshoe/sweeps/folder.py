@@ -13,7 +13,7 @@ from typing import Any
 from smartshoe.atomic import json_text, make_folder, replacing, write_text
 from smartshoe.errors import InputError, UsageError
 from smartshoe.sweeps.design import design_of
-from smartshoe.sweeps.plan import Plan
+from smartshoe.sweeps.plan import SweepPlan
 
 SCHEMA = "smartshoe.sweep/1"
 LEFT_OVER_S = 3600.0  # after which an unfinished file is a killed process's, not another one's at work
@@ -30,7 +30,7 @@ class SweepFolder:
         """Where the cases lie."""
         return self.path / "cases"
 
-    def claim(self, plan: Plan) -> None:
+    def claim(self, plan: SweepPlan) -> None:
         """Make the folder this plan's; raises `UsageError` where it is another sweep's or another version's.
 
         A plan that holds all cases of the one before goes on with the folder: so a sweep grows.
@@ -70,9 +70,11 @@ class SweepFolder:
             raise UsageError(f"{note} is no sweep's: choose another --out")
         return theirs
 
-    def _refuse_another(self, plan: Plan, theirs: dict[str, Any]) -> None:
+    def _refuse_another(self, plan: SweepPlan, theirs: dict[str, Any]) -> None:
         mine = set(plan.names())
-        old = Plan(plan.source, theirs["base"], design_of(theirs["sweep"], 0, plan.source.error), theirs["version"])
+        old = SweepPlan(
+            plan.source, theirs["base"], design_of(theirs["sweep"], 0, plan.source.error), theirs["version"]
+        )
         foreign = sum(name not in mine for name in set(old.names()))
         if foreign:
             begun = "" if self.done() else "none is computed yet: remove it, or "
@@ -118,7 +120,7 @@ class SweepFolder:
         return dict(found)
 
 
-def _table_of(plan: Plan) -> dict[str, Any]:
+def _table_of(plan: SweepPlan) -> dict[str, Any]:
     """The design as a ``[sweep]`` table that gives it again."""
     design = plan.design
     vary: dict[str, Any] = {}
@@ -137,7 +139,7 @@ def _plain(content: dict[str, Any]) -> dict[str, Any]:
     return dict(json.loads(json.dumps(content, default=str)))
 
 
-def write_results(plan: Plan, folder: SweepFolder) -> Path:
+def write_results(plan: SweepPlan, folder: SweepFolder) -> Path:
     """Write ``results.csv``: a row a case, in the design's order. One case is read at a time, twice: header first."""
     keys = [axis.key for axis in plan.design.axes]
     figures: dict[str, None] = {}

@@ -12,7 +12,7 @@ from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain
 from smartshoe.sweeps.charts import against_key, over_pairs
 from smartshoe.sweeps.drivers import Driver, drivers_of, main_figures, what_drives, worst_first
-from smartshoe.sweeps.plan import Plan
+from smartshoe.sweeps.plan import SweepPlan
 from smartshoe.sweeps.repeating import command_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Section:
     worst: list[tuple[str, str]]
 
 
-def write_page(path: Path, plan: Plan, table: pd.DataFrame) -> None:
+def write_page(path: Path, plan: SweepPlan, table: pd.DataFrame) -> None:
     """Write the page to ``path``, whole or not at all; ``table`` is ``results.csv``."""
     main = main_figures(table, plan)
     failed = table[table["status"] == "failed"]
@@ -81,11 +81,11 @@ def _range_of(table: pd.DataFrame, key: str) -> str:
     return shown + (" …" if len(values) > 6 else "")
 
 
-def _command(plan: Plan, table: pd.DataFrame, case: str) -> str:
+def _command(plan: SweepPlan, table: pd.DataFrame, case: str) -> str:
     return command_of(plan, int(table.index[table["case"] == case][0]))
 
 
-def _section(plan: Plan, table: pd.DataFrame, figure: str) -> Section:
+def _section(plan: SweepPlan, table: pd.DataFrame, figure: str) -> Section:
     found = drivers_of(table, plan, [figure])
     keys = [driver.key for driver in found]
     worst = [

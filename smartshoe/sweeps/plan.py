@@ -13,8 +13,8 @@ import smartshoe
 from smartshoe.errors import ScenarioError
 from smartshoe.scenario import check_simulated, checked, read_tables
 from smartshoe.scenario.keys import Tables, with_values
-from smartshoe.scenario.schema import ScenarioKeyError, Source
-from smartshoe.sweeps.design import Design, design_of
+from smartshoe.scenario.schema import ScenarioKeyError, ScenarioText
+from smartshoe.sweeps.design import SweepDesign, design_of
 
 UNSEEN = ("sweep", "title", "about")  # of a scenario's keys: what no figure depends on
 NAME_DIGITS = 24  # of a case's name: 96 bits, so that no two of 100,000 cases share one
@@ -34,12 +34,12 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """A scenario and its design. ``files`` maps a file that the scenario reads to the digest of what it holds."""
 
-    source: Source
+    source: ScenarioText
     base: Tables
-    design: Design
+    design: SweepDesign
     version: str = field(default_factory=lambda: smartshoe.__version__)
     _digests: dict[str, str] = field(default_factory=dict, repr=False)
 
@@ -115,13 +115,13 @@ class Plan:
         return self.source.error(("sweep", "vary", key), f"with {value!r}, {error.reason}")
 
 
-def read_plan(path: Path | str) -> Plan:
+def read_plan(path: Path | str) -> SweepPlan:
     """The sweep that a scenario file asks for, checked; raises `ScenarioError`."""
     tables, source = read_tables(path)
     base = {key: value for key, value in tables.items() if key != "sweep"}
     seed = base.get("seed", 0)
     design = design_of(tables.get("sweep"), seed if isinstance(seed, int) else 0, source.error)
-    plan = Plan(source, base, design)
+    plan = SweepPlan(source, base, design)
     plan.check()
     return plan
 

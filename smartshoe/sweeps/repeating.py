@@ -8,10 +8,10 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-from smartshoe.sweeps.plan import Plan
+from smartshoe.sweeps.plan import SweepPlan
 
 
-def command_of(plan: Plan, case: int) -> str:
+def command_of(plan: SweepPlan, case: int) -> str:
     """``smartshoe run`` with the seed and the values of a case (0-based)."""
     words = ["smartshoe", "run", str(plan.source.path), "--seed", str(plan.design.seed(case))]
     for key, value in plan.design.values(case).items():

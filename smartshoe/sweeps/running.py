@@ -14,7 +14,7 @@ from smartshoe.sweeps import places
 from smartshoe.sweeps.case import computed
 from smartshoe.sweeps.folder import SweepFolder, write_results
 from smartshoe.sweeps.places import Compute, Task, WorkerLostError
-from smartshoe.sweeps.plan import Plan, read_plan
+from smartshoe.sweeps.plan import SweepPlan, read_plan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,7 @@ class SweepResult:
     ``failed`` is None while cases are missing: then there are no ``results`` and no ``report`` yet either.
     """
 
-    plan: Plan
+    plan: SweepPlan
     folder: Path
     cases: int
     computed: int
@@ -105,7 +105,7 @@ def sweep(
 
 
 def sweep_plan(
-    plan: Plan,
+    plan: SweepPlan,
     out: Path,
     jobs: int | None = 1,
     scheduler: str | None = None,
@@ -147,7 +147,7 @@ def _place(jobs: int | None, scheduler: str | None, cases: int) -> Place:
 
 
 def _compute_all(
-    plan: Plan, folder: SweepFolder, mine: Sequence[int], place: Place, progress: Progress | None, compute: Compute
+    plan: SweepPlan, folder: SweepFolder, mine: Sequence[int], place: Place, progress: Progress | None, compute: Compute
 ) -> int:
     """Compute what is not there; how many that were."""
     to_do = _to_do(plan, folder, mine)
@@ -177,7 +177,7 @@ def _compute_all(
     return counted
 
 
-def _to_do(plan: Plan, folder: SweepFolder, mine: Sequence[int]) -> list[int]:
+def _to_do(plan: SweepPlan, folder: SweepFolder, mine: Sequence[int]) -> list[int]:
     """The first of each kind of equal cases that is not done."""
     seen = folder.done()
     found: list[int] = []
@@ -189,7 +189,7 @@ def _to_do(plan: Plan, folder: SweepFolder, mine: Sequence[int]) -> list[int]:
     return found
 
 
-def _concluded(plan: Plan, folder: SweepFolder, count: int) -> SweepResult:
+def _concluded(plan: SweepPlan, folder: SweepFolder, count: int) -> SweepResult:
     """The table and the page, from the cases."""
     from smartshoe.sweeps.page import write_page
 

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class ForceTrace:
     """One recording's signals in newton (n,); ``valid`` marks samples that were logged.
 
     Reference, raw (reading on the calibration's scale), best static line, compensated.
@@ -72,7 +72,7 @@ class Validation(Summarised):
     unit: str | None
     overall: RateResult
     rates: tuple[RateResult, ...]
-    traces: tuple[Trace, ...]
+    traces: tuple[ForceTrace, ...]
     full_scale_n: float
     static_gain: float
     static_offset_n: float
@@ -146,7 +146,7 @@ def validate(recordings: RecordingLike | Sequence[RecordingLike], calibration: C
         np.concatenate([f[m] for f, m in zip(loads, valid, strict=True)]),
     )
     traces = tuple(
-        Trace(
+        ForceTrace(
             recording.name,
             recording.time_s,
             load_n,
@@ -158,7 +158,7 @@ def validate(recordings: RecordingLike | Sequence[RecordingLike], calibration: C
         for recording, reading, load_n, mask in zip(given, readings, loads, valid, strict=True)
     )
     full_scale_n = float(np.ptp(np.concatenate([t.load_n[t.valid] for t in traces]))) or 1.0
-    found: list[tuple[Trace, Cycle]] = [(t, cycle) for t in traces for cycle in cycles(t.time_s, t.load_n)]
+    found: list[tuple[ForceTrace, Cycle]] = [(t, cycle) for t in traces for cycle in cycles(t.time_s, t.load_n)]
     owner = {id(cycle): trace for trace, cycle in found}
     groups = by_rate([cycle for _, cycle in found])
     rates = tuple(
@@ -181,7 +181,7 @@ def _mean(values: list[float]) -> float | None:
 
 
 def _judge(
-    rate: float | None, found: list[tuple[Trace, Cycle]], full_scale_n: float, whole: tuple[Trace, ...] = ()
+    rate: float | None, found: list[tuple[ForceTrace, Cycle]], full_scale_n: float, whole: tuple[ForceTrace, ...] = ()
 ) -> RateResult:
     """Errors over ``whole`` records, or over the given cycles; loops over the cycles in either case."""
     spans = [(t, slice(None)) for t in whole] or [(t, slice(c.start, c.stop)) for t, c in found]

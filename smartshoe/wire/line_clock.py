@@ -20,7 +20,7 @@ REMEMBERED = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ReadingLine:
     """A line's ``time`` (as written, or in s once placed) and readings (channels,), NaN where there is none."""
 
     time: float
@@ -38,20 +38,20 @@ class LineClock:
     def __init__(self, counters: Counters, unit: TimeUnit | None) -> None:
         self._counters = counters
         self._unit: TimeUnit | None = unit
-        self._waiting: list[Line] = []
-        self._last: Line | None = None
-        self._held: Line | None = None
-        self._first: list[Line] = []
+        self._waiting: list[ReadingLine] = []
+        self._last: ReadingLine | None = None
+        self._held: ReadingLine | None = None
+        self._first: list[ReadingLine] = []
         self._turns = 0.0
         self._boot = 0
         self._period = 0.0
-        self._recent: deque[Line] = deque(maxlen=REMEMBERED)
+        self._recent: deque[ReadingLine] = deque(maxlen=REMEMBERED)
 
     def use(self, unit: TimeUnit) -> None:
         """Take times as ``unit`` from the next line on."""
         self._unit = unit
 
-    def place(self, line: Line) -> list[Line]:
+    def place(self, line: ReadingLine) -> list[ReadingLine]:
         """The lines that became sure with ``line``, in order, their times in s."""
         self._waiting.append(line)
         if self._unit is None:
@@ -63,17 +63,17 @@ class LineClock:
         self._counters.frames += len(placed)
         return placed
 
-    def _step(self, before: Line, line: Line) -> float:
+    def _step(self, before: ReadingLine, line: ReadingLine) -> float:
         """Time from ``before`` to ``line`` as written, over the turn of a counter."""
         step = line.time - before.time
         is_counter = self._unit != "s" and line.time == int(line.time) and before.time == int(before.time)
         return step + COUNTER_TURN if is_counter and step < -COUNTER_TURN / 2 else step
 
-    def _goes_on(self, before: Line, line: Line) -> bool:
+    def _goes_on(self, before: ReadingLine, line: ReadingLine) -> bool:
         """Whether ``line`` is one of the next few after ``before``."""
         return 0.0 < self._step(before, line) <= GAP_PERIODS * self._period
 
-    def _place(self, line: Line) -> list[Line]:
+    def _place(self, line: ReadingLine) -> list[ReadingLine]:
         if self._last is None:
             return self._start(line)
         last, held = self._last, self._held
@@ -100,7 +100,7 @@ class LineClock:
         self._period = self._step(held, line)
         return [first, self._give(line)]
 
-    def _start(self, line: Line) -> list[Line]:
+    def _start(self, line: ReadingLine) -> list[ReadingLine]:
         """The first three lines in even steps; a first line may be the end of one, with digits of its time missing."""
         self._first.append(line)
         if len(self._first) < 3:
@@ -113,7 +113,7 @@ class LineClock:
         self._first, self._period = [], self._step(two, three)
         return [self._give(one), self._give(two), self._give(three)]
 
-    def _give(self, line: Line) -> Line:
+    def _give(self, line: ReadingLine) -> ReadingLine:
         if self._last is not None:
             step = self._step(self._last, line)
             if line.time < self._last.time:

@@ -19,7 +19,7 @@ from smartshoe.units import COUNTS, Unit, find_unit, unit_of_suffix
 from smartshoe.units import unit as unit_of
 from smartshoe.wire.counters import Counters
 from smartshoe.wire.information import ChannelInformation, Information
-from smartshoe.wire.line_clock import Line, LineClock, TimeUnit
+from smartshoe.wire.line_clock import LineClock, ReadingLine, TimeUnit
 from smartshoe.wire.samples import CHANNELS, Samples
 
 COLUMNS = ("t", *CHANNELS)
@@ -88,7 +88,7 @@ class LineDecoder:
         """The samples that became sure with ``data``, maybe none."""
         self.counters.bytes += len(data)
         *whole, rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
-        lines: list[Line] = []
+        lines: list[ReadingLine] = []
         for line in whole:
             was_cut, self._is_cut = self._is_cut, False
             if was_cut or len(line) > LONGEST_LINE:
@@ -106,7 +106,7 @@ class LineDecoder:
             self.counters.malformed += 1
         self._is_lost = True
 
-    def _read(self, line: bytes, lines: list[Line]) -> None:
+    def _read(self, line: bytes, lines: list[ReadingLine]) -> None:
         """One line: a sample onto ``lines`` (as soon as its clock is sure), a header, a comment, garbage."""
         try:
             text = line.decode("utf-8").strip().lstrip("\ufeff\0")
@@ -141,7 +141,7 @@ class LineDecoder:
             self.counters.resynchronisations += 1
         lines.extend(self._clock.place(sample))
 
-    def _sample(self, fields: list[str]) -> Line | None:
+    def _sample(self, fields: list[str]) -> ReadingLine | None:
         layout = self._layout
         if len(fields) == layout.fields + 1 and not fields[-1]:
             fields = fields[:-1]  # a sketch's loop prints a separator behind every number
@@ -157,7 +157,7 @@ class LineDecoder:
             if value is None or math.isinf(value):
                 return None
             readings.append(value)
-        return Line(time, tuple(readings))
+        return ReadingLine(time, tuple(readings))
 
     def _take_header(self, fields: list[str]) -> bool:
         """Whether the fields are a header with this decoder's columns; if so it holds from here."""
@@ -197,7 +197,7 @@ class LineDecoder:
         except FormatError:
             return  # a comment that cannot be an information is a comment
 
-    def _samples(self, lines: list[Line]) -> Samples:
+    def _samples(self, lines: list[ReadingLine]) -> Samples:
         if not lines:
             return Samples.empty(self._names, self._unit)
         values = np.array([line.readings for line in lines])

@@ -11,7 +11,7 @@ from scipy.signal import lsim, max_len_seq
 
 from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.transfer_function import identify_transfer_function
-from smartshoe.identification.transfer_function.discrete import Chain
+from smartshoe.identification.transfer_function.discrete import StateVariableFilter
 from smartshoe.identification.transfer_function.experiment import prepare
 from smartshoe.identification.transfer_function.problem import OutputError, Structure, Whitened
 from smartshoe.identification.transfer_function.srivc import least_squares, reflected
@@ -144,7 +144,7 @@ def test_uneven_recursion_is_the_even_one_on_even_steps(system, hold, delay):
     rng = np.random.default_rng(3)
     u, step_s = excitation(system[1], hold, 80, rng)
     time_s = np.arange(u.size) * step_s
-    chain = Chain(system[1][1:])
+    chain = StateVariableFilter(system[1][1:])
     start = rng.normal(size=chain.size)
     even = chain.run_even(u, 4, 70, start, step_s, hold, delay * step_s)
     uneven = chain.run_uneven(u, time_s, time_s[4:74], start, hold, delay * step_s)
@@ -495,7 +495,7 @@ def test_unsettled_fit_says_so_where_it_is_wanted():
 
 
 def test_chain_steps_as_the_matrix_exponential_of_the_plain_companion_form():
-    chain = Chain(np.array([3.0, 2.0]))
+    chain = StateVariableFilter(np.array([3.0, 2.0]))
     plain = np.array([[0, 1, 0, 0], [-2, -3, 1, 0], [0, 0, 0, 1], [0, 0, -2, -3]], dtype=float)
     expected = expm(plain * 0.3)
     ours = chain.scale[:, None] * chain.transition(0.3)[:4, :4] / chain.scale

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from simulators.bladder import BladderParameters, SimulatedBladder
-from simulators.effects.sensing import Curve, Drift, Limit
+from simulators.effects.sensing import Curve, Limit, OutputDrift
 from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.first_order import lag
 
@@ -67,7 +67,7 @@ CASES: dict[str, tuple[str, Callable[[np.ndarray, np.ndarray], np.ndarray], dict
     "a gain that compounds": ("gain_drift", lambda t, p: p * np.exp(4e-4 * t), {}),
     "die and package": (
         "warm_up",
-        lambda t, p: p + Drift(warm_up_percent=1.5, warm_up_time_constant_s=40.0).zero(t, 0.0),
+        lambda t, p: p + OutputDrift(warm_up_percent=1.5, warm_up_time_constant_s=40.0).zero(t, 0.0),
         {"time_constant": 30.0, "stretch": 1.0},
     ),
     "a hard stop": ("saturation", lambda t, p: Limit(70.0)(p), {"level": 0.85, "knee": 0.01}),

@@ -12,17 +12,17 @@ from scipy.optimize import least_squares
 
 from simulators.bladder import (
     BladderParameters,
-    Conditioning,
-    GasHeat,
-    Hysteresis,
-    Leak,
+    ConditioningParameters,
+    GasHeatParameters,
+    HysteresisParameters,
+    LeakParameters,
     SimulatedBladder,
-    Softening,
+    SofteningParameters,
 )  # fmt: skip
-from simulators.effects.contact import Contact
-from simulators.effects.damage import PermanentSet
-from simulators.effects.friction import BoucWen, StickSlip
-from simulators.effects.relaxation import PowerLawCreep, SecondRelaxation
+from simulators.effects.contact import ContactParameters
+from simulators.effects.damage import PermanentSetParameters
+from simulators.effects.friction import BoucWenParameters, StickSlipParameters
+from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import Array, Conditions
 from smartshoe.models.extended import ExtendedModel
@@ -34,32 +34,32 @@ N = 1.0 + K1 * X
 
 # Truth, effect, and where the truth names one: the strength's value and how near to it the fit must come.
 CASES: tuple[tuple[str, dict[str, Any], float | None, float], ...] = (
-    ("second_relaxation", {"second_relaxation": SecondRelaxation(0.15, 0.7)}, None, 0.0),
-    ("second_relaxation", {"second_relaxation": SecondRelaxation(0.1, 25.0)}, None, 0.0),
-    ("power_law_creep", {"power_law_creep": PowerLawCreep(0.15, 0.2)}, None, 0.0),
-    ("power_law_creep", {"power_law_creep": PowerLawCreep(0.1, 0.4)}, None, 0.0),
-    ("linear_leak", {"leak": Leak(linear_per_s=0.003)}, 0.003, 0.15),
-    ("linear_leak", {"leak": Leak(capillary_per_s=0.003)}, 0.003, 0.15),
-    ("orifice_leak", {"leak": Leak(orifice_per_s=0.0005)}, None, 0.0),
-    ("orifice_leak", {"leak": Leak(nozzle_per_s=0.0005)}, None, 0.0),
-    ("gas_heat", {"gas_heat": GasHeat(0.2, 1.0)}, 0.08, 0.1),
-    ("gas_heat", {"gas_heat": GasHeat(0.4, 1.5, 3)}, 0.16, 0.2),
+    ("second_relaxation", {"second_relaxation": SecondRelaxationParameters(0.15, 0.7)}, None, 0.0),
+    ("second_relaxation", {"second_relaxation": SecondRelaxationParameters(0.1, 25.0)}, None, 0.0),
+    ("power_law_creep", {"power_law_creep": PowerLawCreepParameters(0.15, 0.2)}, None, 0.0),
+    ("power_law_creep", {"power_law_creep": PowerLawCreepParameters(0.1, 0.4)}, None, 0.0),
+    ("linear_leak", {"leak": LeakParameters(linear_per_s=0.003)}, 0.003, 0.15),
+    ("linear_leak", {"leak": LeakParameters(capillary_per_s=0.003)}, 0.003, 0.15),
+    ("orifice_leak", {"leak": LeakParameters(orifice_per_s=0.0005)}, None, 0.0),
+    ("orifice_leak", {"leak": LeakParameters(nozzle_per_s=0.0005)}, None, 0.0),
+    ("gas_heat", {"gas_heat": GasHeatParameters(0.2, 1.0)}, 0.08, 0.1),
+    ("gas_heat", {"gas_heat": GasHeatParameters(0.4, 1.5, 3)}, 0.16, 0.2),
     ("gas_compression", {"gas": "boyle"}, 7000.0 / 101_325.0, 0.1),
     ("wall_hardening", {"wall_stiffening": 1.0}, None, 0.0),
     ("wall_hardening", {"wall_hardening": 0.2}, None, 0.0),
-    ("contact_area", {"contact": Contact(saturation=0.3)}, None, 0.0),
+    ("contact_area", {"contact": ContactParameters(saturation=0.3)}, None, 0.0),
     ("contact_area", {"static_exponent": 0.95}, 0.5**0.95 - 0.5, 0.1),
-    ("dead_band", {"contact": Contact(gap_n=15.0)}, 15.0 / PEAK_N, 0.05),
-    ("play_hysteresis", {"hysteresis": Hysteresis(strength=0.01)}, 0.01, 0.1),
-    ("play_hysteresis", {"stick_slip": StickSlip(0.015)}, 0.015, 0.1),
-    ("bouc_wen_hysteresis", {"bouc_wen": BoucWen(0.01)}, 0.01, 0.1),
-    ("bouc_wen_hysteresis", {"bouc_wen": BoucWen(0.02, 0.2, 2.5, 0.1)}, 0.02, 0.1),
-    ("load_unload_asymmetry", {"contact": Contact(direction_gain=0.02)}, 0.02, 0.05),
-    ("load_unload_asymmetry", {"contact": Contact(direction_gain=-0.02, direction_turn_n=9.0)}, -0.02, 0.05),
-    ("rate_gain", {"contact": Contact(rate_gain=0.03)}, 0.03, 0.05),
-    ("mullins_softening", {"softening": Softening(0.06)}, 0.06 * (N - 1.0) / N, 0.2),
-    ("cycle_conditioning", {"conditioning": Conditioning(-0.02, 4.0)}, -0.02, 0.02),
-    ("permanent_set", {"permanent_set": PermanentSet(0.0005)}, 0.0005 * (N - 1.0) / N, 0.1),
+    ("dead_band", {"contact": ContactParameters(gap_n=15.0)}, 15.0 / PEAK_N, 0.05),
+    ("play_hysteresis", {"hysteresis": HysteresisParameters(strength=0.01)}, 0.01, 0.1),
+    ("play_hysteresis", {"stick_slip": StickSlipParameters(0.015)}, 0.015, 0.1),
+    ("bouc_wen_hysteresis", {"bouc_wen": BoucWenParameters(0.01)}, 0.01, 0.1),
+    ("bouc_wen_hysteresis", {"bouc_wen": BoucWenParameters(0.02, 0.2, 2.5, 0.1)}, 0.02, 0.1),
+    ("load_unload_asymmetry", {"contact": ContactParameters(direction_gain=0.02)}, 0.02, 0.05),
+    ("load_unload_asymmetry", {"contact": ContactParameters(direction_gain=-0.02, direction_turn_n=9.0)}, -0.02, 0.05),
+    ("rate_gain", {"contact": ContactParameters(rate_gain=0.03)}, 0.03, 0.05),
+    ("mullins_softening", {"softening": SofteningParameters(0.06)}, 0.06 * (N - 1.0) / N, 0.2),
+    ("cycle_conditioning", {"conditioning": ConditioningParameters(-0.02, 4.0)}, -0.02, 0.02),
+    ("permanent_set", {"permanent_set": PermanentSetParameters(0.0005)}, 0.0005 * (N - 1.0) / N, 0.1),
 )
 
 

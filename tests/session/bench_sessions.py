@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from smartshoe.protocol import Protocol, dynamic_protocol
-from smartshoe.session import Plan
+from smartshoe.session import SessionPlan
 
 SHORT = Protocol("short", dynamic_protocol((200.0, 800.0), rest_s=2.0).segments)
 SHORT_TOML = '[protocol.short]\nkind = "dynamic"\nrates_n_per_s = [200, 800]\nrest_s = 2\n'
 
 
-def bench_plan(**changes: Any) -> Plan:
+def bench_plan(**changes: Any) -> SessionPlan:
     """A simulated shoe under a simulated machine, pressed twice."""
     settings: dict[str, Any] = {
         "shoe": "sim:stand?seed=5",
@@ -22,4 +22,4 @@ def bench_plan(**changes: Any) -> Plan:
         "diagnosed": False,
         **changes,
     }
-    return Plan(**settings)
+    return SessionPlan(**settings)

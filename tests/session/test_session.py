@@ -16,7 +16,7 @@ from smartshoe.devices.base import Block
 from smartshoe.errors import InputError, LimitError, UsageError
 from smartshoe.journal import Journal, read_journal
 from smartshoe.protocol import static_protocol
-from smartshoe.session import Plan, SessionFolder, Unattended, analyse, conduct, protocols_named
+from smartshoe.session import SessionFolder, SessionPlan, Unattended, analyse, conduct, protocols_named
 from smartshoe.session.folder import SAMPLES
 from smartshoe.store import CalibrationStore
 from smartshoe.units import MILLIBAR
@@ -173,7 +173,7 @@ def test_blocks_survive_the_journal_bit_for_bit(tmp_path: Path) -> None:
 
 def test_a_plan_survives_its_file() -> None:
     plan = bench_plan(serial_number="T7", store="somewhere")
-    assert Plan.from_dict(json.loads(json.dumps(plan.to_dict())), "here") == plan
+    assert SessionPlan.from_dict(json.loads(json.dumps(plan.to_dict())), "here") == plan
 
 
 def test_limits_are_checked_before_anything_moves(tmp_path: Path) -> None:

@@ -15,13 +15,13 @@ from scipy.optimize import brentq
 from simulators.bladder import (
     AMBIENT_PA,
     BladderParameters,
-    Conditioning,
-    GasHeat,
-    Hysteresis,
-    Leak,
+    ConditioningParameters,
+    GasHeatParameters,
+    HysteresisParameters,
+    LeakParameters,
     SimulatedBladder,
-    Softening,
-    Temperature,
+    SofteningParameters,
+    TemperatureParameters,
 )
 from smartshoe.errors import UsageError
 
@@ -31,12 +31,12 @@ EVERYTHING = replace(
     gas="boyle",
     static_exponent=0.9,
     wall_hardening=0.2,
-    hysteresis=Hysteresis(strength=0.02),
-    leak=Leak(0.01, 0.002),
-    gas_heat=GasHeat(0.5, 0.8),
-    temperature=Temperature(0.01, 2.0, 60.0),
-    softening=Softening(0.1),
-    conditioning=Conditioning(0.02),
+    hysteresis=HysteresisParameters(strength=0.02),
+    leak=LeakParameters(0.01, 0.002),
+    gas_heat=GasHeatParameters(0.5, 0.8),
+    temperature=TemperatureParameters(0.01, 2.0, 60.0),
+    softening=SofteningParameters(0.1),
+    conditioning=ConditioningParameters(0.02),
 )
 
 knots = st.lists(st.floats(0, 800), min_size=2, max_size=8)
@@ -73,7 +73,7 @@ def pressed(parameters: BladderParameters, load_n: np.ndarray, rate_hz: float = 
 )
 def test_linear_bladder_is_the_papers_transfer_function_with_heat_as_a_lead(k1, k2, c, heat, tau, corners):
     """P/f = H/(H + K1 + K2 s/(s + k2/c)), H = 1 + 0.4 heat s/(s + 1/tau); without heat eq. (2)-(4)."""
-    parameters = BladderParameters(k1, k2, c, gas_heat=GasHeat(heat, tau))
+    parameters = BladderParameters(k1, k2, c, gas_heat=GasHeatParameters(heat, tau))
     K1, K2, r, g = k1 * 0.38113, k2 * 0.38113, k2 / c, 0.4 * heat
     gas = np.array([1 + g, 1 / tau])
     wall = np.array([K1 + K2, K1 * r])
@@ -88,7 +88,7 @@ def test_linear_bladder_is_the_papers_transfer_function_with_heat_as_a_lead(k1, 
 
 
 def test_boyle_hardening_and_leak_follow_the_differential_equation():
-    parameters = replace(LEFT_TOE, gas="boyle", wall_hardening=0.5, leak=Leak(0.05, 0.01))
+    parameters = replace(LEFT_TOE, gas="boyle", wall_hardening=0.5, leak=LeakParameters(0.05, 0.01))
     load_n = through([800, 500, 500, 700], seconds=8.0)
     time_s = np.arange(load_n.size) / 1000
     K1, K2, rate = 1.341 * 0.38113, 0.215 * 0.38113, 0.215
@@ -116,9 +116,9 @@ def test_boyle_hardening_and_leak_follow_the_differential_equation():
     "effects",
     [
         {"c": 0.01},
-        {"leak": Leak(0.5)},
-        {"gas_heat": GasHeat(0.8, 0.2)},
-        {"gas": "boyle", "wall_hardening": 0.5, "leak": Leak(0.3), "gas_heat": GasHeat(0.5, 0.5)},
+        {"leak": LeakParameters(0.5)},
+        {"gas_heat": GasHeatParameters(0.8, 0.2)},
+        {"gas": "boyle", "wall_hardening": 0.5, "leak": LeakParameters(0.3), "gas_heat": GasHeatParameters(0.5, 0.5)},
     ],
 )
 def test_halving_the_step_converges_at_second_order(effects):
@@ -151,7 +151,9 @@ def test_work_done_on_a_bladder_from_rest_is_never_negative(parameters, corners,
 @given(strength=st.floats(0.001, 0.05), half_width_n=st.floats(5, 80), peak=st.floats(200, 800), low=st.floats(0, 150))
 def test_hysteresis_dissipates_over_a_closed_cycle_the_same_at_any_rate(strength, half_width_n, peak, low):
     # A wall without an arm to speak of, so that only the rate-independent loop is left.
-    parameters = BladderParameters(1.3, 1e-9, hysteresis=Hysteresis(strength=strength, half_width_n=half_width_n))
+    parameters = BladderParameters(
+        1.3, 1e-9, hysteresis=HysteresisParameters(strength=strength, half_width_n=half_width_n)
+    )
     areas = []
     for seconds in (2.0, 8.0):
         bladder = SimulatedBladder(parameters)
@@ -180,12 +182,14 @@ def test_memory_carries_over_from_call_to_call(parameters):
 
 
 def test_sealed_air_warmed_by_8_kelvin_rises_by_27_millibar():
-    held = replace(LEFT_TOE, k1=1e6, temperature=Temperature(drift_k_per_s=0.08))  # a rigid wall keeps the volume
+    held = replace(
+        LEFT_TOE, k1=1e6, temperature=TemperatureParameters(drift_k_per_s=0.08)
+    )  # a rigid wall keeps the volume
     assert pressed(held, np.zeros(100_001))[-1] == pytest.approx(2700, rel=0.01)
 
 
 def test_warming_settles_with_its_time_constant():
-    held = replace(LEFT_TOE, k1=1e6, temperature=Temperature(warming_k=3.0, warming_time_constant_s=20.0))
+    held = replace(LEFT_TOE, k1=1e6, temperature=TemperatureParameters(warming_k=3.0, warming_time_constant_s=20.0))
     pressure_pa = pressed(held, np.zeros(200_000))
     assert pressure_pa[19_999] == pytest.approx(AMBIENT_PA * 3 / 300 * (1 - np.exp(-1)), rel=1e-3)
     assert pressure_pa[-1] == pytest.approx(AMBIENT_PA * 3 / 300, rel=1e-3)
@@ -206,7 +210,7 @@ def test_boyles_law_adds_the_linearisation_error_of_the_audit():
 
 def test_a_leak_loses_pressure_in_a_hold_and_ends_below_zero():
     load_n = np.concatenate([np.full(20_000, 600.0), np.zeros(2_000)])
-    sealed, leaking = pressed(LEFT_TOE, load_n), pressed(replace(LEFT_TOE, leak=Leak(0.02)), load_n)
+    sealed, leaking = pressed(LEFT_TOE, load_n), pressed(replace(LEFT_TOE, leak=LeakParameters(0.02)), load_n)
     assert leaking[19_999] < 0.9 * sealed[19_999]
     assert leaking[-1] < -100
     # The arm relaxes onto the gas: sealed, the pressure creeps up in a hold.
@@ -215,14 +219,14 @@ def test_a_leak_loses_pressure_in_a_hold_and_ends_below_zero():
 
 def test_heat_of_compression_falls_within_seconds_of_a_ramp():
     load_n = np.interp(np.arange(10_000) / 1000, [0, 1], [0, 800])
-    extra = pressed(replace(LEFT_TOE, k2=1e-9, gas_heat=GasHeat(1.0, 1.0)), load_n)
+    extra = pressed(replace(LEFT_TOE, k2=1e-9, gas_heat=GasHeatParameters(1.0, 1.0)), load_n)
     assert extra[1_000] > extra[3_000] > extra[9_999]
 
 
 def test_softening_changes_only_the_reloading_below_the_largest_load():
-    soft = replace(LEFT_TOE, k2=1e-9, softening=Softening(0.2))
+    soft = replace(LEFT_TOE, k2=1e-9, softening=SofteningParameters(0.2))
     load_n = through([400, 0, 400, 0, 800], seconds=12.0)
-    virgin, found = pressed(replace(soft, softening=Softening()), load_n), pressed(soft, load_n)
+    virgin, found = pressed(replace(soft, softening=SofteningParameters()), load_n), pressed(soft, load_n)
     first, second = slice(0, 2_000), slice(4_001, 5_500)
     assert np.abs(found - virgin)[first].max() < 1e-6
     assert (found - virgin)[second][100:-100].min() > 1
@@ -231,7 +235,7 @@ def test_softening_changes_only_the_reloading_below_the_largest_load():
 
 
 def test_conditioning_counts_cycles_not_seconds():
-    settled = replace(LEFT_TOE, k2=1e-9, conditioning=Conditioning(0.03, 2.0))
+    settled = replace(LEFT_TOE, k2=1e-9, conditioning=ConditioningParameters(0.03, 2.0))
     for seconds in (10.0, 40.0):
         load_n = through([800, 0] * 4 + [800], seconds)
         peaks = pressed(settled, load_n)[np.linspace(0, load_n.size - 1, 11).astype(int)[1::2]]

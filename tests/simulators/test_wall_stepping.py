@@ -14,19 +14,19 @@ from scipy.integrate import solve_ivp
 from simulators.bladder import (
     AMBIENT_PA,
     BladderParameters,
-    Conditioning,
-    GasHeat,
-    Hysteresis,
-    Leak,
+    ConditioningParameters,
+    GasHeatParameters,
+    HysteresisParameters,
+    LeakParameters,
     SimulatedBladder,
-    Softening,
-    Temperature,
+    SofteningParameters,
+    TemperatureParameters,
 )
-from simulators.effects.contact import Contact
-from simulators.effects.damage import PermanentSet
-from simulators.effects.friction import BoucWen, StickSlip
+from simulators.effects.contact import ContactParameters
+from simulators.effects.damage import PermanentSetParameters
+from simulators.effects.friction import BoucWenParameters, StickSlipParameters
 from simulators.effects.outside import Odd
-from simulators.effects.relaxation import PowerLawCreep, SecondRelaxation
+from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
 from simulators.steppers import PlainStepper, WallStepper
 from simulators.wall_stepping import nozzle_flow
 
@@ -36,27 +36,27 @@ FIRST_EFFECTS = replace(
     PLAIN,
     static_exponent=0.9,
     wall_hardening=0.2,
-    hysteresis=Hysteresis(strength=0.02),
-    leak=Leak(0.01, 0.002),
-    gas_heat=GasHeat(0.5, 0.8),
-    temperature=Temperature(0.01, 2.0, 60.0),
-    softening=Softening(0.1),
-    conditioning=Conditioning(0.02),
+    hysteresis=HysteresisParameters(strength=0.02),
+    leak=LeakParameters(0.01, 0.002),
+    gas_heat=GasHeatParameters(0.5, 0.8),
+    temperature=TemperatureParameters(0.01, 2.0, 60.0),
+    softening=SofteningParameters(0.1),
+    conditioning=ConditioningParameters(0.02),
 )
 EFFECTS = {
     "wall_stiffening": replace(PLAIN, wall_stiffening=1.0),
-    "second_relaxation": replace(PLAIN, second_relaxation=SecondRelaxation(0.5, 1.0)),
-    "power_law_creep": replace(PLAIN, power_law_creep=PowerLawCreep(0.5, 0.3)),
-    "stick_slip": replace(PLAIN, stick_slip=StickSlip(0.03)),
-    "bouc_wen": replace(PLAIN, bouc_wen=BoucWen(0.03)),
-    "permanent_set": replace(PLAIN, permanent_set=PermanentSet(0.01)),
-    "capillary": replace(PLAIN, leak=Leak(capillary_per_s=0.02)),
-    "nozzle": replace(PLAIN, leak=Leak(nozzle_per_s=0.005)),
-    "heat_modes": replace(PLAIN, gas_heat=GasHeat(0.5, 1.0, 4)),
-    "contact_area": replace(PLAIN, contact=Contact(saturation=0.3)),
-    "gap": replace(PLAIN, contact=Contact(gap_n=40.0)),
-    "direction": replace(PLAIN, contact=Contact(direction_gain=0.03)),
-    "rate": replace(PLAIN, contact=Contact(rate_gain=0.1)),
+    "second_relaxation": replace(PLAIN, second_relaxation=SecondRelaxationParameters(0.5, 1.0)),
+    "power_law_creep": replace(PLAIN, power_law_creep=PowerLawCreepParameters(0.5, 0.3)),
+    "stick_slip": replace(PLAIN, stick_slip=StickSlipParameters(0.03)),
+    "bouc_wen": replace(PLAIN, bouc_wen=BoucWenParameters(0.03)),
+    "permanent_set": replace(PLAIN, permanent_set=PermanentSetParameters(0.01)),
+    "capillary": replace(PLAIN, leak=LeakParameters(capillary_per_s=0.02)),
+    "nozzle": replace(PLAIN, leak=LeakParameters(nozzle_per_s=0.005)),
+    "heat_modes": replace(PLAIN, gas_heat=GasHeatParameters(0.5, 1.0, 4)),
+    "contact_area": replace(PLAIN, contact=ContactParameters(saturation=0.3)),
+    "gap": replace(PLAIN, contact=ContactParameters(gap_n=40.0)),
+    "direction": replace(PLAIN, contact=ContactParameters(direction_gain=0.03)),
+    "rate": replace(PLAIN, contact=ContactParameters(rate_gain=0.1)),
     "resonance": replace(PLAIN, odd=Odd(resonance=0.3)),
     "pinch": replace(PLAIN, odd=Odd(pinch=0.3, pinch_share=0.9, seed=2)),
     "seating": replace(PLAIN, odd=Odd(seating=0.05)),
@@ -123,7 +123,7 @@ def test_each_effect_converges_with_the_step(name):
 @settings(max_examples=10, deadline=None)
 @given(alpha=st.floats(0.1, 0.6), stiffness=st.floats(0.01, 1))
 def test_ladder_of_arms_relaxes_by_a_power_law(alpha, stiffness):
-    weight, rate = PowerLawCreep(stiffness, alpha).arms()
+    weight, rate = PowerLawCreepParameters(stiffness, alpha).arms()
     time_s = np.geomspace(0.1, 1000, 30)
     modulus = (weight * np.exp(-np.outer(time_s, rate))).sum(axis=1)
     assert gamma(alpha) > 0
@@ -132,7 +132,7 @@ def test_ladder_of_arms_relaxes_by_a_power_law(alpha, stiffness):
 
 
 def test_second_relaxation_thins_under_stress_as_its_equation_says():
-    parameters = replace(PLAIN, k2=1e-9, second_relaxation=SecondRelaxation(0.8, 0.7, 0.3))
+    parameters = replace(PLAIN, k2=1e-9, second_relaxation=SecondRelaxationParameters(0.8, 0.7, 0.3))
     load_n = through([800, 800, 200], 4.0)
     time_s = np.arange(load_n.size) / 1000
     stress, K3 = load_n / (0.0623 * AMBIENT_PA), 0.8 * 0.38113
@@ -171,7 +171,7 @@ def test_nozzle_flow_is_the_square_root_for_small_pressures_and_odd_in_direction
 
 
 def test_heat_modes_share_the_heat_and_the_slowest_has_the_time_constant():
-    share, rate = GasHeat(1.0, 2.0, 6).spread()
+    share, rate = GasHeatParameters(1.0, 2.0, 6).spread()
     assert share.sum() == pytest.approx(1.0)
     assert rate[0] == 0.5
     assert (np.diff(rate) > 0).all()

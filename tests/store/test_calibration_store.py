@@ -18,7 +18,7 @@ from smartshoe.errors import InputError, RefusedError, UsageError
 from smartshoe.store import CalibrationStore, default_folder, find
 from smartshoe.store.calibration_store import segment
 from smartshoe.store.dates import iso, moment
-from smartshoe.store.entry import Event
+from smartshoe.store.entry import HistoryEvent
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_no_repair_ever_lies_between_a_date_and_its_calibration(
 
 
 def test_a_calibration_on_the_day_of_the_repair_is_after_it() -> None:
-    events = (Event("repaired", "S1", moment("2026-01-10")),)
+    events = (HistoryEvent("repaired", "S1", moment("2026-01-10")),)
     assert segment(events, moment("2026-01-10")) == (moment("2026-01-10"), None)
     assert segment(events, moment("2026-01-09T23:59")) == (None, moment("2026-01-10"))
 

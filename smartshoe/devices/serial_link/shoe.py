@@ -221,7 +221,7 @@ def _empty(reader: SerialReader) -> Block:
     )
 
 
-class _Provider:
+class _SerialProvider:
     """``serial:///dev/rfcomm0?baud=115200&format=auto&side=left``; see `SerialSettings` for the options."""
 
     def open_shoe(
@@ -236,4 +236,4 @@ class _Provider:
         return SerialShoe(target, settings)
 
 
-provider = _Provider()
+provider = _SerialProvider()

@@ -2,8 +2,9 @@
 
 The chain is ``A(p) x = u``, ``A(p) w = x`` with p = d/dt; its states are x, w and their first n - 1 derivatives. From
 them everything follows without a numerical derivative: the model's output, its derivatives with respect to every
-coefficient (`Chain.numerator_map`, `Chain.denominator_map`), and the filtered derivatives that SRIVC needs. The
-transition over a step is a block of the exponential of the system with its input as further states (Van Loan 1978).
+coefficient (`StateVariableFilter.numerator_map`, `StateVariableFilter.denominator_map`), and the filtered derivatives
+that SRIVC needs. The transition over a step is a block of the exponential of the system with its input as further
+states (Van Loan 1978).
 Each state is scaled by a power of two that balances the matrix (`scipy.linalg.matrix_balance`), which is time
 measured in the roots' radius where they have one, and better where they are spread.
 """
@@ -31,7 +32,7 @@ class Trajectory:
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class StateVariableFilter:
     """The chain for ``denominator`` (n,), its coefficients without the leading 1, highest power first.
 
     ``levels`` 2 has w and x, 1 only x. Balanced states times ``scale`` are w and its derivatives, then x and its
@@ -213,9 +214,9 @@ class Chain:
         return out
 
 
-def prefilter(order: int, lambda_rad_s: float) -> Chain:
+def prefilter(order: int, lambda_rad_s: float) -> StateVariableFilter:
     """The state-variable filter 1/(s + lambda)^order."""
-    return Chain(np.asarray(np.poly(np.full(order, -lambda_rad_s))[1:], dtype=float), levels=1)
+    return StateVariableFilter(np.asarray(np.poly(np.full(order, -lambda_rad_s))[1:], dtype=float), levels=1)
 
 
 def split_delay(delay_s: float, step_s: float) -> tuple[int, float]:

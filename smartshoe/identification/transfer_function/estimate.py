@@ -12,7 +12,7 @@ from smartshoe.errors import UsageError
 from smartshoe.identification.residual_tests import ResidualTest, whiteness
 from smartshoe.identification.transfer_function.discrete import Array, Intersample
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
-from smartshoe.identification.transfer_function.problem import Look, OutputError, Structure, orthogonal_factor
+from smartshoe.identification.transfer_function.problem import ErrorGradient, OutputError, Structure, orthogonal_factor
 from smartshoe.models import Parameter
 
 QUANTILE = 1.959963984540054
@@ -145,7 +145,7 @@ class Ending:
 def summarise(
     problem: OutputError,
     theta: Array,
-    looks: Sequence[Look],
+    looks: Sequence[ErrorGradient],
     *,
     ended: Ending,
     n_missing: int,
@@ -223,16 +223,16 @@ def summarise(
 
 
 def _nuisances(
-    problem: OutputError, tail: Array, looks: Sequence[Look], root: Array, variance: float
+    problem: OutputError, tail: Array, looks: Sequence[ErrorGradient], root: Array, variance: float
 ) -> tuple[Array, Array, Array, Array]:
     """Offsets (e,), initial states (e, n) and their standard deviations, the shared parameters' share in them."""
-    from smartshoe.identification.transfer_function.discrete import Chain
+    from smartshoe.identification.transfer_function.discrete import StateVariableFilter
 
     n = problem.poles
     offsets = np.full(len(looks), problem.offset or 0.0)
     offsets_sd, starts = np.zeros(len(looks)), np.zeros((len(looks), n))
     starts_sd = np.zeros_like(starts)
-    scale = Chain(tail).scale[-n:]
+    scale = StateVariableFilter(tail).scale[-n:]
     for index, look in enumerate(looks):
         back = look.nuisance.back
         own = np.sum(back**2, axis=1) * variance

@@ -30,7 +30,7 @@ SINGULAR = 1e-13  # of the largest singular value of the gradient, columns scale
 
 
 @dataclass(frozen=True)
-class _Options:
+class _FitOptions:
     """How each part of the fit goes about it."""
 
     method: Method
@@ -77,7 +77,7 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
     """
     fixed = None if offset == "estimate" else offset
     structure = Structure(poles, zeros, intersample, initial_state, fixed)
-    options = _Options(method, prefilter_rad_s, tolerance, max_iterations)
+    options = _FitOptions(method, prefilter_rad_s, tolerance, max_iterations)
     _check(structure, options, delay_s, max_delay_s)
     experiments, missing = prepare(u, y, sample_time_s=sample_time_s, time_s=time_s, hold=intersample)
     unknowns = zeros + 1 + poles + (delay_s == "estimate")
@@ -87,7 +87,7 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
         raise NotIdentifiableError(
             f"{counted} samples for {unknowns + nuisances} unknowns: record {2 * unknowns + nuisances} at least"
         )
-    fit = _Fit(experiments, structure, options)
+    fit = _StructureFit(experiments, structure, options)
     try:
         problem, found, started, notes = (
             fit.with_delay(max_delay_s) if delay_s == "estimate" else fit.at(float(delay_s))
@@ -115,10 +115,10 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
     )
 
 
-class _Fit:
+class _StructureFit:
     """One data set and structure, fitted at a known delay or with it."""
 
-    def __init__(self, experiments: Sequence[Excitation], structure: Structure, options: _Options) -> None:
+    def __init__(self, experiments: Sequence[Excitation], structure: Structure, options: _FitOptions) -> None:
         self.experiments, self.structure, self.options = experiments, structure, options
 
     def problem(self, *, delayed: bool, delay_s: float = 0.0, most_delay_s: float | None = None) -> OutputError:
@@ -328,7 +328,7 @@ def _require_distinct(columns: Array) -> None:
         )
 
 
-def _check(structure: Structure, options: _Options, delay_s: float | str, max_delay_s: float | None) -> None:
+def _check(structure: Structure, options: _FitOptions, delay_s: float | str, max_delay_s: float | None) -> None:
     poles, zeros = structure.poles, structure.zeros
     for name, value, allowed in (
         ("method", options.method, get_args(Method)),

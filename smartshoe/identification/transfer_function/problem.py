@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.identification.solve import Evaluation
-from smartshoe.identification.transfer_function.discrete import Array, Chain, Intersample, Trajectory
+from smartshoe.identification.transfer_function.discrete import Array, Intersample, StateVariableFilter, Trajectory
 from smartshoe.identification.transfer_function.experiment import Excitation
 
 InitialState = Literal["estimate", "steady", "rest"]
@@ -42,7 +42,7 @@ class Nuisance:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class ErrorGradient:
     """One experiment at one theta: ``error`` (n,) = measured - model, ``columns`` (n, p) = d model / d theta.
 
     Both are cleared of the nuisances and 0 where a sample does not count. ``coefficients`` are the nuisances' own.
@@ -123,7 +123,7 @@ class OutputError:
         m = self.zeros + 1
         return theta[:m], theta[m : m + self.poles], float(theta[-1]) if self.delayed else self.delay_s
 
-    def forced(self, chain: Chain, index: int, delay_s: float, start: Array | None = None) -> Trajectory:
+    def forced(self, chain: StateVariableFilter, index: int, delay_s: float, start: Array | None = None) -> Trajectory:
         """The chain driven by the input of experiment ``index`` from its first sample that counts, there in ``start``.
 
         By default it starts from 0, or where the first input would have led it if the start is steady.
@@ -138,7 +138,7 @@ class OutputError:
             return chain.run_even(u, begin + before, count, start, experiment.step_s, self.hold, delay_s)
         return chain.run_uneven(u, knots, experiment.time_s[begin:], start, self.hold, delay_s)
 
-    def filtered(self, chain: Chain, index: int, signal: Array) -> Trajectory:
+    def filtered(self, chain: StateVariableFilter, index: int, signal: Array) -> Trajectory:
         """The chain driven by ``signal``, one value for each sample from the first that counts, straight between."""
         experiment = self.experiments[index]
         time_s = experiment.time_s[self.firsts[index] :]
@@ -147,12 +147,12 @@ class OutputError:
             return chain.run_even(signal, 0, signal.size, start, experiment.step_s, "foh", 0.0)
         return chain.run_uneven(signal, time_s, time_s, start, "foh", 0.0)
 
-    def free(self, chain: Chain, index: int) -> Array:
+    def free(self, chain: StateVariableFilter, index: int) -> Array:
         """The chain's states after an impulse at the first sample that counts."""
         experiment = self.experiments[index]
         return chain.run_free(experiment.time_s[self.firsts[index] :], experiment.step_s)
 
-    def nuisance(self, chain: Chain, index: int, free: Array | None) -> Nuisance:
+    def nuisance(self, chain: StateVariableFilter, index: int, free: Array | None) -> Nuisance:
         """The orthonormal basis of what experiment ``index`` adds, 0 where a sample does not count."""
         from scipy.linalg import qr, solve_triangular
 
@@ -174,11 +174,11 @@ class OutputError:
         back[order[:rank]] = solve_triangular(triangle[:rank, :rank], np.eye(rank))
         return Nuisance(np.asarray(basis[:, :rank]), back / norm[:, None])
 
-    def look(self, theta: Array) -> list[Look]:
+    def look(self, theta: Array) -> list[ErrorGradient]:
         """Every experiment at ``theta`` (size,); a look that is not finite is one at a theta that cannot be."""
         numerator, denominator, delay_s = self.split(theta)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            chain = Chain(denominator)
+            chain = StateVariableFilter(denominator)
             x_rows, x_inputs = chain.derivatives_of_x()
             forced_map = chain.denominator_map(numerator)
             powers = range(self.zeros, -1, -1)
@@ -216,7 +216,7 @@ class OutputError:
                     shared[~experiment.counted[first:]] = 0.0
                 leaning = nuisance.basis.T @ shared
                 looks.append(
-                    Look(
+                    ErrorGradient(
                         error - nuisance.basis @ taken,
                         shared - nuisance.basis @ leaning if leaning.size else shared,
                         nuisance,
@@ -233,14 +233,14 @@ class OutputError:
     def output(self, theta: Array, index: int) -> Array:
         """The model's output (n,) of experiment ``index`` without offset and estimated initial state."""
         numerator, denominator, delay_s = self.split(theta)
-        chain = Chain(denominator, levels=1)
+        chain = StateVariableFilter(denominator, levels=1)
         rows, inputs = chain.derivatives_of_x()
         powers = list(range(self.zeros, -1, -1))
         run = self.forced(chain, index, delay_s)
         output: Array = run.states @ (numerator @ rows[powers]) + (numerator @ inputs[powers])[0] * run.value
         return output
 
-    def _free(self, chain: Chain, index: int, known: dict[float, Array]) -> Array:
+    def _free(self, chain: StateVariableFilter, index: int, known: dict[float, Array]) -> Array:
         step = self.experiments[index].step_s
         if step is None:
             return self.free(chain, index)

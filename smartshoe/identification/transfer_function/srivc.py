@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.transfer_function.discrete import Array, Chain, prefilter
-from smartshoe.identification.transfer_function.problem import Look, OutputError
+from smartshoe.identification.transfer_function.discrete import Array, StateVariableFilter, prefilter
+from smartshoe.identification.transfer_function.problem import ErrorGradient, OutputError
 
 NEGLIGIBLE_STEP = 1e-3  # of a standard error, over all parameters together
 FIRST_STEPS, FIRST_CLIMB = 3, 1.5  # steps that may raise the cost, and by how much
@@ -97,7 +97,7 @@ def srivc(
         step, relative, length = ways.refined()
         noise = np.sqrt(cost / max(problem.count - theta.size, 1))
         settled = relative < tolerance or length <= NEGLIGIBLE_STEP * noise
-        best: tuple[float, Array, list[Look]] | None = None
+        best: tuple[float, Array, list[ErrorGradient]] | None = None
         for attempt in range(HALVINGS):
             if attempt == 1:
                 step, _, _ = ways.descending()
@@ -125,7 +125,7 @@ def srivc(
     return Settled(theta, max_iterations, False, cost)
 
 
-def _cost(looks: Sequence[Look]) -> float:
+def _cost(looks: Sequence[ErrorGradient]) -> float:
     return float(sum(look.error @ look.error for look in looks))
 
 
@@ -145,7 +145,7 @@ class _Ways:
     """
 
     def __init__(
-        self, problem: OutputError, looks: Sequence[Look], theta: Array, delay_bounds_s: tuple[float, float]
+        self, problem: OutputError, looks: Sequence[ErrorGradient], theta: Array, delay_bounds_s: tuple[float, float]
     ) -> None:
         self.problem, self.looks, self.theta, self.bounds = problem, looks, theta, delay_bounds_s
         instruments = np.vstack([look.columns for look in looks])
@@ -158,7 +158,7 @@ class _Ways:
     def refined(self) -> tuple[Array, float, float]:
         """SRIVC's: instruments' rows, the measured output's filtered derivatives as regressors."""
         m, n = self.problem.zeros + 1, self.problem.poles
-        chain = Chain(self.theta[m : m + n], levels=1)
+        chain = StateVariableFilter(self.theta[m : m + n], levels=1)
         rows, _ = chain.derivatives_of_x()
         straight = []
         for index, look in enumerate(self.looks):

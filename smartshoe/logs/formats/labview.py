@@ -74,7 +74,7 @@ def _spread(cells: list[str], channels: int, multi: bool) -> list[str]:
 
 
 @dataclass(frozen=True)
-class _Layout:
+class _SegmentLayout:
     """How the file says that its cells are to be read; ``width`` cells make a row of ``channels`` signals."""
 
     path: Path
@@ -102,7 +102,9 @@ def read(path: Path) -> Sheet:
     lines = _text(path).splitlines()
     general, at = _general_header(path, lines)
     separator = _SEPARATORS.get(general.get("Separator", "Tab").casefold(), "\t")
-    layout = _Layout(path, separator, general.get("X_Columns", "One").casefold(), general.get("Decimal_Separator"))
+    layout = _SegmentLayout(
+        path, separator, general.get("X_Columns", "One").casefold(), general.get("Decimal_Separator")
+    )
     sheet = Sheet(path, "labview", [], {key: value for key, value in general.items() if key not in _LAYOUT})
     segments: list[list[Column]] = []
     while (at := _next_filled(lines, at)) < len(lines):
@@ -152,7 +154,7 @@ def _one_after_the_other(path: Path, segments: list[list[Column]], notes: list[s
     return first
 
 
-def _segment(layout: _Layout, lines: list[str], at: int, sheet: Sheet) -> tuple[list[Column], int]:
+def _segment(layout: _SegmentLayout, lines: list[str], at: int, sheet: Sheet) -> tuple[list[Column], int]:
     """The columns of the segment whose header begins at line index ``at``, and the index below it."""
     path = layout.path
     header, at = _segment_header(layout, lines, at)
@@ -194,7 +196,7 @@ def _segment(layout: _Layout, lines: list[str], at: int, sheet: Sheet) -> tuple[
     return columns, at
 
 
-def _segment_header(layout: _Layout, lines: list[str], at: int) -> tuple[dict[str, list[str]], int]:
+def _segment_header(layout: _SegmentLayout, lines: list[str], at: int) -> tuple[dict[str, list[str]], int]:
     """A segment's header by key, and the index of its last line."""
     header: dict[str, list[str]] = {}
     while at < len(lines) and not lines[at].startswith(_END):
@@ -207,7 +209,7 @@ def _segment_header(layout: _Layout, lines: list[str], at: int) -> tuple[dict[st
 
 
 def _rows(
-    layout: _Layout, lines: list[str], at: int, width: int, header: dict[str, list[str]]
+    layout: _SegmentLayout, lines: list[str], at: int, width: int, header: dict[str, list[str]]
 ) -> tuple[list[tuple[int, list[str]]], list[str], int]:
     """The rows (line, cells) up to the next segment or blank line, what the Comment column says, the index below."""
     rows: list[tuple[int, list[str]]] = []
@@ -223,7 +225,7 @@ def _rows(
     return rows, comments, at
 
 
-def _times(layout: _Layout, header: dict[str, list[str]], table: list[Array], channels: int) -> Array:
+def _times(layout: _SegmentLayout, header: dict[str, list[str]], table: list[Array], channels: int) -> Array:
     """The segment's time (n,) in s: its X column, or the start and step that its header gives."""
     path = layout.path
     if layout.x_columns == "no":

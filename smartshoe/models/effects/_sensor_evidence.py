@@ -19,7 +19,7 @@ LEAST_RHYTHM = 0.1  # sum of squared correlations, above what chance gives
 
 
 @dataclass(frozen=True)
-class Evidence:
+class SensorEvidence:
     """A test that came out: ``value`` of its ``statistic`` above ``threshold``, said in one sentence.
 
     ``strength`` is the standard deviation of what was found, where it is largest, as a share of full scale.

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.models.effects._sensor_evidence import Evidence, Waveformless
+from smartshoe.models.effects._sensor_evidence import SensorEvidence, Waveformless
 from smartshoe.models.effects.effect import Array, Conditions, Effect
 from smartshoe.models.effects.exposure import by
 
@@ -32,7 +32,7 @@ class ColouredNoise(Waveformless, Effect):
     }
 
 
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:
+def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
     """Whether what differs between equal load cycles is correlated in time; None without, or without repeats.
 
     ``residual`` and ``prediction`` (n,) in shares of full scale, ``sample_time_s`` apart. Differences between cycles
@@ -72,7 +72,7 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
         f"what differs between equal load cycles is correlated over about {tau_s:.2g} s: "
         f"coloured noise of {100 * strength:.2g} % of full scale"
     )
-    return Evidence("first_order_noise_score", value, threshold, says, strength)
+    return SensorEvidence("first_order_noise_score", value, threshold, says, strength)
 
 
 def _skewness(memory: float, total: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from smartshoe.models.effects._sensor_evidence import ONE_SIDED, PRESSURE, Evidence, Waveformless, growing_noise
+from smartshoe.models.effects._sensor_evidence import ONE_SIDED, PRESSURE, SensorEvidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Array, Conditions, Effect
 from smartshoe.models.effects.exposure import by
 
@@ -18,7 +18,7 @@ class HeteroscedasticNoise(Waveformless, Effect):
     }
 
 
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:
+def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
     """Whether the variance of ``residual`` (n,) grows with ``prediction`` (n,), its growth with the slope apart.
 
     Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
@@ -28,4 +28,4 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
         return None
     value, strength, _ = found
     says = f"the noise grows with pressure: {100 * strength:.2g} % of full scale are added at the largest pressure"
-    return Evidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)
+    return SensorEvidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)

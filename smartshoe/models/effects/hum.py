@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, Evidence
+from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, SensorEvidence
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -24,7 +24,7 @@ BURST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
-class HumEvidence(Evidence):
+class HumEvidence(SensorEvidence):
     """With the line's ``frequency_hz`` as logged, its amplitude's parts (shares of full scale) and its ``sources``.
 
     ``sources``: mains harmonics in Hz that this sampling rate puts there. The tone is cosine cos(2 pi f t) + sine

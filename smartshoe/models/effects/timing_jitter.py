@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, Evidence, Waveformless, growing_noise
+from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, SensorEvidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Array, Conditions, Effect
 from smartshoe.models.effects.exposure import by
 
@@ -20,7 +20,7 @@ class TimingJitter(Waveformless, Effect):
     }
 
 
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> Evidence | None:
+def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
     """Whether the variance of ``residual`` (n,) grows with the slope of ``prediction`` (n,), that with its size apart.
 
     Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
@@ -31,4 +31,4 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     value, strength, local = found
     jitter_s = strength / sqrt(float(local.slope_squared.max()))
     says = f"the noise grows with the slope of the pressure, as from {1e3 * jitter_s:.2g} ms of jitter in the sampling"
-    return Evidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
+    return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)

@@ -13,7 +13,7 @@ from smartshoe.recording import Recording
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.numbers import plain
-from smartshoe.validation import Trace, Validation
+from smartshoe.validation import ForceTrace, Validation
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def error_by_rate(unit: UnitReport, limits: tuple[float, float]) -> Chart | None
                  log_x=True)  # fmt: skip
 
 
-def _cycles_by_rate(validation: Validation) -> dict[float, list[tuple[Trace, Cycle]]]:
+def _cycles_by_rate(validation: Validation) -> dict[float, list[tuple[ForceTrace, Cycle]]]:
     found = [(trace, cycle) for trace in validation.traces for cycle in cycles(trace.time_s, trace.load_n)]
     owner = {id(cycle): trace for trace, cycle in found}
     groups = by_rate([cycle for _, cycle in found])

@@ -20,7 +20,7 @@ CARD_WIDTH, CARD_HEIGHT = 120.0, 56.0
 
 
 @dataclass(frozen=True, eq=False)
-class Card:
+class UnitCard:
     """A unit as the page shows it; ``anchor`` is its place there."""
 
     unit: UnitReport
@@ -64,7 +64,7 @@ def _small_loop(unit: UnitReport, most_n: float) -> Markup | None:
     )
 
 
-def cards(units: Sequence[UnitReport]) -> list[Card]:
+def cards(units: Sequence[UnitReport]) -> list[UnitCard]:
     """A card a unit, worst first, by grade and then by what is left."""
     loops, errors = charts.common_limits(units)
     made = []
@@ -76,7 +76,7 @@ def cards(units: Sequence[UnitReport]) -> list[Card]:
         ]
         folded = [charts.signals(unit, recording) for recording in unit.recordings] + [charts.response(unit)]
         made.append(
-            Card(
+            UnitCard(
                 unit, judgement.judge(unit), f"unit-{number}", _small_loop(unit, loops[1]),
                 [chart for chart in shown if chart is not None], folded,
             )

@@ -14,7 +14,7 @@ from smartshoe.report.charts import Chart, Line, Mark, Panel, Style
 from smartshoe.report.diagnosis.sentences import file_name
 from smartshoe.report.diagnosis.views import (
     Binned,
-    Evidence,
+    EvidenceView,
     Stretch,
     binned,
     edges_of,
@@ -33,7 +33,7 @@ MOST_RECORDINGS = 6  # whose faults are drawn
 LOOP_POINTS = 120
 
 
-def _residuals(found: Evidence) -> list[tuple[str, str, Array]]:
+def _residuals(found: EvidenceView) -> list[tuple[str, str, Array]]:
     """Label, colour and residual before and after; one of them where nothing was added."""
     before = ("before", BEFORE, found.before)
     return [before, ("after", AFTER, found.after)] if found.is_changed else [("error", BEFORE, found.before)]
@@ -56,7 +56,7 @@ def _line(label: str, colour: str, found: Binned, dashed: bool = False) -> Line:
     return Line(label, found.mean, colour, style, low=found.mean - found.sd, high=found.mean + found.sd)
 
 
-def over_time(found: Evidence, unit: str) -> Chart:
+def over_time(found: EvidenceView, unit: str) -> Chart:
     """The error of every recording, one after the other, before and after on one scale, below the load."""
     limits = _limits(found.before)
     panels = [Panel("load (N)", [Line("load", found.load_n, "load")], height=90)]
@@ -133,7 +133,7 @@ def _along(load_n: Array, values: Array, at_n: Array) -> Array:
     return np.asarray(np.interp(at_n, load_n[order], values[order], left=np.nan, right=np.nan))
 
 
-def over_state(found: Evidence, unit: str) -> list[Chart]:
+def over_state(found: EvidenceView, unit: str) -> list[Chart]:
     """The error over load and over reading, loading and unloading apart, and over the rate, before above after."""
     reading = "Mean and band of one sd; lines that part between loading and unloading are a loop."
     charts = []
@@ -155,7 +155,7 @@ def over_state(found: Evidence, unit: str) -> list[Chart]:
     return charts
 
 
-def _means(found: Evidence, x: Array, edges: Array) -> tuple[Array, list[Line]]:
+def _means(found: EvidenceView, x: Array, edges: Array) -> tuple[Array, list[Line]]:
     """The judged error's means before and after over ``x`` (judged samples,), where there are samples."""
     each = [(when, colour, binned(x, residual[found.judged], edges)) for when, colour, residual in _residuals(found)]
     filled = np.isfinite(each[0][2].mean)
@@ -163,7 +163,7 @@ def _means(found: Evidence, x: Array, edges: Array) -> tuple[Array, list[Line]]:
     return kept[0][2].x, [_line(*one) for one in kept]
 
 
-def over_cycles(found: Evidence, unit: str) -> Chart | None:
+def over_cycles(found: EvidenceView, unit: str) -> Chart | None:
     """The error's mean and spread in each load cycle, before and after; None with one cycle."""
     cycle = found.cycle[found.judged]
     if np.ptp(cycle) == 0:
@@ -174,7 +174,7 @@ def over_cycles(found: Evidence, unit: str) -> Chart | None:
                  "load cycle (number)", x, [Panel(f"measured − simulated ({unit})", lines)])  # fmt: skip
 
 
-def over_frequency(found: Evidence, unit: str) -> Chart | None:
+def over_frequency(found: EvidenceView, unit: str) -> Chart | None:
     """The error's amplitude spectral density in decibel, before and after; None where there is nothing."""
     made = [(when, colour, *spectrum(found, residual)) for when, colour, residual in _residuals(found)]
     made = [one for one in made if one[2].size > 1]

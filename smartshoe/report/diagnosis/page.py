@@ -11,7 +11,7 @@ from smartshoe.diagnosis.result import Cause, Diagnosis
 from smartshoe.diagnosis.thresholds import described
 from smartshoe.report.charts import Chart
 from smartshoe.report.diagnosis import charts, grids, sentences
-from smartshoe.report.diagnosis.views import Evidence, by_load_and_rate, by_place_and_cycle, evidence
+from smartshoe.report.diagnosis.views import EvidenceView, by_load_and_rate, by_place_and_cycle, evidence
 from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import sentence, words
@@ -70,7 +70,7 @@ def write_diagnosis_page(
     return write_document(path, "diagnosis.html", {**shown, **_of_traces(diagnosis, found)})
 
 
-def _of_traces(diagnosis: Diagnosis, found: Evidence | None) -> dict[str, Any]:
+def _of_traces(diagnosis: Diagnosis, found: EvidenceView | None) -> dict[str, Any]:
     """Charts and grids of the signals; empty where no sample can be used."""
     traces, unit = diagnosis.traces, diagnosis.unit
     if found is None:

@@ -53,7 +53,7 @@ def binned(x: Array, values: Array, edges: Array) -> Binned:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class EvidenceView:
     """Every usable sample of every recording, one after the other. All (n,) except ``starts`` and ``names``.
 
     ``time_s`` runs on from recording to recording, each of which begins at its ``starts``. ``before`` and ``after``
@@ -89,7 +89,7 @@ class Evidence:
         return np.sign(np.where(np.abs(self.rate_n_per_s) < still, 0.0, self.rate_n_per_s)).astype(np.intp)
 
 
-def evidence(traces: Sequence[Trace], full_scale_load_n: float) -> Evidence | None:
+def evidence(traces: Sequence[Trace], full_scale_load_n: float) -> EvidenceView | None:
     """The traces joined; None where no sample can be used."""
     columns: list[tuple[Array, ...]] = []
     starts, names = [], []
@@ -123,7 +123,7 @@ def evidence(traces: Sequence[Trace], full_scale_load_n: float) -> Evidence | No
     time_s, load_n, reading, rate, cycle, before, after, held_out = (
         np.concatenate([part[k] for part in columns]) for k in range(8)
     )
-    return Evidence(
+    return EvidenceView(
         time_s,
         load_n,
         reading,
@@ -213,7 +213,7 @@ class Map:
     row_edges: Array
 
 
-def by_load_and_rate(found: Evidence, residual: Array, traces: Sequence[Trace], bins: int = 12) -> Map | None:
+def by_load_and_rate(found: EvidenceView, residual: Array, traces: Sequence[Trace], bins: int = 12) -> Map | None:
     """Mean residual by load (rows, N) and by the rate of the ramp (columns), unloading left, standing in the middle."""
     rates = sorted({abs(_two_digits(rate)) for trace in traces for rate in _rates(trace)})
     if not rates:
@@ -231,7 +231,7 @@ def by_load_and_rate(found: Evidence, residual: Array, traces: Sequence[Trace], 
     return Map(values, names, edges)
 
 
-def by_place_and_cycle(found: Evidence, residual: Array) -> Map | None:
+def by_place_and_cycle(found: EvidenceView, residual: Array) -> Map | None:
     """Mean residual by place within the load cycle (rows, percent of its time) and by cycle (columns)."""
     numbers = int(found.cycle.max()) + 1
     if numbers < 2:
@@ -284,7 +284,7 @@ def _merged(rates: Sequence[float], alike: float = 0.25, most: int = 6) -> list[
     return means
 
 
-def spectrum(found: Evidence, residual: Array) -> tuple[Array, Array]:
+def spectrum(found: EvidenceView, residual: Array) -> tuple[Array, Array]:
     """Frequency (m,) in Hz and amplitude spectral density (m,) of the residual, evened out over log frequency.
 
     Frequencies at which there is nothing are left out.

@@ -14,7 +14,7 @@ from smartshoe.loading import by_rate, cycles
 from smartshoe.recording import Recording
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
-from smartshoe.validation import Trace
+from smartshoe.validation import ForceTrace
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def signals(recordings: Sequence[Recording]) -> Figure:
         return figure
 
 
-def loops(traces: Sequence[Trace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> Figure | None:
+def loops(traces: Sequence[ForceTrace], rates_n_per_s: Sequence[float] = (100.0, 800.0)) -> Figure | None:
     """Raw (best static line) and compensated estimate against load at a low and a high rate, as the paper's Fig. 8.
 
     The nearest rates there are; None where the record has no cycle.
@@ -105,7 +105,7 @@ def bode(
         return figure
 
 
-def residuals(traces: Sequence[Trace]) -> Figure:
+def residuals(traces: Sequence[ForceTrace]) -> Figure:
     """Compensated force less load, against time and against load."""
     with mpl.rc_context(STYLE):
         figure, (by_time, by_load) = figure_of(9.6, 2.8, 2)

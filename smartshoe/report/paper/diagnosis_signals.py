@@ -15,7 +15,7 @@ from smartshoe.masks import runs_of
 from smartshoe.report.diagnosis.views import (
     BINS,
     MOST_GROUPS,
-    Evidence,
+    EvidenceView,
     Stretch,
     binned,
     edges_of,
@@ -94,7 +94,7 @@ def loops(traces: Sequence[Trace], unit: str) -> Figure | None:
         return figure
 
 
-def residual_by_course(found: Evidence, unit: str) -> Figure:
+def residual_by_course(found: EvidenceView, unit: str) -> Figure:
     """The residual against time, load cycle and frequency; before above and after below, on the same axes."""
     courses = _residuals(found)
     with mpl.rc_context(STYLE):
@@ -127,7 +127,7 @@ def residual_by_course(found: Evidence, unit: str) -> Figure:
         return figure
 
 
-def residual_by_state(found: Evidence, unit: str) -> Figure:
+def residual_by_state(found: EvidenceView, unit: str) -> Figure:
     """The residual against load, reading and rate, loading and unloading apart; before above and after below."""
     courses = _residuals(found)
     with mpl.rc_context(STYLE):
@@ -173,7 +173,7 @@ def _simulations(trace: Trace, changed: bool) -> list[tuple[Array, str, str, str
     return [*said, (trace.extended, EXTENDED, "-", "extended simulation")] if changed else said
 
 
-def _residuals(found: Evidence) -> tuple[tuple[Array, str, str], ...]:
+def _residuals(found: EvidenceView) -> tuple[tuple[Array, str, str], ...]:
     """Residual, colour and label before and after; one of them where nothing was added."""
     if not found.is_changed:
         return ((found.before, BASELINE, ""),)
@@ -206,7 +206,7 @@ def _mean_and_band(axis: Any, x: Array, values: Array, colour: str, label: str =
     axis.plot(found.x, found.mean, color=colour, lw=1.4, marker=".", ms=3.5, label=label)
 
 
-def _held_out_spans(found: Evidence) -> list[tuple[float, float]]:
+def _held_out_spans(found: EvidenceView) -> list[tuple[float, float]]:
     """Stretches of time that were not fitted; none where all or nothing was."""
     mask = found.held_out
     if not mask.any() or mask.all():
