@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.instron import SensingUnit
+from simulators.sensing_unit import SensingUnit
 from smartshoe.devices.base import Block
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.units import MILLIBAR

@@ -18,12 +18,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.bladder import AMBIENT_PA, LOWEST_STEP_HZ, X_OVER_NRT, SimulatedBladder
+from simulators.bladder import LOWEST_STEP_HZ, SimulatedBladder
+from simulators.bladder_parameters import AMBIENT_PA, X_OVER_NRT
 from simulators.hidden_effects import Draws, Law, Options, Subject, Surroundings, Warp, merged
 from simulators.hidden_effects.operators import lagged
-from simulators.instron import SensingUnit, SimulatedInstron
+from simulators.instron import SimulatedInstron
 from simulators.presets import FULL_SCALE_N
 from simulators.provider import provider
+from simulators.sensing_unit import SensingUnit
 from simulators.sensor import SimulatedHdiSensor
 from smartshoe.devices.base import Bladder, ChannelDescription, Sensor
 from smartshoe.errors import SmartShoeError
@@ -170,7 +172,7 @@ def balanced(laws: Sequence[Given], acting: Array, at: Surroundings, subject: Su
 def _bladder(plain: Options, more: Options) -> SimulatedBladder:
     from pydantic import TypeAdapter
 
-    from simulators.bladder import BladderParameters
+    from simulators.bladder_parameters import BladderParameters
 
     return SimulatedBladder(TypeAdapter(BladderParameters).validate_python(merged(plain, more)))
 

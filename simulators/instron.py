@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.bladder import TUBE_DIAMETER_M, SimulatedBladder
+from simulators.bladder_parameters import TUBE_DIAMETER_M
 from simulators.daq import MyRioParameters, SimulatedMyRio, sampled
 from simulators.effects.room import NeighbourUnit, Room
-from simulators.sensor import SimulatedHdiSensor
+from simulators.sensing_unit import SensingUnit
 from smartshoe.devices.base import ChannelDescription, Shoe, TestMachine
 from smartshoe.errors import LimitError
 from smartshoe.gate import limits
@@ -25,21 +25,11 @@ from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
 
 if TYPE_CHECKING:
     from simulators.bench import Bench
-    from simulators.twin import SimulatedTwin
 
 Array = NDArray[np.float64]
 
 LOAD_LIMIT_N = 2000.0  # Instron 5944
 MILLIMETRE, CELSIUS = unit("mm"), unit("°C")
-
-
-@dataclass(frozen=True)
-class SensingUnit:
-    """A bladder, or a twin in its place, with its sensor: what the machine presses."""
-
-    name: str
-    bladder: SimulatedBladder | SimulatedTwin
-    sensor: SimulatedHdiSensor
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """What a scenario may say of simulated devices, checked by pydantic: unknown keys and values out of bounds are errors.
 
-The bladder's options are `simulators.bladder.BladderParameters` themselves; the instruments' are in the units that a
-person writes (mbar, percent) and become SI here.
+The bladder's options are `simulators.bladder_parameters.BladderParameters` themselves; the instruments' are in the
+units that a person writes (mbar, percent) and become SI here.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema
 
 from simulators import presets
-from simulators.bladder import X_OVER_NRT, BladderParameters
+from simulators.bladder_parameters import X_OVER_NRT, BladderParameters
 from simulators.bounds import Finite, NotNegative, Positive
 from simulators.daq import LARGEST_ERROR_V, MyRioParameters
 from simulators.effects.logging import ReadingChannel

@@ -5,7 +5,7 @@ Table 1 has no metatarsal units; they borrow the heel's constants of their side,
 
 from __future__ import annotations
 
-from simulators.bladder import X_OVER_NRT, BladderParameters
+from simulators.bladder_parameters import X_OVER_NRT, BladderParameters
 from simulators.sensor import HdiParameters
 
 FULL_SCALE_N = 800.0

@@ -39,8 +39,9 @@ class Provider:
         import numpy as np
 
         from simulators.bladder import SimulatedBladder
-        from simulators.instron import SensingUnit, SimulatedInstron
+        from simulators.instron import SimulatedInstron
         from simulators.options import MachineOptions, TwinMachineOptions, is_twin, with_preset
+        from simulators.sensing_unit import SensingUnit
         from simulators.sensor import SimulatedHdiSensor
 
         given = {"unit": DEFAULT_UNIT, **(options or {})}
@@ -71,8 +72,8 @@ class Provider:
         import numpy as np
 
         from simulators.bladder import SimulatedBladder
-        from simulators.instron import SensingUnit
         from simulators.options import ShoeOptions, with_preset
+        from simulators.sensing_unit import SensingUnit
         from simulators.sensor import SimulatedHdiSensor
         from simulators.shoe import SimulatedShoe
 

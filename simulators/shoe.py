@@ -17,8 +17,8 @@ from simulators.gait.events import TrueEvent, events_of
 from simulators.gait.plan import FEET
 from simulators.gait.sensing import Sampler
 from simulators.gait.shape import COLUMNS
-from simulators.instron import SensingUnit
 from simulators.profiles import PROFILES, Gait
+from simulators.sensing_unit import SensingUnit
 from smartshoe.devices.base import Block, ChannelDescription, Shoe
 from smartshoe.errors import UsageError
 from smartshoe.units import MILLIBAR

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.bladder import AMBIENT_K, AMBIENT_PA, HEAT_RATIO, BladderParameters
+from simulators.bladder_parameters import AMBIENT_K, AMBIENT_PA, HEAT_RATIO, BladderParameters
 from simulators.effects.contact import ContactState, through_contact
 from simulators.effects.outside import fresh, strike
 from simulators.preisach import MEMORY, loop_shape

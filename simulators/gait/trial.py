@@ -88,7 +88,7 @@ def blocks(  # noqa: PLR0913 - a public verb
     first_contact_s: unloaded until then.
     noise_n: white noise (standard deviation) on loads recorded in N; the sensors have their own.
     drift: what each channel's zero moves over the trial, as a share of body weight (in N) or of the sensor's range.
-    units: options of the units (`simulators.gait.sensing.sensing_units`), for example {"*": {"bladder":
+    units: options of the units (`simulators.gait.units.sensing_units`), for example {"*": {"bladder":
         {"hysteresis": {"strength": 0.02}}}}.
 
     Loads are linear between samples for the bladders. Raises `UsageError` on what cannot be.
@@ -108,7 +108,8 @@ def blocks(  # noqa: PLR0913 - a public verb
     count = max(2, round(made.duration_s * sample_rate_hz))
     sampler = None
     if sensors:
-        from simulators.gait.sensing import Sampler, sensing_units
+        from simulators.gait.sensing import Sampler
+        from simulators.gait.units import sensing_units
 
         sampler = Sampler(sensing_units(unit_rng, sides, _drifting(units, drift, made.duration_s)), ADC_BITS, unit_rng)
     size = count if np.isinf(block_s) else max(2, round(block_s * sample_rate_hz))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.bladder import HEAT_RATIO
+from simulators.bladder_parameters import HEAT_RATIO
 from simulators.hidden_effects.law import Law, Surroundings
 from simulators.hidden_effects.operators import against_modes
 from simulators.hidden_effects.registry import Draws, Hideable, bladder, log_uniform

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from simulators.bladder import X_OVER_NRT
+from simulators.bladder_parameters import X_OVER_NRT
 from simulators.hidden_effects.law import Law
 from simulators.presets import effective_area_m2
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.bladder import AMBIENT_PA
+from simulators.bladder_parameters import AMBIENT_PA
 from simulators.hidden_effects.law import Law, Surroundings
 from simulators.hidden_effects.registry import (
     SHARE_OF_RANGE,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.bladder import X_OVER_NRT
+from simulators.bladder_parameters import X_OVER_NRT
 from simulators.effects.sensing import DIE_FASTER, DIE_SHARE
 from simulators.hidden_effects.law import Law, Surroundings
 from simulators.hidden_effects.operators import integral

@@ -64,9 +64,9 @@ class _LazyGroup(click.Group):
 
 def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted and not ctx.resilient_parsing:
-        import smartshoe
+        from smartshoe.version import __version__
 
-        click.echo(f"smartshoe {smartshoe.__version__}")
+        click.echo(f"smartshoe {__version__}")
         ctx.exit()
 
 

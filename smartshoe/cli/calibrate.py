@@ -142,8 +142,8 @@ def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) 
 def _plan(options: dict[str, Any]) -> SessionPlan:
     import datetime
 
-    import smartshoe
     from smartshoe.session import SessionPlan, protocols_named
+    from smartshoe.version import __version__
 
     if options["store"] is not None and not options["serial_number"]:
         raise UsageError("--store needs --serial-number: the store keeps units by their serial number")
@@ -157,7 +157,7 @@ def _plan(options: dict[str, Any]) -> SessionPlan:
         serial_number=options["serial_number"],
         store=options["store"],
         created=datetime.datetime.now(datetime.UTC).date().isoformat(),
-        version=smartshoe.__version__,
+        version=__version__,
         diagnosed=options["diagnosed"],
         largest_repeats=options["repeats"],
         wait_s=options["wait_s"],

@@ -137,11 +137,11 @@ def _title(recordings: list[Recording], unit: str | None) -> str:
 
 
 def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, str]:
-    import smartshoe
+    from smartshoe.version import __version__
 
     facts = {"fitted": ", ".join(recording.name for recording in recordings)}
     facts["judged on"] = ", ".join(recording.name for recording in others) or "every third load cycle, not fitted"
-    return {**facts, "smartshoe": smartshoe.__version__}
+    return {**facts, "smartshoe": __version__}
 
 
 def _save_calibration(path: str, found: Diagnosis, recordings: list[Recording], unit: str | None) -> None:

@@ -273,6 +273,7 @@ def extended_calibration(
     model: ExtendedModel,
     *,
     unit: str = "",
+    serial_number: str = "",
     parameters: Mapping[str, Parameter] | None = None,
     covariance: tuple[tuple[float, ...], ...] = (),
     load_range_n: tuple[float, float] | None = None,
@@ -285,7 +286,7 @@ def extended_calibration(
     b1 = a F/(G R), with F/(G R) full-scale load over gain times full-scale reading in N per reading unit, which is
     also the calibration's ``scale``. ``parameters`` and ``covariance`` go together, as in `Calibration`.
     """
-    from smartshoe import __version__
+    from smartshoe.version import __version__
 
     newton_per_reading = model.full_scale_load_n / (model.gain * model.full_scale_reading)
     shift = sum(float(part.values[0]) for part in model.parts if part.effect.shifts == "reading")
@@ -304,5 +305,6 @@ def extended_calibration(
         sample_rate_hz=sample_rate_hz,
         created=created,
         smartshoe_version=__version__,
+        serial_number=serial_number,
         extended=model,
     )

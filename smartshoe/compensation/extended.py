@@ -11,7 +11,8 @@ from smartshoe.compensation.core_inverse import CoreInverse
 from smartshoe.compensation.filter import ForceFilter
 from smartshoe.compensation.noise_limit import MOST, NoiseLimit, noise_gain
 from smartshoe.errors import UsageError
-from smartshoe.models.effects.effect import Arm, CStep, Inverse
+from smartshoe.models.effects.effect import CStep, Inverse
+from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel, Part
 from smartshoe.units import Unit, declared, find_unit
 

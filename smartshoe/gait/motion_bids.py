@@ -77,7 +77,7 @@ def write_motion_bids(
 
 def _describe(root: Path, subject: str, title: str) -> None:
     """What stands once in a data set, and the subject's line."""
-    from smartshoe import __version__
+    from smartshoe.version import __version__
 
     description = root / "dataset_description.json"
     if not description.exists():

@@ -243,7 +243,7 @@ class Identification(Summarised):
 
         ``created`` is an ISO date where the caller wants one in the file.
         """
-        from smartshoe import __version__
+        from smartshoe.version import __version__
 
         a1, b0, b1 = self.coefficients
         return Calibration(

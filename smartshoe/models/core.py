@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.models.effects.effect import Arm, Element, Heat, Leak
+from smartshoe.models.elements import Arm, Element, Heat, Leak
 
 Array = NDArray[np.float64]
 

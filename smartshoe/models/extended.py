@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from smartshoe.models.core import USUAL_WALL_RATIO, Core
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import PLACES, Arm, Conditions, CoreEffect, Effect, EffectParameter, Element
+from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter
+from smartshoe.models.elements import Arm, Element
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ import numpy as np
 from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.document import write_document
+from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
 from smartshoe.report.wording import sentence
@@ -19,20 +20,7 @@ from smartshoe.store.dates import iso
 from smartshoe.store.drift import Drift, Trend
 from smartshoe.store.quantities import STATIC_GAIN, ZERO
 
-SHOWN = ("static_gain", "a1", "b0", "b1", "k1", "k2", "zero")
-TITLES = {
-    "static_gain": "static gain",
-    "a1": "relaxation rate a1",
-    "b0": "fast gain b0",
-    "zero": "zero (reading at no load)",
-}
-LEAST_SPAN = 0.004  # of a parameter's size: so that a still one looks still
 DAY_S = 86400.0
-
-
-def shown_names(drift: Drift) -> list[str]:
-    """The quantities that are drawn, in their order."""
-    return [name for name in SHOWN if name in drift.trends] + [n for n in drift.trends if n not in SHOWN and n != "c"]
 
 
 def _chart(drift: Drift, trend: Trend) -> Chart:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import smartshoe
 from smartshoe.atomic import make_folder, write_text
 from smartshoe.compensation.provenance import calibrated_on
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
@@ -12,6 +11,7 @@ from smartshoe.report.calibration.judgement import headline, judge
 from smartshoe.report.trial import TrialSection
 from smartshoe.report.wording import sentence
 from smartshoe.scenario.run import ScenarioResult, UnitResult, diagnosed_on
+from smartshoe.version import __version__
 
 
 def _publish_diagnosis(
@@ -24,7 +24,7 @@ def _publish_diagnosis(
     if found is None or settings is None:
         return None
     own = make_folder(folder / "diagnosis" / unit.name)
-    facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "smartshoe": smartshoe.__version__}
+    facts = {"scenario": result.source.name, "seed": str(result.scenario.seed), "smartshoe": __version__}
     page = publish_diagnosis(own, found, unit.name, facts, figures)["report"]
     if found.model is not None:
         saved = calibrated_on(found.calibration(unit=unit.name), diagnosed_on(unit.recordings, settings))
@@ -69,7 +69,7 @@ def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str
     facts = {
         "scenario": result.source.name,
         "seed": str(result.scenario.seed),
-        "smartshoe": smartshoe.__version__,
+        "smartshoe": __version__,
     }
     units = [_unit_report(result, unit, diagnosed.get(unit.name)) for unit in result.units]
     title, about, trial = result.scenario.title, result.scenario.about, _publish_trial(result, folder)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import smartshoe
 from smartshoe.compensation import Calibration
 from smartshoe.devices import open_machine
 from smartshoe.devices.base import TestMachine
@@ -22,6 +21,7 @@ from smartshoe.recording import Recording
 from smartshoe.scenario.schema import DiagnoseTable, Scenario, ScenarioText
 from smartshoe.scenario.trial import RecordedTrial, TrialResult, analyse_trial, opened_shoe, record_trial
 from smartshoe.validation import Validation, validate
+from smartshoe.version import __version__
 
 if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
@@ -85,7 +85,7 @@ class ScenarioResult:
             "scenario": self.source.name,
             "title": self.scenario.title,
             "seed": self.scenario.seed,
-            "version": smartshoe.__version__,
+            "version": __version__,
             "units": [unit.to_dict() for unit in self.units],
             **trial,
         }

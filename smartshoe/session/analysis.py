@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import smartshoe
 from smartshoe.compensation import Calibration
 from smartshoe.devices.joining import join
 from smartshoe.errors import InputError, NotIdentifiableError, SmartShoeError
@@ -15,6 +14,7 @@ from smartshoe.recording import Recording
 from smartshoe.session.folder import Attempt, SessionFolder
 from smartshoe.session.plan import SessionPlan
 from smartshoe.validation import Validation, validate
+from smartshoe.version import __version__
 
 if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
@@ -48,7 +48,7 @@ class SessionResult:
             "unit": self.plan.unit,
             "serial_number": self.plan.serial_number,
             "created": self.plan.created,
-            "version": smartshoe.__version__,
+            "version": __version__,
             "experiments": [self._experiment(name, recording) for name, recording in self.recordings.items()],
             "attempts": [
                 {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import smartshoe
 from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.compensation.provenance import calibrated_on
 from smartshoe.logs import write
@@ -14,6 +13,7 @@ from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.session.analysis import SessionResult
 from smartshoe.session.checks import AT_THE_END
 from smartshoe.session.folder import kept_on_disk
+from smartshoe.version import __version__
 
 if TYPE_CHECKING:
     from smartshoe.store.entry import Entry
@@ -78,7 +78,7 @@ def _write_page(result: SessionResult, folder: Path, unit: UnitReport, entry: En
         f" ({'; '.join(_clocks(name, recording) for name, recording in result.recordings.items())})."
     )
     facts = {"shoe": plan.shoe, "machine": plan.machine, "serial number": plan.serial_number or "not given",
-             "date": plan.created, "smartshoe": smartshoe.__version__}  # fmt: skip
+             "date": plan.created, "smartshoe": __version__}  # fmt: skip
     title = f"Calibration of {plan.unit}"
     return write_page(folder / "report.html", title, about, facts, [unit], session=_card(result, entry))
 
@@ -119,7 +119,7 @@ def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | N
     if found is None:
         return None
     own = make_folder(folder / "diagnosis")
-    page = publish_diagnosis(own, found, plan.unit, {"smartshoe": smartshoe.__version__})["report"]
+    page = publish_diagnosis(own, found, plan.unit, {"smartshoe": __version__})["report"]
     if found.model is not None:
         extended = found.calibration(unit=plan.unit, created=plan.created)
         calibrated_on(extended, list(result.recordings.values())).save(folder / f"{plan.unit}_extended.json")

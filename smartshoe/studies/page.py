@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-import smartshoe
 from smartshoe.report.charts import Chart, Line, Panel
 from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain
-from smartshoe.studies.running import Difference, StudyResult
 from smartshoe.studies.statistics import Agreement, Mean
 from smartshoe.studies.trials import TrialFigures
+from smartshoe.version import __version__
+
+if TYPE_CHECKING:
+    from smartshoe.studies.running import Difference, StudyResult
 
 COLOURS = ("reading", "raw", "corrected", "toe", "heel", "meta4")
 SHOWN = (
@@ -41,7 +44,7 @@ def write_page(path: Path, result: StudyResult, source: Path) -> None:
                 "subjects": str(len(subjects)),
                 "trials": str(len(result.trials)),
                 "left out": str(len(result.left_out)),
-                "smartshoe": smartshoe.__version__,
+                "smartshoe": __version__,
             },
             "left_out": [(trial.entry.file, trial.left_out) for trial in result.left_out],
             "flags": [*result.flags, *careful(result)],

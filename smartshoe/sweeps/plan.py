@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import smartshoe
 from smartshoe.errors import ScenarioError
 from smartshoe.scenario import check_simulated, checked, read_tables
 from smartshoe.scenario.keys import Tables, with_values
 from smartshoe.scenario.schema import ScenarioKeyError, ScenarioText
 from smartshoe.sweeps.design import SweepDesign, design_of
+from smartshoe.version import __version__
 
 UNSEEN = ("sweep", "title", "about")  # of a scenario's keys: what no figure depends on
 NAME_DIGITS = 24  # of a case's name: 96 bits, so that no two of 100,000 cases share one
@@ -40,7 +40,7 @@ class SweepPlan:
     source: ScenarioText
     base: Tables
     design: SweepDesign
-    version: str = field(default_factory=lambda: smartshoe.__version__)
+    version: str = field(default_factory=lambda: __version__)
     _digests: dict[str, str] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:

@@ -30,11 +30,11 @@ CALIBRATION = replace(
     extended_calibration(
         MODEL,
         unit="left_toe",
+        serial_number="HT-0042",
         parameters={"a1": Parameter.from_sd(0.3, 0.01, "1/s")},
         covariance=((1e-4,),),
         created="2016-10-12",
     ),
-    serial_number="HT-0042",
     sources=({"name": "toe.csv", "sha256": "0123abcd"},),
 )
 

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from simulators import presets
-from simulators.bladder import X_OVER_NRT
+from simulators.bladder_parameters import X_OVER_NRT
 from simulators.gait import Person, Run, Stand, Tiptoe, Trial, Walk, trial
 from smartshoe.compensation import Calibration
 from smartshoe.recording import REGIONS

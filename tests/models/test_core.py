@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from smartshoe.models.core import Core, plain
-from smartshoe.models.effects.effect import Arm, Heat, Leak
+from smartshoe.models.elements import Arm, Heat, Leak
 from smartshoe.models.first_order import simulate
 
 STEP_S = 0.05

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from smartshoe.models.core import USUAL_WALL_RATIO, Core
 from smartshoe.models.effects._wall_loop import relaxed
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Arm, Array, Conditions, CoreEffect, Effect
+from smartshoe.models.effects.effect import Array, Conditions, CoreEffect, Effect
+from smartshoe.models.elements import Arm
 
 NAMES = (
     "second_relaxation", "power_law_creep", "linear_leak", "orifice_leak", "gas_heat", "gas_compression",

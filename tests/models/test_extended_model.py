@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from smartshoe.errors import UsageError
 from smartshoe.models.core import Core
 from smartshoe.models.effects import Conditions, blocks, catalogue, effect
-from smartshoe.models.effects.effect import PLACES, Arm
+from smartshoe.models.effects.effect import PLACES
+from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
 
 NAMES = [

@@ -11,8 +11,9 @@ from smartshoe.compensation.extended import ExtendedCompensator
 from smartshoe.models.core import Core, plain
 from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.effects._monotone_curve import KNOTS
-from smartshoe.models.effects.effect import Arm, Array, CoreEffect
+from smartshoe.models.effects.effect import Array, CoreEffect
 from smartshoe.models.effects.flexible_loop import HALF_WIDTHS
+from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.twin import TwinBladder
 

@@ -12,14 +12,14 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from simulators.bladder import (
+from simulators.bladder import SimulatedBladder
+from simulators.bladder_parameters import (
     AMBIENT_PA,
     BladderParameters,
     ConditioningParameters,
     GasHeatParameters,
     HysteresisParameters,
     LeakParameters,
-    SimulatedBladder,
     SofteningParameters,
     TemperatureParameters,
 )

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from simulators.daq import MyRioParameters
-from simulators.instron import InstronParameters, SensingUnit, SimulatedInstron
+from simulators.instron import InstronParameters, SimulatedInstron
+from simulators.sensing_unit import SensingUnit
 from simulators.sensor import HdiParameters, SimulatedHdiSensor
 from simulators.twin import twin_of
 from smartshoe.compensation import Calibration, compensated, extended_calibration

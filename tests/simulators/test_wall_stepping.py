@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from simulators.bladder import (
+from simulators.bladder import SimulatedBladder
+from simulators.bladder_parameters import (
     AMBIENT_PA,
     BladderParameters,
     ConditioningParameters,
     GasHeatParameters,
     HysteresisParameters,
     LeakParameters,
-    SimulatedBladder,
     SofteningParameters,
     TemperatureParameters,
 )

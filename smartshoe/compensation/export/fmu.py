@@ -68,7 +68,7 @@ def _unit(
     *,
     start_value: float,
 ) -> dict[str, bytes]:
-    from smartshoe import __version__
+    from smartshoe.version import __version__
 
     # The token says whether binary and description belong together.
     token = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32]

@@ -184,7 +184,7 @@ def one_safe_line(text: str) -> str:
 
 def origin(calibration: Calibration, sample_rate_hz: float) -> dict[str, str]:
     """Where a calibration comes from and what it holds for, key to one line of text; "model" is for the caller."""
-    import smartshoe
+    from smartshoe.version import __version__
 
     low_high = calibration.load_range_n
     rates = calibration.rate_range_n_per_s
@@ -199,7 +199,7 @@ def origin(calibration: Calibration, sample_rate_hz: float) -> dict[str, str]:
         "delay": f"{calibration.delay_s:g} s between the reading and load logs, not compensated",
         "calibrated": calibration.created or "date not known",
         "identified by": f"smartshoe {calibration.smartshoe_version or '(version not known)'}",
-        "exported by": f"smartshoe {smartshoe.__version__}",
+        "exported by": f"smartshoe {__version__}",
     }
     for number, source in enumerate(calibration.sources, start=1):
         said[f"source {number}"] = f"{source.get('name') or '(unnamed)'}, sha256 {source.get('sha256') or 'not known'}"

@@ -2,19 +2,9 @@
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.catalogue import blocks, catalogue, effect, told_apart_by
-from smartshoe.models.effects.effect import (
-    Arm,
-    Conditions,
-    CoreEffect,
-    CStep,
-    Effect,
-    EffectParameter,
-    Heat,
-    Inverse,
-    Leak,
-    Place,
-)
+from smartshoe.models.effects.effect import Conditions, CoreEffect, CStep, Effect, EffectParameter, Inverse, Place
 from smartshoe.models.effects.exposure import by
+from smartshoe.models.elements import Arm, Heat, Leak
 
 __all__ = [
     "Arm",

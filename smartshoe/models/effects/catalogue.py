@@ -11,15 +11,16 @@ import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from smartshoe.errors import UsageError
-from smartshoe.models import effects
 from smartshoe.models.effects.effect import PLACES, Effect
 from smartshoe.models.effects.exposure import WORDS, Exposure
 
 GROUP = "smartshoe.effects"
+ROOM = __name__.rpartition(".")[0]
 
 
 def _concrete(kind: Any) -> list[type[Effect]]:
@@ -29,9 +30,9 @@ def _concrete(kind: Any) -> list[type[Effect]]:
 
 @cache
 def _found() -> Mapping[str, Effect]:
-    for module in pkgutil.iter_modules(effects.__path__):
-        importlib.import_module(f"{effects.__name__}.{module.name}")
-    own = (kind() for kind in _concrete(Effect) if kind.__module__.startswith(effects.__name__))
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        importlib.import_module(f"{ROOM}.{module.name}")
+    own = (kind() for kind in _concrete(Effect) if kind.__module__.startswith(ROOM))
     found = {made.name: made for made in own}
     for entry in entry_points(group=GROUP):
         made = _offered(entry)

@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import UsageError
+from smartshoe.models.core import Core
 from smartshoe.models.effects.exposure import Direction, Exposure
+from smartshoe.models.elements import Arm, Element
 
 Array = NDArray[np.float64]
 Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
@@ -194,32 +196,6 @@ class Effect(ABC):
         return all(p.null is None or value == p.null for p, value in zip(self.parameters, values, strict=True))
 
 
-@dataclass(frozen=True, slots=True)
-class Arm:
-    """A Maxwell arm of the wall: stiffness ``share`` of (gas + k1), relaxing at ``rate_per_s``."""
-
-    share: float
-    rate_per_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Heat:
-    """Heat of compression: ``share`` of the isothermal pressure rise, leaving at ``rate_per_s``."""
-
-    share: float
-    rate_per_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Leak:
-    """Air lost at ``rate_per_s`` times the pressure."""
-
-    rate_per_s: float
-
-
-Element = Arm | Heat | Leak
-
-
 class CoreEffect(Effect):
     """An effect that adds states to the linear network of wall and gas (`smartshoe.models.core`)."""
 
@@ -231,6 +207,4 @@ class CoreEffect(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The network with these elements alone: no relaxation of the baseline, unit static gain."""
-        from smartshoe.models.core import Core
-
         return Core(self.elements(values)).simulate(signal, conditions.step_s)

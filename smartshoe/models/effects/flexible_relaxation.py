@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element, Heat
+from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
+from smartshoe.models.elements import Arm, Element, Heat
 
 RATES_PER_S = np.geomspace(0.01, 30.0, 6)
 GAS_SHARE = 1.6 / 0.6  # heat's share for one of the reading: N/(N - 1) at the usual wall ratio N of the core

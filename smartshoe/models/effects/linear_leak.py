@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter, Element, Leak
+from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
+from smartshoe.models.elements import Element, Leak
 
 
 class LinearLeak(CoreEffect):

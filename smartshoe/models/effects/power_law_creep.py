@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from smartshoe.models.effects.effect import Arm, Array, CoreEffect, EffectParameter, Element
+from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
+from smartshoe.models.elements import Arm, Element
 
 SHORTEST_S, LONGEST_S, ARMS = 0.02, 2000.0, 9
 SPACING = math.log10(LONGEST_S / SHORTEST_S) / (ARMS - 1)  # decades

@@ -5,8 +5,9 @@ from __future__ import annotations
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects._wall_loop import shared
-from smartshoe.models.effects.effect import Arm, Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
+from smartshoe.models.elements import Arm
 
 NEWTON_STEPS = 5
 

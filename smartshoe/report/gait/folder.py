@@ -24,7 +24,7 @@ def publish_gait(
     ``figures`` is the format (svg, pdf, png) of figures for papers, None for none. Returns them by what they are.
     ``forces.csv`` is a plain table, a trial again for ``smartshoe gait``.
     """
-    import smartshoe
+    from smartshoe.version import __version__
 
     names = {"report": "gait.html", "result": "gait.json"}
     names |= {table: f"{table}.csv" for table in ("strides", "events", "forces")}
@@ -35,7 +35,7 @@ def publish_gait(
         text = frame.to_csv(index=False, float_format=f"%.{DIGITS}g", lineterminator="\n")
         write_text(written[table], text)
     write_text(written["forces"], forces_text(found.columns()))
-    write_gait_page(written["report"], found, f"Gait: {title}", {**facts, "smartshoe": smartshoe.__version__})
+    write_gait_page(written["report"], found, f"Gait: {title}", {**facts, "smartshoe": __version__})
     if figures is not None:
         from smartshoe.report.paper.gait import write_figures
 

@@ -15,6 +15,9 @@ from smartshoe.atomic import replacing
 Array = NDArray[np.float64]
 
 MOST = 900  # points of a line
+FOOT_COLOURS = {"left": "#0072B2", "right": "#D55E00"}
+REGION_COLOURS = {"heel": "#7c3aed", "meta4": "#0891b2", "meta1": "#ca8a04", "toe": "#be185d"}
+TOTAL = "#1f2937"
 STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "smartshoe",

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
-from smartshoe.report.drift import LEAST_SPAN, TITLES, shown_names
+from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.paper.drawing import STYLE, figure_of
 from smartshoe.store.drift import Drift, Trend
 

@@ -20,15 +20,13 @@ from smartshoe.gait.result import GaitResult
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
 from smartshoe.report.gait.strides import main_strides, whole_of
-from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
+from smartshoe.report.paper.drawing import FOOT_COLOURS, REGION_COLOURS, STYLE, TOTAL, figure_of, save, thin
+from smartshoe.report.paper.soles import centre
 
 Array = NDArray[np.float64]
 
-FOOT_COLOURS = {"left": "#0072B2", "right": "#D55E00"}
-REGION_COLOURS = {"heel": "#7c3aed", "meta4": "#0891b2", "meta1": "#ca8a04", "toe": "#be185d"}
 PHASE_COLOURS = ("#f3f4f6", "#a5b4fc", "#6ee7b7", "#fcd34d")
 MEMBER_COLOURS = ("#c7d2fe", "#a5b4fc", "#6ee7b7", "#fde68a", "#fbbf24", "#f3f4f6")
-TOTAL = "#1f2937"
 MOST_STRIDES = 40
 WINDOW_STRIDES = 5
 ABOVE: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 4, "fontsize": 8, "borderpad": 0.1}
@@ -248,8 +246,6 @@ def variability(found: GaitResult) -> Figure | None:
 
 def write_figures(folder: Path, found: GaitResult, ending: str) -> list[Path]:
     """Write the trial's figures (svg, pdf, png by ``ending``) below ``folder``, and return them."""
-    from smartshoe.report.paper.soles import centre
-
     drawn = {
         "trial": course(found), "strides": strides(found), "butterfly": butterfly(found), "units": regions(found),
         "phases": phases(found), "memberships": memberships(found), "centre": centre(found),

@@ -16,8 +16,7 @@ from smartshoe.gait.insole import OUTLINE, PLACES
 from smartshoe.gait.result import FootCourse, GaitResult
 from smartshoe.report.gait.shapes import INWARDS, MIDDLE, paths_of, placed
 from smartshoe.report.gait.strides import main_strides
-from smartshoe.report.paper.drawing import STYLE
-from smartshoe.report.paper.gait import FOOT_COLOURS, REGION_COLOURS, TOTAL
+from smartshoe.report.paper.drawing import FOOT_COLOURS, REGION_COLOURS, STYLE, TOTAL
 
 Array = NDArray[np.float64]
 
