@@ -111,9 +111,11 @@ def _examined(recording: Recording, dropped_to: Array = NONE) -> tuple[list[Find
 def _lacking(recording: Recording) -> str | None:
     """Why there is no pair of load and reading, or None."""
     if not recording.of_role("load"):
+        commanded = recording.of_role("command")
+        said = f" ({commanded[0].name} is what was asked for, not what was measured)" if commanded else ""
         return (
-            "there is no reference load: without it an error of the unit cannot be told from the load; name its column"
-            " with --force"
+            f"there is no reference load{said}: without it an error of the unit cannot be told from the load; name its"
+            " column with --force"
         )
     count = len(recording.sensors)
     if count == 1:

@@ -39,15 +39,21 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
 
 
 def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``wrong_sign``: a pressure (or force) that falls as load rises. Counts, volts and lengths may."""
+    """Kind ``wrong_sign``: a load that is negative in compression, or a pressure (or force) that falls as load rises.
+
+    Counts, volts and lengths may fall.
+    """
     if view.sign > 0 or view.recording.sensor.unit.quantity not in RISES_WITH_LOAD:
         return
-    yield Finding(
-        "wrong_sign",
-        np.ones(len(view.recording), dtype=bool),
-        f"the {view.recording.sensor.name} falls as the load rises: turn the sign of one of the two (load is positive"
-        " in compression)",
-    )
+    name, at = view.recording.sensor.name, view.curve[0]
+    if -at[0] > abs(at[-1]):
+        says = (
+            f"the load is negative in compression (it runs from {at[0]:.4g} to {at[-1]:.4g} N and the {name} rises as"
+            " it falls): turn its sign, compression is positive"
+        )
+    else:
+        says = f"the {name} falls as the load rises: turn the sign of one of the two (load is positive in compression)"
+    yield Finding("wrong_sign", np.ones(len(view.recording), dtype=bool), says)
 
 
 def _followed_share(view: View) -> tuple[float, float]:
