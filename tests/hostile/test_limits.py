@@ -12,7 +12,7 @@ from smartshoe.devices import open_machine, open_shoe
 from smartshoe.errors import LimitError, OptionError, UsageError
 from smartshoe.gate import raise_limits
 from smartshoe.protocol import Protocol, Segment
-from smartshoe.session import Plan, SessionFolder
+from smartshoe.session import SessionFolder, SessionPlan
 from smartshoe.store import CalibrationStore
 from smartshoe.units import MILLIBAR
 
@@ -86,7 +86,7 @@ def test_a_coefficient_near_the_end_of_numbers_fits_no_fixed_point(tmp_path: Pat
 
 
 def test_a_session_from_elsewhere_makes_no_store(tmp_path: Path) -> None:
-    plan = Plan(shoe="sim:stand", machine="sim:instron", unit="left_toe", protocols=(LONG,), serial_number="7",
+    plan = SessionPlan(shoe="sim:stand", machine="sim:instron", unit="left_toe", protocols=(LONG,), serial_number="7",
                 store=str(tmp_path / "elsewhere"))  # fmt: skip
     SessionFolder.begin(tmp_path / "session", plan).close()
     for word in ("--resume", "--replay"):

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from simulators.bladder import (
+from simulators.bladder import SimulatedBladder
+from simulators.bladder_parameters import (
     BladderParameters,
     ConditioningParameters,
     GasHeatParameters,
     HysteresisParameters,
     LeakParameters,
-    SimulatedBladder,
     SofteningParameters,
-)  # fmt: skip
+)
 from simulators.effects.contact import ContactParameters
 from simulators.effects.damage import PermanentSetParameters
 from simulators.effects.friction import BoucWenParameters, StickSlipParameters
