@@ -41,9 +41,14 @@ _raised: list[str] = []
 
 def raise_limits(settings: Iterable[str]) -> None:
     """Let ``NAME=NUMBER`` of ``settings`` hold in this process; raises `UsageError` for what is no limit."""
+    before = list(_raised)
     _raised[:] = settings
     limits.cache_clear()
-    limits()
+    try:
+        limits()
+    except UsageError:
+        _raised[:] = before
+        raise
 
 
 @cache

@@ -31,9 +31,21 @@ class Ended:
         return self.err.rstrip("\n").rpartition("\n")[2]
 
 
-def ended(arguments: Sequence[str], folder: Path) -> Ended:
-    """Run a command line in this process and hold it against the contract; ``folder`` is where it may write."""
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+def _state(folder: Path, kept: Sequence[str]) -> dict[Path, int]:
+    """When each file and folder changed; where folders named ``kept`` record what happens, only files outside them."""
+    return {
+        path: path.stat().st_mtime_ns
+        for path in folder.rglob("*")
+        if not kept or (path.is_file() and not set(kept) & set(path.relative_to(folder).parts))
+    }
+
+
+def ended(arguments: Sequence[str], folder: Path, kept: Sequence[str] = ()) -> Ended:
+    """Run a command line in this process and hold it against the contract; ``folder`` is where it may write.
+
+    Folders named ``kept`` (a session's, a store) may change though the command is refused.
+    """
+    before = _state(folder, kept)
     peak_kib, began_s = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -48,7 +60,6 @@ def ended(arguments: Sequence[str], folder: Path) -> Ended:
         assert found.last_line.startswith("error: "), found
         assert len(found.last_line) < LONGEST_LINE, found
         assert found.last_line.isprintable(), found
-        after = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-        assert after == before, "a refused command left or changed a file"
+        assert _state(folder, kept) == before, "a refused command left or changed a file"
     assert not [path for path in folder.rglob("*") if "partial" in path.name]
     return found

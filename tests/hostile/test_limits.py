@@ -10,7 +10,7 @@ from contract import ended
 from smartshoe.compensation import Calibration
 from smartshoe.devices import open_machine, open_shoe
 from smartshoe.errors import LimitError, OptionError, UsageError
-from smartshoe.gate import raise_limits
+from smartshoe.gate import limits, raise_limits
 from smartshoe.protocol import Protocol, Segment
 from smartshoe.session import SessionFolder, SessionPlan
 from smartshoe.store import CalibrationStore
@@ -29,6 +29,9 @@ def test_a_pressing_of_too_many_samples_is_refused_before_it_runs() -> None:
             machine.check(LONG)
         finally:
             raise_limits([])
+    with pytest.raises(UsageError, match="is not known"):
+        raise_limits(["sample=1"])
+    assert limits().samples == 5_000_000  # a wrong setting leaves what held
     with open_machine("sim:instron", fine_rate_hz=100_000.0) as fine, pytest.raises(LimitError, match="samples"):
         fine.check(Protocol("short", (Segment("ramp", 100.0, 60.0),)))
 
