@@ -7,10 +7,12 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import click
 
+from smartshoe.cli.output import Talk, talk
 from smartshoe.errors import SmartShoeError
 from smartshoe.gate.limits import raise_limits
 
@@ -73,8 +75,8 @@ def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 @click.group(
     cls=_LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Each command has --help with an example. --debug shows a traceback where one helps,"
-    " --limit NAME=NUMBER lets larger files in.",
+    epilog="Each command has --help with an example. --quiet leaves out progress and notes, --verbose tells every step,"
+    " --debug shows a traceback, --limit NAME=NUMBER lets larger files in.",
 )
 @click.option("--version", is_flag=True, expose_value=False, is_eager=True, callback=_show_version,
               help="Show the version and exit.")  # fmt: skip
@@ -95,29 +97,42 @@ def _one_line(text: str) -> str:
     return line
 
 
-def _of_every_command(arguments: Sequence[str]) -> tuple[list[str], bool, list[str]]:
-    """The command line without what any command takes at any place: ``--debug``, ``--limit NAME=NUMBER``."""
-    words, limits, debug = [], [], False
+@dataclass(slots=True)
+class _Common:
+    """What any command takes at any place of its line: ``--debug``, ``--quiet``, ``--verbose``, ``--limit``."""
+
+    debug: bool = False
+    talk: Talk = "usual"
+    limits: list[str] = field(default_factory=list)
+
+
+def _of_every_command(arguments: Sequence[str]) -> tuple[list[str], _Common]:
+    """The command line without what is common, and that."""
+    words: list[str] = []
+    common = _Common()
     waiting = iter(arguments)
     for word in waiting:
         if word == "--":
             words += [word, *waiting]
         elif word == "--debug":
-            debug = True
+            common.debug = True
+        elif word in ("--quiet", "--verbose"):
+            common.talk = "quiet" if word == "--quiet" else "verbose"
         elif word == "--limit":
-            limits.append(next(waiting, ""))
+            common.limits.append(next(waiting, ""))
         elif word.startswith("--limit="):
-            limits.append(word.removeprefix("--limit="))
+            common.limits.append(word.removeprefix("--limit="))
         else:
             words.append(word)
-    return words, debug, limits
+    return words, common
 
 
 def run_command(arguments: Sequence[str]) -> int:
     """Run a command line and return its exit status; errors are printed to stderr as one sentence."""
-    words, debug, limits = _of_every_command(arguments)
+    words, common = _of_every_command(arguments)
+    before = talk.set(common.talk)
     try:
-        raise_limits(limits)
+        raise_limits(common.limits)
         result: Any = group.main(args=words, prog_name="smartshoe", standalone_mode=False)
         return result if isinstance(result, int) else 0
     except BrokenPipeError:
@@ -125,9 +140,11 @@ def run_command(arguments: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:
-        if debug:
+        if common.debug:
             raise
         return _told(error)
+    finally:
+        talk.reset(before)
 
 
 def _told(error: Exception) -> int:

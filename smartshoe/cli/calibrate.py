@@ -54,7 +54,7 @@ def command(
     from smartshoe.kernels import warm_up
 
     warm_up.begin()
-    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.cli.output import emit_json, note, progress
     from smartshoe.session import analyse, conduct, publish
 
     if replay is not None:
@@ -65,8 +65,8 @@ def command(
         target = folder.path
     with folder:
         _require_own_store(folder, options["store"])
-        for note in folder.notes:
-            click.echo(f"note: {folder.path}: {note}", err=True)
+        for said in folder.notes:
+            note(f"{folder.path}: {said}")
         if replay is None:
             asks = not yes and sys.stdin.isatty() and not folder.plan.machine.startswith("sim:")
             try:

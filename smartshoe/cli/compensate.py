@@ -25,6 +25,7 @@ def command(
     unit: str | None,
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
+    from smartshoe.cli.output import note
     from smartshoe.compensation import Calibration, compensated
     from smartshoe.logs import write
 
@@ -32,8 +33,8 @@ def command(
     (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
     warn_of_another_unit([recording], calibration)
     result = compensated(recording, calibration)
-    for note in result.notes[len(recording.notes) :]:
-        click.echo(f"note: {note}", err=True)
+    for said in result.notes[len(recording.notes) :]:
+        note(said)
     if out_path is not None:
         write(result, out_path)
     estimate_n = result["force_estimate"].si

@@ -66,7 +66,7 @@ def command(
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
     from smartshoe.atomic import make_folder
-    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.cli.output import emit_json, note, progress
     from smartshoe.diagnosis import diagnose
     from smartshoe.errors import NotIdentifiableError, UsageError
 
@@ -98,7 +98,7 @@ def command(
     taken = emit_json(found.to_dict(), json_path)
     if refused:
         for said in found.limits[1:]:
-            click.echo(f"note: {said}", err=True)
+            note(said)
         raise NotIdentifiableError(found.limits[0] if found.limits else found.says)
     if taken:
         return

@@ -79,7 +79,7 @@ def command(
     from smartshoe.atomic import make_folder
     from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
     from smartshoe.cli.inputs import say_what_strikes, units_of, with_units
-    from smartshoe.cli.output import emit_json, progress, show_notes
+    from smartshoe.cli.output import emit_json, note, progress, show_notes
     from smartshoe.gait.analysis import analyse
     from smartshoe.gait.coverage import Coverage
     from smartshoe.logs import read
@@ -104,7 +104,7 @@ def command(
             }
         )
         if stream is None:
-            click.echo("note: a large recording goes through as a stream (--whole takes it into memory)", err=True)
+            note("a large recording goes through as a stream (--whole takes it into memory)")
     chosen = units_of(sensors)
     recordings = [] if streamed else [with_units(read(file, time=time), chosen) for file in files]
     show_notes(recordings)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -34,22 +36,47 @@ def emit_json(result: dict[str, Any], path: str | None) -> bool:
 def show_notes(recordings: list[Recording]) -> None:
     """What readers did to the files, on stderr."""
     for recording in recordings:
-        for note in recording.notes:
-            click.echo(f"note: {recording.label}: {note}", err=True)
+        for said in recording.notes:
+            note(f"{recording.label}: {said}")
+
+
+Talk = Literal["quiet", "usual", "verbose"]
+talk: ContextVar[Talk] = ContextVar("talk", default="usual")
+
+
+def note(text: str) -> None:
+    """What a person may want to know, on stderr; nothing with ``--quiet``."""
+    if talk.get() != "quiet":
+        click.echo(f"note: {text}", err=True)
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step's name on a terminal; nothing elsewhere."""
-    if not sys.stderr.isatty():
+def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
+    """A bar with the step's name on a terminal, and the time left where the ``total`` of steps is known.
+
+    Elsewhere nothing, or with ``--verbose`` a line a step with the seconds since the command began.
+    """
+    if talk.get() == "verbose":
+        began = time.monotonic()
+        yield lambda text: click.echo(f"{time.monotonic() - began:6.1f} s  {text}", err=True)
+        return
+    if talk.get() == "quiet" or not sys.stderr.isatty():
         yield lambda _: None
         return
     from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+    known = (BarColumn(20), TextColumn("left"), TimeRemainingColumn()) if total else ()
     with Progress(
-        SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn(),
+        SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn(), *known,
         console=Console(stderr=True), transient=True,
     ) as bar:  # fmt: skip
-        task = bar.add_task("starting", total=None)
-        yield lambda text: bar.update(task, description=text)
+        task = bar.add_task("starting", total=total)
+        done = -1
+
+        def step(text: str) -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, description=text, completed=done, total=max(total, done + 1) if total else None)
+
+        yield step

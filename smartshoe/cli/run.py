@@ -35,7 +35,7 @@ def command(
     from smartshoe.atomic import json_text, make_folder
     from smartshoe.cli.output import emit_json, progress
     from smartshoe.report.tables import print_summary
-    from smartshoe.scenario import load, run
+    from smartshoe.scenario import load, run, steps_of
     from smartshoe.scenario.keys import parse_assignments
     from smartshoe.scenario.publish import judged, publish
 
@@ -45,7 +45,7 @@ def command(
     if seed is not None:
         loaded = loaded.model_copy(update={"seed": seed})
     folder = make_folder(out_folder) if out_folder is not None else None
-    with progress() as step:
+    with progress(steps_of(loaded) + (folder is not None)) as step:
         result = run(loaded, source, step)
         whole = result.to_dict()
         report = None

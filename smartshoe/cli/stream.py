@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from smartshoe.cli.output import note
 from smartshoe.cli.ranges import FiniteRange
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
               help="Stop after this long (default: the stream's end, or Ctrl-C).")  # fmt: skip
 @click.option("--out", metavar="FILE", help="Write every sample to a new plain table.")
 def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, out: str | None) -> None:
-    """Live readings and forces from a shoe: a line a second, every sample to FILE; Ctrl-C ends it."""
+    """Live readings and forces from a shoe: each second's least and most, every sample to FILE; Ctrl-C ends it."""
     from smartshoe.cli.inputs import load_calibrations
     from smartshoe.devices import open_shoe
     from smartshoe.errors import UsageError
@@ -80,9 +81,10 @@ class _StreamRun:
     def until(self, shoe: Shoe, forces: StreamedForces, duration_s: float | None) -> None:
         """Read until ``duration_s`` of the device's time have passed, or the stream ends."""
         from smartshoe.errors import DeviceError
-        from smartshoe.session.streaming import StreamTable, last_of
+        from smartshoe.session.streaming import Seconds, StreamTable
 
-        start_s, due_s = None, 0.0
+        start_s, due_s, lost = None, 0.0, 0
+        seconds: Seconds | None = None
         for block in shoe.blocks():
             self._tell_events(shoe)
             if self.is_stopped:
@@ -95,13 +97,20 @@ class _StreamRun:
                 if self._out is not None:
                     facts = {"shoe": str(shoe), "sample_rate_hz": repr(shoe.sample_rate_hz)}
                     self._table = StreamTable(self._out, block, forces.names, facts)
+            if seconds is None:
+                seconds = Seconds(block, forces.names)
+                click.echo(f"{seconds.heading}\nleast to most of each second", err=True)
             force_n = forces.push(block)
+            seconds.add(block, force_n)
             if self._table is not None:
                 self._table.append(block, force_n)
             self._samples += len(block)
             last_s = float(block.time_s[-1])
             if last_s >= due_s:
-                click.echo(f"{last_of(block, force_n, self._samples).says}  lost {self._lost(shoe)}")
+                click.echo(seconds.told(last_s))
+                if self._lost(shoe) > lost:
+                    lost = self._lost(shoe)
+                    note(f"samples lost so far: {lost}")
                 due_s += int(last_s - due_s) + 1
             if duration_s is not None and last_s - start_s >= duration_s:
                 break
@@ -120,7 +129,7 @@ class _StreamRun:
     def _tell_events(self, shoe: Shoe) -> None:
         events = shoe.events
         for event in events[self._told :]:
-            click.echo(f"note: {event.says}", err=True)
+            note(event.says)
         self._told = len(events)
 
     def close(self) -> None:

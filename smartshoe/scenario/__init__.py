@@ -8,6 +8,7 @@ from smartshoe.scenario.run import (
     run,
     simulate,
     simulate_trial,
+    steps_of,
 )
 from smartshoe.scenario.schema import Scenario, checked, load, read_tables
 
@@ -23,4 +24,5 @@ __all__ = [
     "run",
     "simulate",
     "simulate_trial",
+    "steps_of",
 ]

@@ -217,6 +217,13 @@ def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Dia
     )
 
 
+def steps_of(scenario: Scenario) -> int:
+    """How often `run` tells of its progress."""
+    pressed = sum(len(unit.recordings) or len(scenario.protocol) for unit in scenario.unit)
+    of_each = 2 + (scenario.diagnose is not None)
+    return pressed + of_each * len(scenario.unit) + 2 * (scenario.trial is not None)
+
+
 def run(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> ScenarioResult:
     """Devices, then identification, calibration and validation of each unit, then the trial.
 

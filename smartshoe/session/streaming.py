@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -95,28 +94,45 @@ class StreamedForces:
         return found
 
 
-@dataclass(slots=True)
-class Second:
-    """What a second of the stream was: the last reading of each unit and its force; how many samples there were."""
+WIDTH, TIME_WIDTH, CELL_WIDTH = 80, 10, 17  # characters of a line, its time, one unit
 
-    time_s: float
-    samples: int
-    readings: dict[str, float]
-    force_n: dict[str, float]
-    unit: Unit
+
+class Seconds:
+    """What a stream did since a person was last told: the least and the most of each unit, in N where calibrated.
+
+    A walking foot's one value at an instant says nothing; how far it was unloaded and loaded within a second does.
+    """
+
+    def __init__(self, block: Block, forces: Sequence[str]) -> None:
+        self._symbols = {name: "N" if name in forces else block.unit.symbol for name in block.names}
+        self._low: dict[str, float] = {}
+        self._high: dict[str, float] = {}
 
     @property
-    def says(self) -> str:
-        """A line for a person."""
-        parts = []
-        for name, reading in self.readings.items():
-            force = f" {self.force_n[name]:6.1f} N" if name in self.force_n else ""
-            parts.append(f"{name} {reading:7.2f} {self.unit.symbol}{force}")
-        return f"{self.time_s:8.1f} s  " + "  ".join(parts)
+    def heading(self) -> str:
+        """The names over the columns, with what stands there."""
+        return "\n".join(self._rows("time", [f"{name} {symbol}" for name, symbol in self._symbols.items()]))
 
+    def add(self, block: Block, force_n: Mapping[str, Array]) -> None:
+        """Take a block in; missing samples are passed over."""
+        for column, name in enumerate(block.names):
+            values = np.asarray(force_n.get(name, block.readings[:, column]))[~block.missing[:, column]]
+            if values.size:
+                self._low[name] = min(self._low.get(name, np.inf), float(values.min()))
+                self._high[name] = max(self._high.get(name, -np.inf), float(values.max()))
 
-def last_of(block: Block, force_n: Mapping[str, Array], samples: int) -> Second:
-    """The block's last sample."""
-    readings = {name: float(block.readings[-1, column]) for column, name in enumerate(block.names)}
-    forces = {name: float(force[-1]) for name, force in force_n.items()}
-    return Second(float(block.time_s[-1]), samples, readings, forces, block.unit)
+    def told(self, time_s: float) -> str:
+        """The line (two where there are many units) at ``time_s``; from then on it counts anew."""
+        cells = [
+            f"{self._low[name]:.1f} to {self._high[name]:.1f}" if name in self._low else "–" for name in self._symbols
+        ]
+        self._low, self._high = {}, {}
+        return "\n".join(self._rows(f"{time_s:.1f} s", cells))
+
+    def _rows(self, first: str, cells: Sequence[str]) -> list[str]:
+        each = (WIDTH - TIME_WIDTH) // CELL_WIDTH
+        rows = [cells[k : k + each] for k in range(0, len(cells), each)]
+        return [
+            f"{first if k == 0 else '':>{TIME_WIDTH}}" + "".join(f"{cell:>{CELL_WIDTH}}" for cell in row)
+            for k, row in enumerate(rows)
+        ]

@@ -59,9 +59,14 @@ def test_every_sample_is_in_the_file_with_the_force_that_compensate_gives(
     force_n = filter_.apply(recording["left_heel"].values)
     np.testing.assert_allclose(written["left_heel_force_estimate"].values, force_n, rtol=1e-12, atol=1e-9)
     lines = capsys.readouterr().out.splitlines()
-    seconds = [line for line in lines if " s  left_toe" in line]
+    seconds = [line for line in lines if " s " in line]
     assert len(seconds) == 6  # 0 to 5 s
-    assert all("left_heel" in line and " N" in line and line.endswith("lost 0") for line in seconds)
+    assert all(len(line) <= 80 and line.count(" to ") == 4 for line in seconds)
+    # The second line is of the samples after the first block up to a second later: its least and most, not its last.
+    heel = [line.split(" s ")[1].split("  ")[-1] for line in seconds]
+    assert max(float(cell.split(" to ")[1]) for cell in heel) == pytest.approx(
+        force_n[recording.time_s <= recording.time_s[0] + 5.1].max(), abs=0.06
+    )
 
 
 def test_lost_samples_do_not_shift_the_force_in_time(

@@ -1,0 +1,47 @@
+"""How much a command says beside its result: ``--quiet``, ``--verbose``, progress."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from smartshoe.cli import run_command
+from smartshoe.cli.output import progress, talk
+
+ROWS = "\n".join(f"{0.01 * k:.2f},{k},{k},good" for k in range(20))
+
+
+@pytest.mark.parametrize(("flag", "says"), [("", True), ("--quiet", False), ("--verbose", True)])
+def test_quiet_leaves_out_notes_wherever_it_stands(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], flag: str, says: bool
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"Time (s),Load (N),P (mbar),remark\n{ROWS}\n", encoding="utf-8")
+    assert run_command([word for word in (flag, "convert", str(path), str(tmp_path / "out.csv")) if word]) == 0
+    assert ("note: " in capsys.readouterr().err) is says
+    assert talk.get() == "usual"
+
+
+def test_warnings_stay_with_quiet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "negated.csv"
+    rows = "\n".join(f"{0.01 * k:.2f},{-k},{k}" for k in range(20))
+    path.write_text(f"time_s,force_n,pressure_mbar\n{rows}\n", encoding="utf-8")
+    assert run_command(["convert", str(path), str(tmp_path / "out.csv"), "--quiet"]) == 0
+    assert "compression is positive here" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("level", "lines"), [("quiet", 0), ("usual", 0), ("verbose", 2)])
+def test_steps_are_lines_with_verbose_and_nothing_in_a_pipe_without(
+    capsys: pytest.CaptureFixture[str], level: str, lines: int
+) -> None:
+    before = talk.set(level)  # type: ignore[arg-type]
+    try:
+        with progress(2) as step:
+            step("one")
+            step("two")
+    finally:
+        talk.reset(before)
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == lines
+    assert all(line.endswith(word) for line, word in zip(told, ("one", "two"), strict=False))
