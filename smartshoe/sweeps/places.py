@@ -5,27 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from smartshoe.errors import DeviceError, UsageError
-from smartshoe.sweeps.case import computed
 from smartshoe.sweeps.folder import SweepFolder
-from smartshoe.sweeps.plan import Case
 
-Done = Callable[[], None]
-Compute = Callable[[Case], str]
+Compute = Callable[[Any], str]  # from a case to its text
 
 ANSWER_S = 10.0  # within which a scheduler, and then a worker of it, must answer
 AHEAD = "4*n_jobs"  # cases handed out ahead of the workers
+
+
+class Named(Protocol):
+    """A case: whatever computes it, and its ``name``."""
+
+    @property
+    def name(self) -> str:
+        """The name that the case's content gives it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
     """A case, and the sweep's folder, which takes it where this process can write there."""
 
-    case: Case
+    case: Named
     folder: SweepFolder
-    compute: Compute = computed
+    compute: Compute
 
     def __call__(self) -> tuple[str, str | None]:
         """The case's name, and its text where somebody else has to write it.

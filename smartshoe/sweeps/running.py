@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smartshoe.atomic import replacing
-from smartshoe.errors import DeviceError, UsageError
-from smartshoe.sweeps import places
+from smartshoe.errors import UsageError
 from smartshoe.sweeps.case import computed
 from smartshoe.sweeps.folder import SweepFolder, write_results
-from smartshoe.sweeps.places import Compute, Task, WorkerLostError
+from smartshoe.sweeps.places import Compute
 from smartshoe.sweeps.plan import SweepPlan, read_plan
+from smartshoe.sweeps.queue import Progress, compute_all, place_of, shard_of
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Progress = Callable[[int, int], None]
-
-LOST_WITHOUT_PROGRESS = 5  # workers killed in a row, with no case done between, before the sweep gives up
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,79 +109,17 @@ def sweep_plan(
     compute: Compute = computed,
 ) -> SweepResult:
     """`sweep` of a plan that was read already; ``compute`` turns a case into its JSON text."""
-    part, parts = shard
-    if not 1 <= part <= parts:
-        raise UsageError(f"shard {part}/{parts} is none: give K/N with K from 1 to N")
+    mine = shard_of(len(plan), shard)
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}: give 1 or more")
     folder = SweepFolder(out)
     folder.claim(plan)
-    mine = range(part - 1, len(plan), parts)
-    count = _compute_all(plan, folder, mine, _place(jobs, scheduler, len(mine)), progress, compute)
+    count = compute_all(plan, folder, mine, place_of(jobs, scheduler, len(mine)), compute, progress)
     done = folder.done()
     missing = sum(name not in done for name in set(plan.names()))
     if missing:
         return SweepResult(plan, out, len(plan), count, missing, None, None, None)
     return _concluded(plan, folder, count)
-
-
-Place = Callable[[Iterator[Task]], Iterator[tuple[str, str | None]]]
-
-
-def _place(jobs: int | None, scheduler: str | None, cases: int) -> Place:
-    if scheduler is not None:
-        return lambda tasks: places.on_a_cluster(tasks, scheduler)
-    if jobs is None:
-        from joblib import cpu_count
-
-        jobs = int(cpu_count())
-    wanted = min(jobs, cases)
-    if wanted <= 1:
-        return places.in_this_process
-    return lambda tasks: places.in_processes(tasks, wanted)
-
-
-def _compute_all(
-    plan: SweepPlan, folder: SweepFolder, mine: Sequence[int], place: Place, progress: Progress | None, compute: Compute
-) -> int:
-    """Compute what is not there; how many that were."""
-    to_do = _to_do(plan, folder, mine)
-    there = SweepFolder(folder.path.resolve())  # for workers in another folder
-    whole = len(to_do)
-    counted = lost = 0
-    while to_do:
-        before = counted
-        try:
-            for name, text in place(Task(plan.case(number), there, compute) for number in to_do):
-                if text is not None:
-                    folder.put(name, text)
-                counted += 1
-                if progress is not None:
-                    progress(counted, whole)
-        except WorkerLostError as error:
-            lost = lost + 1 if counted == before else 1
-            if lost >= LOST_WITHOUT_PROGRESS:
-                raise DeviceError(
-                    f"{error}, {lost} times in a row; {len(to_do)} cases are left, the first is"
-                    f" {plan.name(to_do[0])}: the same command goes on where this one stopped"
-                ) from error
-            to_do = _to_do(plan, folder, mine)
-            counted = whole - len(to_do)
-        else:
-            break
-    return counted
-
-
-def _to_do(plan: SweepPlan, folder: SweepFolder, mine: Sequence[int]) -> list[int]:
-    """The first of each kind of equal cases that is not done."""
-    seen = folder.done()
-    found: list[int] = []
-    for number in mine:
-        name = plan.name(number)
-        if name not in seen:
-            seen.add(name)
-            found.append(number)
-    return found
 
 
 def _concluded(plan: SweepPlan, folder: SweepFolder, count: int) -> SweepResult:

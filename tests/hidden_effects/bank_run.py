@@ -5,9 +5,11 @@
     python tests/hidden_effects/bank_run.py --world measured --measured ../shared/data/sensors --rows measured.jsonl
     python tests/hidden_effects/bank_run.py worlds:0-81 --laws 0,1           laws to develop on; 2 is left out
     python tests/hidden_effects/bank_run.py --again rows.jsonl --by law      judge earlier answers anew
+    python tests/hidden_effects/bank_run.py single:0-5000 two:0-5000 --queue FOLDER --shard 3/100
 
 The first index is included, the last is not. A run that was interrupted goes on where it stopped: rows that are in
-the file are not run again.
+the file are not run again. With --queue the cases lie in a folder, one file each, as those of `smartshoe sweep`: it
+takes any number of workers and of job arrays (--shard K/N), and any number of kills.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from typing import Any
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
+from bank_queue import rows_over  # noqa: E402
 from bank_tables import report  # noqa: E402  threads are set before numpy comes
 from bank_worlds import THERE, WORLDS, Job, run  # noqa: E402
 
@@ -80,6 +83,22 @@ def run_all(jobs: list[Job], workers: int, path: Path | None) -> Iterator[dict[s
         yield row
 
 
+def _over_the_queue(jobs: list[Job], given: argparse.Namespace) -> list[dict[str, Any]]:
+    part, _, parts = given.shard.partition("/")
+    if not (part.isdecimal() and parts.isdecimal()):
+        raise SystemExit(f"--shard {given.shard} is none: give K/N")
+
+    def tell(done: int, to_do: int) -> None:
+        print(f"\r{done} of {to_do}", end="", file=sys.stderr, flush=True)
+
+    shard = int(part), int(parts)
+    rows = list(rows_over(jobs, given.queue, given.workers, shard, tell))
+    print(f"\n{len(rows)} of {len(jobs)} cases are there", file=sys.stderr)
+    if given.rows:
+        given.rows.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    return rows
+
+
 def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -92,6 +111,8 @@ def main() -> None:
     parser.add_argument("--laws", help="of `worlds`: which of the three laws to run, such as 0,1")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--rows", type=Path, help="append every row here, and go on from what is there")
+    parser.add_argument("--queue", type=Path, help="a folder that takes the cases, and goes on from there")
+    parser.add_argument("--shard", default="1/1", metavar="K/N", help="with --queue: only the K-th of N parts")
     parser.add_argument("--again", type=Path, nargs="+", help="judge these rows instead of running anything")
     parser.add_argument("--by", choices=("effect", "law", "condition"), default="effect")
     given = parser.parse_args()
@@ -110,6 +131,9 @@ def main() -> None:
         jobs = jobs_of(given.ranges, given.world, folder, laws)
     if not jobs:
         parser.error("give a range such as single:0-40, or --again")
+    if given.queue:
+        report(_over_the_queue(jobs, given), given.by)
+        return
     rows = []
     for row in run_all(jobs, given.workers, given.rows):
         rows.append(row)
