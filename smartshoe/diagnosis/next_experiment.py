@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smartshoe.diagnosis.excitation import Excitation
 from smartshoe.diagnosis.experiments import EXPERIMENTS
 from smartshoe.diagnosis.inference import Inference
 from smartshoe.diagnosis.likelihood import Fit, fit
 from smartshoe.diagnosis.result import Cause, NextExperiment
 from smartshoe.diagnosis.session import Session
-from smartshoe.diagnosis.traits import Traits
 from smartshoe.models.effects import Conditions, effect, told_apart_by
 from smartshoe.protocol import Protocol
 
@@ -35,7 +35,7 @@ CHANNELS = {
 
 
 def next_experiment(
-    found: Inference, causes: Sequence[Cause], sessions: Sequence[Session], traits: Traits, *, open_: bool
+    found: Inference, causes: Sequence[Cause], sessions: Sequence[Session], excitation: Excitation, *, open_: bool
 ) -> NextExperiment | None:
     """For the most doubtful cause: the protocol with the largest expected margin, or the channel to log.
 
@@ -43,7 +43,7 @@ def next_experiment(
     """
     doubtful = [cause for cause in causes if cause.equivalents and cause.name in found.fit.model.names]
     if not doubtful:
-        return _unseen(found, causes, traits) if open_ or any(c.equivalents for c in causes) else None
+        return _unseen(found, causes, excitation) if open_ or any(c.equivalents for c in causes) else None
     cause = max(doubtful, key=lambda one: one.size)
     rival = cause.equivalents[0]
     other = _in_place_of(found, cause.name, rival)
@@ -84,12 +84,12 @@ def _in_place_of(found: Inference, name: str, rival: str) -> Fit:
     return fit(found.likelihood, found.fit.model.without(name).with_part(added, values))
 
 
-def _unseen(found: Inference, causes: Sequence[Cause], traits: Traits) -> NextExperiment:
+def _unseen(found: Inference, causes: Sequence[Cause], excitation: Excitation) -> NextExperiment:
     """The first protocol that holds what this data lacks; the same again where it lacks nothing."""
     peak_n = found.fit.model.full_scale_load_n
     names = tuple(cause.name for cause in causes)
     for word, protocol in SHOWN_BY.items():
-        if word not in traits.present:
+        if word not in excitation.present:
             says = f"run {protocol.replace('_', ' ')}: this data holds no {word.replace('_', ' ')}, where kinds differ"
             return NextExperiment(names, protocol, None, says, None, EXPERIMENTS[protocol](peak_n))
     says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"

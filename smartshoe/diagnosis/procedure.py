@@ -13,19 +13,19 @@ from smartshoe.diagnosis.aligned import aligned
 from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis.decay import decay_of
+from smartshoe.diagnosis.excitation import Excitation, excitation_of
 from smartshoe.diagnosis.held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis.inference import Inference, Progress, infer
 from smartshoe.diagnosis.integrity import Integrity, examine
-from smartshoe.diagnosis.leftover import Leftover, leftover_of
 from smartshoe.diagnosis.naming import Name, names_of
 from smartshoe.diagnosis.next_experiment import next_experiment
 from smartshoe.diagnosis.noise_kinds import noise_kinds
 from smartshoe.diagnosis.parameters import joint_parameters, parameters_of
 from smartshoe.diagnosis.ranges import ranges_of
-from smartshoe.diagnosis.result import Cause, Diagnosis, Rival, Standing, Statement, Trace, Verdict
+from smartshoe.diagnosis.residual_structure import ResidualStructure, residual_structure
+from smartshoe.diagnosis.result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
 from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale, prepare, thinning
 from smartshoe.diagnosis.thresholds import Thresholds
-from smartshoe.diagnosis.traits import Traits, traits_of
 from smartshoe.diagnosis.zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.errors import UsageError
 from smartshoe.logs.accepted import RecordingLike, recordings_of
@@ -130,7 +130,7 @@ class _Prepared:
     scale: Scale
     limits: list[str]
     start: ExtendedModel
-    traits: Traits
+    excitation: Excitation
     is_no_unit: bool
 
 
@@ -142,12 +142,12 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     start = baseline_of(sessions, scale)
     for added, values in clocks.parts:
         start = start.with_part(added, values)
-    traits, ranges = traits_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
+    excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in clocks.recordings[:count]]
-    limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *traits.limits()]
+    limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    return _Prepared(sessions, fine, scale, limits, start, traits, is_no_unit)
+    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit)
 
 
 @on_one_thread
@@ -159,8 +159,8 @@ def _diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     extended = found.fit.model
-    before = leftover_of(sessions, [residual_of(one, found.baseline.model) for one in sessions])
-    after = leftover_of(sessions, [residual_of(one, extended) for one in sessions])
+    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions])
+    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions])
     left = after.rms if after.significant else 0.0
     everything = max(left, after.size)
     silent = given.is_no_unit or not found.can_validate
@@ -191,13 +191,15 @@ def _diagnosed(
         causes=tuple(causes),
         minor=tuple(part.name for part in extended.parts if part.name not in named),
         data_faults=(*integrity.faults, *noise),
-        baseline=_standing(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
-        extended=_standing(best, force, after, scale),
+        baseline=_goodness(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
+        extended=_goodness(best, force, after, scale),
         gain=gain(baseline, best, scale),
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
-        next_experiment=next_experiment(found, causes, sessions, given.traits, open_=bool(left > thresholds.material)),
+        next_experiment=next_experiment(
+            found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
+        ),
         limits=(*given.limits, *_refused_members(found)),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
@@ -221,7 +223,9 @@ def _is_within_a_sample(
     return abs(float(values[0])) < thresholds.timing_resolution * step_s
 
 
-def _verdict(causes: Sequence[Cause], before: Leftover, after: Leftover, thresholds: Thresholds) -> Verdict:
+def _verdict(
+    causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure, thresholds: Thresholds
+) -> Verdict:
     left = after.rms if after.significant else 0.0
     if causes:
         wrong = before.rms if before.significant else 0.0
@@ -231,7 +235,12 @@ def _verdict(causes: Sequence[Cause], before: Leftover, after: Leftover, thresho
 
 
 def _sentence(
-    verdict: Verdict, causes: Sequence[Cause], baseline: Errors, best: Errors, after: Leftover, thresholds: Thresholds
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    baseline: Errors,
+    best: Errors,
+    after: ResidualStructure,
+    thresholds: Thresholds,
 ) -> str:
     names = [cause.name.replace("_", " ") for cause in causes]
     named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
@@ -292,7 +301,7 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
                 "kind", 1.0, 1.0, "the kind is sure, the law is not: no equation of it follows better than others"
             )
         )
-    lacking = name.effect.exposed_by - given.traits.present
+    lacking = name.effect.exposed_by - given.excitation.present
     if lacking:
         said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
         evidence.append(
@@ -357,9 +366,9 @@ def _with_offset(
     return model
 
 
-def _standing(found: Errors, force_n: float, left: Leftover, scale: Scale) -> Standing:
+def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit:
     span = abs(scale.reading)
-    return Standing(
+    return GoodnessOfFit(
         found.rmse * span,
         scale.unit.symbol,
         found.fit_percent,

@@ -93,7 +93,7 @@ class Cause:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class GoodnessOfFit:
     """How a model does on held-out data; ``structure_rms`` is what its residual holds beside noise (reading's unit)."""
 
     rmse: float
@@ -170,8 +170,8 @@ class Diagnosis(Summarised):
     causes: tuple[Cause, ...] = ()
     minor: tuple[str, ...] = ()
     data_faults: tuple[DataFault, ...] = ()
-    baseline: Standing | None = None
-    extended: Standing | None = None
+    baseline: GoodnessOfFit | None = None
+    extended: GoodnessOfFit | None = None
     gain: Gain | None = None
     explainable_percent: float = 0.0
     explained_percent: float = 0.0

@@ -12,15 +12,15 @@ from scipy.signal import lfilter
 from smartshoe import Recording, dynamic_protocol
 from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.denoise import noise_sd
+from smartshoe.diagnosis.excitation import excitation_of
 from smartshoe.diagnosis.experiments import EXPERIMENTS
 from smartshoe.diagnosis.held_out import errors, gain, residual_of
+from smartshoe.diagnosis.lack_of_fit import repeating, slow
 from smartshoe.diagnosis.likelihood import Likelihood, fit
 from smartshoe.diagnosis.next_experiment import expected_margin
 from smartshoe.diagnosis.noise import correlated_sd
-from smartshoe.diagnosis.remainder import repeating, slow
 from smartshoe.diagnosis.session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
 from smartshoe.diagnosis.thresholds import Thresholds
-from smartshoe.diagnosis.traits import traits_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -205,11 +205,11 @@ def test_a_gains_interval_holds_the_gain_and_shrinks_to_nothing_for_nothing() ->
 
 def test_one_rate_is_said_to_say_nothing_of_rates() -> None:
     sessions, _ = sessions_of(recording(rates=(200, 200)))
-    said = " ".join(traits_of(sessions).limits())
+    said = " ".join(excitation_of(sessions).limits())
     assert "one loading rate only" in said
     several, _ = sessions_of(recording())
-    assert "one loading rate only" not in " ".join(traits_of(several).limits())
-    assert {"rates", "rests", "repeats"} <= traits_of(several).present
+    assert "one loading rate only" not in " ".join(excitation_of(several).limits())
+    assert {"rates", "rests", "repeats"} <= excitation_of(several).present
 
 
 @pytest.mark.parametrize("name", sorted(EXPERIMENTS))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis.characteristic import characteristic_of
 from smartshoe.diagnosis.decay import decay_of, largest_of_noise
+from smartshoe.diagnosis.excitation import excitation_of
 from smartshoe.diagnosis.session import full_scale, prepare
 from smartshoe.diagnosis.thresholds import Thresholds, described
-from smartshoe.diagnosis.traits import traits_of
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ def _session_traits(load: Array, thresholds: Thresholds) -> frozenset[str]:
     recording = Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=MBAR * load)
     usable = [np.ones(load.size, dtype=bool)]
     scale = full_scale([recording], usable)
-    return traits_of(prepare([recording], usable, None, scale, 1), thresholds).present
+    return excitation_of(prepare([recording], usable, None, scale, 1), thresholds).present
 
 
 def _held_load(hold_s: float, rest_s: float) -> Array:

@@ -19,7 +19,7 @@ from looks import look, unfold
 
 from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.integrity import DataFault
-from smartshoe.diagnosis.result import Cause, Diagnosis, NextExperiment, Rival, Standing, Statement, Trace
+from smartshoe.diagnosis.result import Cause, Diagnosis, GoodnessOfFit, NextExperiment, Rival, Statement, Trace
 from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
@@ -93,9 +93,9 @@ def _traces(parts: tuple[str, ...], found: tuple[str, ...], step_in_gain: float 
     return tuple(traces)
 
 
-def _standing(trace: Trace, simulated: np.ndarray, structure: float) -> Standing:
+def _goodness(trace: Trace, simulated: np.ndarray, structure: float) -> GoodnessOfFit:
     rmse = float(np.sqrt(np.mean((trace.reading - simulated) ** 2)))
-    return Standing(rmse, "mbar", 100 * (1 - rmse / float(np.std(trace.reading))), 12.3 * rmse, structure)
+    return GoodnessOfFit(rmse, "mbar", 100 * (1 - rmse / float(np.std(trace.reading))), 12.3 * rmse, structure)
 
 
 LEAK_CAUSE = Cause(
@@ -154,8 +154,8 @@ def case(name: str) -> Diagnosis:
         causes=causes.get(name, ()),
         minor=("sensor_lag",) if name == "two causes" else (),
         data_faults=FAULTS if name in ("two causes", "partly_explained") else (),
-        baseline=_standing(judged, judged.baseline, 0.0 if name == "adequate" else 0.7),
-        extended=_standing(judged, judged.extended, 0.2 if name == "partly_explained" else 0.0),
+        baseline=_goodness(judged, judged.baseline, 0.0 if name == "adequate" else 0.7),
+        extended=_goodness(judged, judged.extended, 0.2 if name == "partly_explained" else 0.0),
         gain=Gain(0.9, 0.2, "mbar", 77.7, (70.0, 80.0)),
         explainable_percent=3.0 if name == "adequate" else 92.0,
         explained_percent={"adequate": 0.4, "unexplained": 0.0, "partly_explained": 61.0}.get(name, 90.5),

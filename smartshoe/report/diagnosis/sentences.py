@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.integrity import DataFault
-from smartshoe.diagnosis.result import Cause, Diagnosis, Standing
+from smartshoe.diagnosis.result import Cause, Diagnosis, GoodnessOfFit
 from smartshoe.models.effects import catalogue, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
@@ -135,7 +135,7 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
     if before is None or after is None:
         return []
 
-    def of_scale(standing: Standing, value: float) -> str:
+    def of_scale(standing: GoodnessOfFit, value: float) -> str:
         return f"{plain(value)} {standing.unit} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
 
     rows = [

@@ -20,7 +20,7 @@ STANDARD = Thresholds()
 
 
 @dataclass(frozen=True, eq=False)
-class Traits:
+class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles; times of the longest hold and rest.
 
     ``present`` holds the words of `Effect.exposed_by` that apply.
@@ -56,7 +56,7 @@ class Traits:
         return said
 
 
-def traits_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) -> Traits:
+def excitation_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) -> Excitation:
     """What all sessions together hold."""
     rates: list[tuple[float, int]] = []
     peaks: list[float] = []
@@ -116,7 +116,7 @@ def traits_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) ->
     if few_peaks and min(few_peaks) < thresholds.same:
         present.add("low_loads")
     repeats = max(kinds.values(), default=0)
-    return Traits(tuple(few_rates), tuple(few_peaks), hold_s, rest_s, repeats, frozenset(present), thresholds)
+    return Excitation(tuple(few_rates), tuple(few_peaks), hold_s, rest_s, repeats, frozenset(present), thresholds)
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[int]:

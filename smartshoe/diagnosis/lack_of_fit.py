@@ -1,12 +1,12 @@
 """What a model leaves over: how much of it is structure and how much noise, judged without any model of the structure.
 
-Two looks, since an unknown effect shows in either:
+Two tests, since an unknown effect shows in either:
 
 *repeating*: the products of a cycle's residual with its repeats' (cycles of one rate and height). Noise of different
 cycles is independent whatever its colour, so that their mean is the variance of what repeats.
 
 *slow*: means over blocks of a few seconds against what noise of the residual's own fast part would give. A step in
-gain, a wander, a random telegraph repeat with no cycle, but they do not average out within a block either.
+gain, a slow walk, a random telegraph repeat with no cycle, but they do not average out within a block either.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ALIKE = 0.1  # in height and duration
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class LackOfFit:
     """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
 
     ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks.
@@ -42,7 +42,7 @@ class Look:
     pairs: int
 
 
-def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> Look:
+def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> LackOfFit:
     """Structure that repeats from cycle to cycle."""
     products: list[float] = []
     spreads: list[float] = []
@@ -63,10 +63,10 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> Look:
         variance = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
         spreads += [variance] * upper[0].size
     if not products:
-        return Look(0.0, 0.0, 0)
+        return LackOfFit(0.0, 0.0, 0)
     mean = float(np.mean(products))
     sd = float(np.sqrt(np.sum(spreads))) / len(spreads)
-    return Look(float(np.sqrt(max(share * mean, 0.0))), mean / max(sd, 1e-300), len(products))
+    return LackOfFit(float(np.sqrt(max(share * mean, 0.0))), mean / max(sd, 1e-300), len(products))
 
 
 def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[list[Array], float]:
@@ -107,7 +107,7 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[li
     return rows, inside_cycles / max(total, 1)
 
 
-def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float) -> Look:
+def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float) -> LackOfFit:
     """Structure in the means of blocks of ``block_s``, beyond what the noise of the faster part would leave there."""
     excess: list[float] = []
     spread = 0.0
@@ -127,9 +127,11 @@ def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float
         # The blocks' own scatter, and that the noise is known from them to some percent only.
         spread += 2.0 * float(expected @ expected) + (NOISE_KNOWN_TO * float(expected.sum())) ** 2
     if not excess:
-        return Look(0.0, 0.0, 0)
+        return LackOfFit(0.0, 0.0, 0)
     mean = float(np.mean(excess))
-    return Look(float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(float(np.sqrt(spread)), 1e-300), len(excess))
+    return LackOfFit(
+        float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(float(np.sqrt(spread)), 1e-300), len(excess)
+    )
 
 
 def _quiet(rows: Array) -> NDArray[np.bool_]:

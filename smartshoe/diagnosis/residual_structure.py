@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.denoise import noise_sd
-from smartshoe.diagnosis.remainder import Look, repeating, slow
+from smartshoe.diagnosis.gauss_markov import GaussMarkov, gauss_markov_of
+from smartshoe.diagnosis.lack_of_fit import LackOfFit, repeating, slow
 from smartshoe.diagnosis.session import Session
-from smartshoe.diagnosis.wander import Wander, wander_of
 
 Array = NDArray[np.float64]
 
@@ -20,27 +20,27 @@ SIGNIFICANT_Z = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Leftover:
-    """``rms`` of the structure in a residual (shares of full scale), by two looks; ``says`` where it is largest.
+class ResidualStructure:
+    """``rms`` of the structure in a residual (shares of full scale), by two tests of lack of fit; ``says`` where it is largest.
 
-    ``wander`` is what its slow part is made of: where that is noise, it is no structure, however slow. ``size`` is all
+    ``memory`` is what its slow part is made of: where that is noise, it is no structure, however slow. ``size`` is all
     that is beyond white noise.
     """
 
-    repeating: Look
-    slow: Look
-    wander: Wander | None
+    repeating: LackOfFit
+    slow: LackOfFit
+    memory: GaussMarkov | None
     says: str
     size: float
 
     @property
     def rms(self) -> float:
-        """The largest of the looks that stand out of the noise."""
+        """The largest of the tests that stand out of the noise."""
         return max(self._found, default=0.0)
 
     @property
     def significant(self) -> bool:
-        """Whether any look stands out of the noise."""
+        """Whether any test stands out of the noise."""
         return bool(self._found)
 
     @property
@@ -51,27 +51,27 @@ class Leftover:
     @property
     def is_noise(self) -> bool:
         """Whether nothing is left but noise, slow or not."""
-        return self.wander is not None and self.wander.is_noise and not self.significant
+        return self.memory is not None and self.memory.is_noise and not self.significant
 
     @property
     def _found(self) -> list[float]:
-        if self.wander is not None and self.wander.is_noise:
+        if self.memory is not None and self.memory.is_noise:
             return [self.repeating.rms] if self.repeating.z > SIGNIFICANT_Z else []
         found = [one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z]
         # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
-        return found if self.wander is None else [*found, min(self.wander.rms, self.size)]
+        return found if self.memory is None else [*found, min(self.memory.rms, self.size)]
 
 
-def leftover_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Leftover:
-    """Both looks at the residuals, and the place of the largest part."""
-    wander = wander_of(sessions, residuals)
+def residual_structure(sessions: Sequence[Session], residuals: Sequence[Array]) -> ResidualStructure:
+    """Both tests of the residuals, and the place of the largest part."""
+    memory = gauss_markov_of(sessions, residuals)
     says = where(sessions, residuals)
-    if wander is not None and wander.switches:
-        says = f"it switches between two levels and stays at each for about {2.0 * wander.tau_s:.2g} s; {says}"
-    return Leftover(
+    if memory is not None and memory.switches:
+        says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
+    return ResidualStructure(
         repeating(sessions, residuals),
         slow(sessions, residuals, BLOCK_S),
-        wander,
+        memory,
         says,
         beyond_noise(sessions, residuals),
     )

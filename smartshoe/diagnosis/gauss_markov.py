@@ -38,7 +38,7 @@ CUT = 9.0  # squares of innovations, in variances: so that one jump is no trend 
 
 
 @dataclass(frozen=True, slots=True)
-class Wander:
+class GaussMarkov:
     """``rms`` of the part with a memory of ``tau_s``, shares of full scale, and what speaks against its being noise.
 
     ``coloured`` (Kolmogorov's statistic of the innovations' spectrum), ``surprises`` (their kurtosis beyond a normal
@@ -81,7 +81,7 @@ class _Blocks:
     step_s: float
 
 
-def wander_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Wander | None:
+def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> GaussMarkov | None:
     """What the slow part of ``residuals``, (n,) a session, is made of; None where there is too little to tell."""
     blocks = [_blocks(session, residual) for session, residual in zip(sessions, residuals, strict=True)]
     blocks = [one for one in blocks if one.good.any()]
@@ -110,7 +110,7 @@ def wander_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> Wander
     follows = max(abs(_correlation(one, size)) for one in drive) * np.sqrt(count)
     level = np.concatenate([one.residual[one.good] for one in blocks])
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
-    return Wander(float(np.sqrt(remembered)), tau_s, coloured, float(kurtosis), float(follows), flatness)
+    return GaussMarkov(float(np.sqrt(remembered)), tau_s, coloured, float(kurtosis), float(follows), flatness)
 
 
 def _blocks(session: Session, residual: Array) -> _Blocks:
