@@ -23,8 +23,8 @@ SIGNIFICANT_Z = 5.0
 class ResidualStructure:
     """``rms`` of the structure in a residual (shares of full scale), by two tests of lack of fit.
 
-    ``says`` where it is largest. ``memory`` is what its slow part is made of: where that is noise, it is no structure, however slow. ``size`` is all
-    that is beyond white noise.
+    ``says`` where it is largest. ``memory`` is what its slow part is made of: where that is noise, it is no structure,
+    however slow. ``size`` is all that is beyond white noise.
     """
 
     repeating: LackOfFit

@@ -45,7 +45,7 @@ class Browser:
 
     def _connected(self) -> ClientConnection:
         port = self._folder / "DevToolsActivePort"
-        for _ in range(600):
+        for _ in range(3600):  # a busy machine takes its time; a browser that is dead is seen by the test's end
             if port.exists() and len(lines := port.read_text().splitlines()) == 2:
                 break
             time.sleep(0.05)
