@@ -54,6 +54,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "min_reported_time": 1e9,  # how long it took says something of the machine that built the site
     "show_memory": False,
+    "image_scrapers": ("matplotlib", "figures"),
     "show_signature": False,
     "remove_config_comments": True,
     "capture_repr": ("_repr_html_", "__repr__"),

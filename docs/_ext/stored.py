@@ -83,18 +83,15 @@ def setup(app: Any) -> dict[str, Any]:
         has_content: ClassVar[bool] = False
 
         def run(self) -> list[Any]:
-            lines = [".. list-table::", "   :header-rows: 1", ""]
-            rows = [("page", "what", "made by", "at", "since then, in what it is about")]
+            lines = ["| page | what | made by | at | since then |", "| --- | --- | --- | --- | --- |"]
             for entry in entries():
                 if digest(entry) != entry["digest"]:
                     logging.getLogger(__name__).warning(
                         "the tables of %s.md are not those stored at %s: run %s, then python docs/_ext/stored.py %s",
                         entry["page"], entry["commit"], entry["command"], entry["page"],
                     )  # fmt: skip
-                rows.append((f":doc:`{entry['page']}`", entry["what"], f"``{entry['command']}``",
-                             f"{entry['commit']}, {entry['date']}", since(entry)))  # fmt: skip
-            for row in rows:
-                lines += [f"   {' ' if k else '*'} - {cell}" for k, cell in enumerate(row)]
+                lines.append(f"| [{entry['page']}]({entry['page']}.md) | {entry['what']} | `{entry['command']}` |"
+                             f" {entry['commit']}, {entry['date']} | {since(entry)} |")  # fmt: skip
             holder = nodes.container()
             self.state.nested_parse(StringList(lines, source=LEDGER.name), self.content_offset, holder)
             return list(holder.children)
