@@ -9,6 +9,7 @@ import numpy as np
 from smartshoe.identification.experiment import Array
 from smartshoe.identification.prediction_error import PredictionError
 from smartshoe.identification.solve import Evaluation, solve_normal
+from smartshoe.models.parameter import NORMAL_95
 
 PERSISTENT_CONDITION = 1e-13
 CURVED = 0.1  # of ln alpha: beyond this sd a straight line no longer describes the interval
@@ -33,7 +34,7 @@ def inverse_normal(normal: Array) -> tuple[Array, bool]:
 def t_quantile(degrees: int) -> float:
     """The 97.5 % quantile of Student's t."""
     if degrees > 1000:  # its expansion in 1/degrees (Abramowitz and Stegun 26.7.5) without the import of scipy.stats
-        z = 1.959963984540054
+        z = NORMAL_95
         return z + (z**3 + z) / (4 * degrees)
     from scipy.special import stdtrit
 

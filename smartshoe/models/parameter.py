@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal law
+
 
 def finite_or_none(value: float) -> float | None:
     """``value`` as a plain float, None where it is not finite (JSON has no NaN)."""
@@ -22,7 +24,7 @@ class Parameter:
     unit: str
 
     @classmethod
-    def from_sd(cls, value: float, sd: float, unit: str, quantile: float = 1.959963984540054) -> Parameter:
+    def from_sd(cls, value: float, sd: float, unit: str, quantile: float = NORMAL_95) -> Parameter:
         """A parameter whose interval is ``value`` plus and minus ``quantile`` standard deviations."""
         return cls(float(value), float(sd), (float(value - quantile * sd), float(value + quantile * sd)), unit)
 

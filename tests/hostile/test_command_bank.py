@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from smartshoe.compensation import Calibration
 from smartshoe.journal import Journal, read_journal
 from smartshoe.protocol import Protocol, Segment
-from smartshoe.session import Plan, SessionFolder
+from smartshoe.session import SessionFolder, SessionPlan
 from smartshoe.units import MILLIBAR
 
 EVERYDAY, BANK = 40, 3500
@@ -57,7 +57,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "S").write_text(SCENARIO)
     (folder / "Y").write_text(STUDY)
     protocol = Protocol("p", (Segment("ramp", 50.0, 1.0),))
-    plan = Plan(shoe="replay:T", machine="log:T", unit="left_toe", protocols=(protocol,), wait_s=0.0)
+    plan = SessionPlan(shoe="replay:T", machine="log:T", unit="left_toe", protocols=(protocol,), wait_s=0.0)
     with SessionFolder.begin(folder / "J", plan) as session:
         channel = {"name": "left_toe", "unit": "mbar", "range": [0, 200], "resolution": 0.1, "rate_hz": 20.0}
         session.note("stream", shoe="x", channels=[channel], information=None)

@@ -13,9 +13,8 @@ from smartshoe.identification.residual_tests import ResidualTest, whiteness
 from smartshoe.identification.transfer_function.discrete import Array, Intersample
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
 from smartshoe.identification.transfer_function.problem import ErrorGradient, OutputError, Structure, orthogonal_factor
-from smartshoe.models import Parameter
+from smartshoe.models.parameter import NORMAL_95, Parameter
 
-QUANTILE = 1.959963984540054
 LEAST_P_VALUE = 1e-3  # of the whiteness test, below which a note says so
 NOISE_FREE = 1e-9  # of the output's spread: a smaller residual is arithmetic
 
@@ -31,12 +30,12 @@ class Root:
     @property
     def ci95_real(self) -> tuple[float, float]:
         """Of the real part."""
-        return self.value.real - QUANTILE * self.sd_real, self.value.real + QUANTILE * self.sd_real
+        return self.value.real - NORMAL_95 * self.sd_real, self.value.real + NORMAL_95 * self.sd_real
 
     @property
     def ci95_imag(self) -> tuple[float, float]:
         """Of the imaginary part; both ends 0 for a real root."""
-        return self.value.imag - QUANTILE * self.sd_imag, self.value.imag + QUANTILE * self.sd_imag
+        return self.value.imag - NORMAL_95 * self.sd_imag, self.value.imag + NORMAL_95 * self.sd_imag
 
 
 @dataclass(frozen=True, eq=False)
