@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,8 +108,9 @@ def under_gain(unit: str) -> list[float]:
     return found
 
 
+@cache
 @on_one_thread
-def least_filtered_rmse(unit: str) -> list[float]:
+def least_filtered_rmse(unit: str) -> tuple[float, ...]:
     """The smallest RMSE(r) in N that the printed filter can give for *any* raw signal with Table 2's RMSE(u).
 
     A least-squares problem with one quadratic constraint: minimise |x - H u|^2 over |x - u| = RMSE(u) sqrt(N),
@@ -139,7 +141,7 @@ def least_filtered_rmse(unit: str) -> list[float]:
         multiplier = brentq(length, low, high) if length(low) > 0 else low
         e = -vectors @ (push / (values + multiplier))
         found.append(float(np.linalg.norm(matrix @ (x + e) - x) / math.sqrt(x.size)))
-    return found
+    return tuple(found)
 
 
 def report() -> list[str]:

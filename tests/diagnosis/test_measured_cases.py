@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -83,6 +84,7 @@ class TestFriction:
     def test_a_trap_is_no_adequate_simulation(self, one_pressure: Diagnosis) -> None:
         assert one_pressure.verdict == "unexplained"
 
+    @pytest.mark.bank
     def test_files_together_show_that_the_gain_within_them_is_another(self, measured: Path) -> None:
         names = ("Circle_1bar", "Circle_3bar", "Circle_7bar")
         found = diagnose([_friction(measured, name, "7[N]", "6[bar]") for name in names])
@@ -92,7 +94,7 @@ class TestFriction:
         assert 1.0 / between == pytest.approx(49.9, rel=0.02)
         assert 1.0 / within > 3.0 / between
 
-    @pytest.mark.parametrize("bar", [1, 7])
+    @pytest.mark.parametrize("bar", [1, pytest.param(7, marks=pytest.mark.bank)])
     def test_displacement_against_force_is_a_loop_that_grows_with_pressure(self, measured: Path, bar: int) -> None:
         found = diagnose(_friction(measured, f"Circle_{bar}bar", "5[N]", "7[N]"))
         assert found.verdict == "unexplained"
@@ -133,7 +135,9 @@ class TestLeak:
 
 
 class TestInsole:
-    @pytest.mark.parametrize("name", ["calibration_dataset", "validation_dataset_3"])
+    @pytest.mark.parametrize(
+        "name", ["calibration_dataset", pytest.param("validation_dataset_3", marks=pytest.mark.bank)]
+    )
     def test_clocks_come_first_and_no_relaxation_is_named(self, measured: Path, name: str) -> None:
         found = diagnose(_insole(measured, name, INSOLE_ROWS_HZ))
         offset_s = float(re.findall(r"reading is ([\d.]+) s late", _fault(found, "two_clocks"))[0])
@@ -247,8 +251,15 @@ def plain_solid_percent(fit: list[Recording], hold: list[Recording]) -> float:
     return 100.0 * (1.0 - float(np.sum((y - a @ gains) ** 2) / np.sum(y**2)))
 
 
+IN_EVERY_RUN = ("microfluidic", "vhb_one_rate")  # a diagnosis takes 5 to 15 s: the others are of the bank
+
+
+def _few(names: Iterable[str]) -> list[object]:
+    return [name if name in IN_EVERY_RUN else pytest.param(name, marks=pytest.mark.bank) for name in names]
+
+
 class TestSensors:
-    @pytest.mark.parametrize("name", KINDS)
+    @pytest.mark.parametrize("name", _few(KINDS))
     def test_the_first_cause_is_of_the_right_kind(self, measured: Path, name: str) -> None:
         found = _sensor(measured, name)
         assert found.causes
@@ -260,14 +271,14 @@ class TestSensors:
         assert not found.causes
         assert "no cause can be told" in _limit(found, "one load cycle")
 
-    @pytest.mark.parametrize("name", SENSORS)
+    @pytest.mark.parametrize("name", _few(SENSORS))
     def test_the_baseline_is_as_good_as_a_plain_standard_linear_solid(self, measured: Path, name: str) -> None:
         fit, hold, column = SENSORS[name]
         plain = plain_solid_percent(_files(measured, fit, column), _files(measured, hold, column))
         standing = _sensor(measured, name).to_dict()["baseline"]
         assert standing["variance_explained_percent"] > plain - 2.0, f"a plain fit explains {plain:.1f} %"
 
-    @pytest.mark.parametrize("name", SENSORS)
+    @pytest.mark.parametrize("name", _few(SENSORS))
     def test_the_extension_is_never_worse_than_the_baseline(self, measured: Path, name: str) -> None:
         found = _sensor(measured, name).to_dict()
         before, after = (found[model]["variance_explained_percent"] for model in ("baseline", "extended"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from presses import press
+from presses import press, pressed
 from scipy import signal
 
 from smartshoe.errors import NotIdentifiableError, UsageError
@@ -49,8 +49,8 @@ def second_relaxation(share: float) -> Recording:
     protocol = dynamic_protocol((100.0, 400.0, 800.0), repeats=3, rest_s=2.0)
     fine = np.arange(0.0, protocol.duration_s, 1e-3)
     load = protocol.load_at(fine)
-    slow = signal.lsim(([1.0, 0.215], [1.6, 0.33]), load, fine)[1]
-    fast = signal.lsim(([share, 0.0], [1.0, 3.0]), load, fine)[1]
+    slow = pressed(([1.0, 0.215], [1.6, 0.33]), load, 1e-3)
+    fast = pressed(([share, 0.0], [1.0, 3.0]), load, 1e-3)
     force_n = load[::10] + 2.23 * np.random.default_rng(3).standard_normal(load[::10].size)
     return Recording.from_arrays(time_s=fine[::10], force_n=force_n, pressure_mbar=(slow + fast)[::10])
 

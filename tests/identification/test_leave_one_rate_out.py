@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from presses import press
-from scipy import signal
+from presses import press, pressed
 
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification.leave_out import leave_one_rate_out
@@ -73,8 +72,8 @@ def two_relaxations(share: float) -> Recording:
     protocol = dynamic_protocol(RATES, repeats=2, rest_s=2.0)
     fine = np.arange(0.0, protocol.duration_s, 1e-3)
     load = protocol.load_at(fine)
-    slow = signal.lsim(([1.0, 0.215], [1.6, 0.33]), load, fine)[1]
-    fast = signal.lsim(([share, 0.0], [1.0, 3.0]), load, fine)[1]
+    slow = pressed(([1.0, 0.215], [1.6, 0.33]), load, 1e-3)
+    fast = pressed(([share, 0.0], [1.0, 3.0]), load, 1e-3)
     force_n = load[::10] + 1.0 * np.random.default_rng(3).standard_normal(load[::10].size)
     return Recording.from_arrays(time_s=fine[::10], force_n=force_n, pressure_mbar=(slow + fast)[::10])
 
