@@ -97,6 +97,11 @@ def _outside(recordings: Sequence[Recording]) -> tuple[str, ...]:
                 " pressed, which bears compression only (turn the sign of the load, or take its mean out, if that is"
                 " what was meant)",
             )
+        if -low > abs(high):
+            return (
+                f"{recording.label}: the load is negative in compression (it runs from {low:.4g} to {high:.4g} N): turn"
+                " its sign, compression is positive",
+            )
     return ()
 
 

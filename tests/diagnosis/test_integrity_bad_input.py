@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis import diagnose
 from smartshoe.diagnosis.integrity import examine
 from smartshoe.recording import Recording
 
@@ -30,7 +31,9 @@ def test_a_load_that_is_negative_in_compression_is_told_as_such() -> None:
     found = examine([_recording(force_n=-LOAD_N, pressure_mbar=READING)])
     assert [fault.kind for fault in found.faults] == ["wrong_sign"]
     assert "the load is negative in compression" in found.faults[0].says
-    assert found.refusals == ()
+    diagnosed = diagnose(_recording(force_n=-LOAD_N, pressure_mbar=READING))
+    assert diagnosed.verdict == "refused"
+    assert "turn its sign" in diagnosed.limits[0]
 
 
 def test_a_pressure_that_falls_under_a_positive_load_is_no_negative_load() -> None:
