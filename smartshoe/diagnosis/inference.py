@@ -175,7 +175,7 @@ def _simpler(first: _State, second: _State, likelihood: Likelihood) -> _State:
     """
     thresholds = first.given.thresholds
     if apart(likelihood.sessions, first.fit.model, second.fit.model) < thresholds.alike * thresholds.material:
-        return min(first, second, key=lambda one: len(one.fit.model.parts))
+        return min(first, second, key=lambda one: (len(one.fit.model.parts), one.total(likelihood)))
     return min(first, second, key=lambda one: one.total(likelihood))
 
 
