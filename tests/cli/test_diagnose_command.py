@@ -15,6 +15,7 @@ import smartshoe
 import smartshoe.diagnosis
 from simulators.hidden import hide
 from smartshoe.cli import run_command
+from smartshoe.loading import rate_range
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
 
 CONTRACT: dict[str, Any] = {
@@ -99,7 +100,7 @@ def test_one_command_writes_page_result_and_calibration(
     assert saved["sources"] == [{"name": str(files[0]), "sha256": sha256}]
     fitted = smartshoe.read(files[0])
     assert saved["load_range_n"] == [fitted.force_n.min(), fitted.force_n.max()]
-    assert saved["rate_range_n_per_s"] == list(smartshoe.identify([fitted]).rate_range_n_per_s)
+    assert saved["rate_range_n_per_s"] == list(rate_range([(fitted.time_s, fitted.force_n)]))
     assert saved["sample_rate_hz"] == round(fitted.sample_rate_hz, 6)
     estimate = tmp_path / "force.csv"
     assert run_command(["compensate", str(files[1]), "--calibration", str(calibration), "--out", str(estimate)]) == 0
