@@ -31,6 +31,6 @@ found.plot()
 print(found.to_frame().head())
 
 left = found.feet["left"]
-figure, axes = plt.subplots(figsize=(7, 3))
+figure, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 axes.plot(left.time_s, left.force_n)
-axes.set(xlabel="time (s)", ylabel="force on the left foot (N)", xlim=(10.0, 15.0))
+_ = axes.set(xlabel="time (s)", ylabel="force on the left foot (N)", xlim=(10.0, 15.0))
