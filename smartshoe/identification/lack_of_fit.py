@@ -21,7 +21,7 @@ LEVEL = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class LackOfFit:
+class LackOfFitTest:
     """``statistic`` F with ``degrees`` (lack of fit, pure error), whole numbers after allowance for autocorrelation.
 
     ``repeatable_percent`` is the share of the residual's variance that repeats from cycle to cycle, of ``n_cycles``.
@@ -48,7 +48,7 @@ class LackOfFit:
 
 def lack_of_fit(
     found: Identification, recordings: RecordingLike | Sequence[RecordingLike], *, skip_first: int = 0
-) -> LackOfFit:
+) -> LackOfFitTest:
     """The F test of a fit's residual over repeated cycles of the ``recordings`` that it was made from, in their order.
 
     ``skip_first`` cycles of each recording are left out. Raises `NotIdentifiableError` where nothing repeats.
@@ -59,7 +59,7 @@ def lack_of_fit(
 
 def lack_of_fit_of(
     residuals: Mapping[str, Array], recordings: Sequence[Recording], *, unknowns: int, skip_first: int = 0
-) -> LackOfFit:
+) -> LackOfFitTest:
     """The same of any model's residuals (n,) by recording, in the recordings' order; NaN where a sample is not counted.
 
     Draper and Smith 1998, *Applied Regression Analysis*, sec. 2.1: the mean square of the repeats' mean, over its
@@ -112,7 +112,7 @@ def lack_of_fit_of(
     else:
         says = f"over {cycles} cycles the residual does not repeat beyond its noise: no lack of fit is seen"
     degrees = (max(round(free[0]), 1), max(round(free[1]), 1))
-    return LackOfFit(float(statistic), p_value, degrees, percent, cycles, says)
+    return LackOfFitTest(float(statistic), p_value, degrees, percent, cycles, says)
 
 
 def _block_means(

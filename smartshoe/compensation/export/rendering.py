@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from smartshoe.compensation.export.model import FilterModel
 
 
-class Named(Protocol):
+class NamedModel(Protocol):
     """What every template says of its model."""
 
     @property
@@ -23,7 +23,7 @@ class Named(Protocol):
         """Key to one line of text."""
 
 
-def render(template: str, model: Named, **values: Any) -> str:
+def render(template: str, model: NamedModel, **values: Any) -> str:
     """The text of ``templates/template`` for ``model``; a value that it lacks is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 

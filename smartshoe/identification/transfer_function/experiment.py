@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class InputOutput:
     """One experiment: ``u`` and ``y`` (n,) with gaps filled, ``counted`` (n,) where both were there.
 
     ``step_s`` is the even step, None where ``time_s`` (n,), which begins at 0, is uneven.
@@ -55,7 +55,7 @@ def as_signals(values: Any, what: str) -> list[Array]:
 
 def prepare(
     u: Any, y: Any, *, sample_time_s: float | None, time_s: Any, hold: Intersample, strict: bool = True
-) -> tuple[list[Excitation], int]:
+) -> tuple[list[InputOutput], int]:
     """The experiments, and how many samples are missing in all.
 
     A missing input is bridged as the hold has it, and neither it nor a missing output counts in the error. Raises
@@ -91,7 +91,7 @@ def prepare(
                 time = np.arange(one_u.size, dtype=float) * step
         y_known = np.isfinite(one_y)
         filled = one_y if y_known.all() else np.interp(time, time[y_known], one_y[y_known])
-        experiments.append(Excitation(time, step, _bridged(one_u, time, hold), filled, present))
+        experiments.append(InputOutput(time, step, _bridged(one_u, time, hold), filled, present))
     if strict:
         _require_excitation(experiments)
     return experiments, missing
@@ -125,7 +125,7 @@ def _bridged(u: Array, time_s: Array, hold: Intersample) -> Array:
     return np.asarray(u[np.where(last < 0, int(np.argmax(known)), last)])
 
 
-def _require_excitation(experiments: Sequence[Excitation]) -> None:
+def _require_excitation(experiments: Sequence[InputOutput]) -> None:
     for what, signals in (
         ("input", [experiment.u for experiment in experiments]),
         ("output", [experiment.y[experiment.counted] for experiment in experiments]),

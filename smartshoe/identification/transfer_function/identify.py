@@ -14,7 +14,7 @@ from smartshoe.identification.solve import minimise
 from smartshoe.identification.transfer_function import delay
 from smartshoe.identification.transfer_function.discrete import Array, Intersample
 from smartshoe.identification.transfer_function.estimate import Ending, TransferFunctionEstimate, summarise
-from smartshoe.identification.transfer_function.experiment import Excitation, prepare
+from smartshoe.identification.transfer_function.experiment import InputOutput, prepare
 from smartshoe.identification.transfer_function.problem import InitialState, OutputError, Structure, Whitened
 from smartshoe.identification.transfer_function.srivc import Settled, least_squares, reflected, srivc
 
@@ -118,7 +118,7 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
 class _StructureFit:
     """One data set and structure, fitted at a known delay or with it."""
 
-    def __init__(self, experiments: Sequence[Excitation], structure: Structure, options: _FitOptions) -> None:
+    def __init__(self, experiments: Sequence[InputOutput], structure: Structure, options: _FitOptions) -> None:
         self.experiments, self.structure, self.options = experiments, structure, options
 
     def problem(self, *, delayed: bool, delay_s: float = 0.0, most_delay_s: float | None = None) -> OutputError:

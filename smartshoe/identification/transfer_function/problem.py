@@ -17,7 +17,7 @@ import numpy as np
 
 from smartshoe.identification.solve import Evaluation
 from smartshoe.identification.transfer_function.discrete import Array, Intersample, StateVariableFilter, Trajectory
-from smartshoe.identification.transfer_function.experiment import Excitation
+from smartshoe.identification.transfer_function.experiment import InputOutput
 
 InitialState = Literal["estimate", "steady", "rest"]
 RANK_TOLERANCE = 1e-11  # of the largest column: an initial state that dies within a step leaves no trace
@@ -82,7 +82,7 @@ class OutputError:
 
     def __init__(
         self,
-        experiments: Sequence[Excitation],
+        experiments: Sequence[InputOutput],
         structure: Structure,
         *,
         delayed: bool,
@@ -105,13 +105,13 @@ class OutputError:
         """How many shared parameters."""
         return self.zeros + 1 + self.poles + self.delayed
 
-    def _first(self, experiment: Excitation) -> int:
+    def _first(self, experiment: InputOutput) -> int:
         if self.initial_state != "estimate" or self.most_delay_s <= 0.0:
             return 0
         latest = max(experiment.time_s.size - 1, 0)
         return min(int(np.searchsorted(experiment.time_s, self.most_delay_s * (1.0 - 1e-9))), latest)
 
-    def _drive(self, experiment: Excitation) -> tuple[Array, Array, int]:
+    def _drive(self, experiment: InputOutput) -> tuple[Array, Array, int]:
         """Input, its times and how many samples were put before: at rest the input was 0 before it began."""
         u, knots = experiment.u, experiment.time_s
         if self.initial_state != "rest":
