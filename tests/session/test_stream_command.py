@@ -164,8 +164,10 @@ def test_ctrl_c_ends_a_live_stream_cleanly(how: signal.Signals, tmp_path: Path) 
         os.kill(running.pid, how)
         said, errors = running.communicate(timeout=20)
     assert running.returncode == 0, errors
-    # On a busy machine the stream may pause before it is stopped, and says so.
-    assert [line for line in errors.splitlines() if not line.startswith("note: no valid frame")] == ["stopped"]
+    # Before it come rows of what streams, a second each, and on a busy machine a note that the stream paused.
+    assert errors.splitlines()[-1] == "stopped"
+    assert "error" not in errors
+    assert "Traceback" not in errors
     written = read(out)
     assert f"{out}: {len(written)} samples" in said
     np.testing.assert_allclose(np.diff(written.time_s), 0.005, atol=1e-6)
