@@ -53,8 +53,10 @@ def without_noise(load: Array, step_s: float, sd: float) -> tuple[Array, float]:
 
 
 def _line(signal: Array, first: int, last: int) -> tuple[Array, Array, float]:
-    """Least squares line through the neighbours ``first`` to ``last`` of each sample: its value there (n,), residual
-    variance (n,), infinite where neighbours lack, and the value's share of the noise's variance.
+    """Least squares line through the neighbours ``first`` to ``last`` of each sample.
+
+    Its value there (n,), residual variance (n,), infinite where neighbours lack, and the value's share of the noise's
+    variance.
     """
     k = np.arange(first, last + 1, dtype=float)
     n = k.size

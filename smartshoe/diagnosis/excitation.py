@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,65 +60,65 @@ class Excitation:
 
 def excitation_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) -> Excitation:
     """What all sessions together hold."""
-    rates: list[tuple[float, int]] = []
-    peaks: list[float] = []
-    hold_s = rest_s = 0.0
-    pauses: list[float] = []
-    minor = False
-    kinds: dict[tuple[int, int], int] = {}
+    rises = [rise for session in sessions for rise in _rises(session, thresholds)]
     alike = float(np.log1p(thresholds.same))
-    for session in sessions:
-        load, step_s = session.conditions.load, session.conditions.step_s
-        span = min(1.0, max(float(np.ptp(load)), 1e-9))
-        lowest = float(load.min())
-        points = turning_points(load, CYCLE_SHARE * span)
-        for first, last in pairwise(points):
-            rise = float(load[last] - load[first])
-            if abs(rise) < 3.0 * CYCLE_SHARE * span:
-                continue
-            part = (load[first : last + 1] - load[first]) / rise
-            begin, end = int(np.argmax(part >= 0.25)), int(np.argmax(part >= 0.75))
-            if (end - begin) * thresholds.same < 1.0 and session.thinned == 1:
-                continue  # a sample more or less makes another rate of it
-            rate = 0.5 * rise / max((end - begin) * step_s, 0.5 * step_s)
-            if rise > 0:
-                rates.append((rate, end - begin))
-                peaks.append(float(load[last]))
-                kind = (round(np.log(rate) / alike), round(np.log(peaks[-1]) / alike))
-                kinds[kind] = kinds.get(kind, 0) + 1
-                if load[first] > lowest + thresholds.clear * CYCLE_SHARE * span:
-                    minor = True
-        flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
-        hold_s = max(hold_s, _longest(flat & ~session.resting & (load > CYCLE_SHARE)) * step_s)
-        lengths = _runs(session.resting)
-        rest_s = max([rest_s, *(n * step_s for n in lengths)])
-        pauses += [n * step_s for n in lengths[1:-1]]
-    present = set()
-    few_rates, few_peaks = _distinct_rates(rates, thresholds.same), _distinct(peaks, thresholds.same)
-    if len(few_rates) > 1:
-        present.add("rates")
-    if len(few_peaks) > 1:
-        present.add("peaks")
-    if any(rate * thresholds.echo_s > thresholds.same for rate, _ in rates):
-        present.add("steps")
-    if hold_s >= thresholds.hold_s:
-        present.add("holds")
+    kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rises)
+    hold_s = max(
+        (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
+    )
+    rests_s = [[n * session.conditions.step_s for n in _runs(session.resting)] for session in sessions]
+    rates = _distinct_rates([(rise.rate, rise.samples) for rise in rises], thresholds.same)
+    peaks = _distinct([rise.peak for rise in rises], thresholds.same)
+    rest_s = max((rest for own in rests_s for rest in own), default=0.0)
+    pauses = [rest for own in rests_s for rest in own[1:-1]]
     # A reading has come to its zero when any sensor's lag is over.
     settled_s = thresholds.clear * thresholds.sensor_lag_s
-    if rest_s >= settled_s:
-        present.add("rests")
-    if rest_s >= thresholds.idle_s:
-        present.add("idle")
-    if pauses and max(pauses) > thresholds.clear * max(min(pauses), settled_s):
-        present.add("pauses")
-    if kinds and max(kinds.values()) >= 2:
-        present.add("repeats")
-    if minor:
-        present.add("minor_loops")
-    if few_peaks and min(few_peaks) < thresholds.same:
-        present.add("low_loads")
     repeats = max(kinds.values(), default=0)
-    return Excitation(tuple(few_rates), tuple(few_peaks), hold_s, rest_s, repeats, frozenset(present), thresholds)
+    found = {
+        "rates": len(rates) > 1,
+        "peaks": len(peaks) > 1,
+        "steps": any(rise.rate * thresholds.echo_s > thresholds.same for rise in rises),
+        "holds": hold_s >= thresholds.hold_s,
+        "rests": rest_s >= settled_s,
+        "idle": rest_s >= thresholds.idle_s,
+        "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), settled_s),
+        "repeats": repeats > 1,
+        "minor_loops": any(rise.is_minor for rise in rises),
+        "low_loads": bool(peaks) and min(peaks) < thresholds.same,
+    }
+    present = frozenset(word for word, is_there in found.items() if is_there)
+    return Excitation(tuple(rates), tuple(peaks), hold_s, rest_s, repeats, present, thresholds)
+
+
+class _Rise(NamedTuple):
+    """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at."""
+
+    rate: float
+    samples: int
+    peak: float
+    is_minor: bool
+
+
+def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
+    load, step_s = session.conditions.load, session.conditions.step_s
+    span = min(1.0, max(float(np.ptp(load)), 1e-9))
+    for first, last in pairwise(turning_points(load, CYCLE_SHARE * span)):
+        rise = float(load[last] - load[first])
+        if rise < 3.0 * CYCLE_SHARE * span or load[last] <= 0.0:
+            continue
+        part = (load[first : last + 1] - load[first]) / rise
+        samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
+        if samples * thresholds.same < 1.0 and session.thinned == 1:
+            continue  # a sample more or less makes another rate of it
+        rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
+        above = float(load[first]) - float(load.min()) > thresholds.clear * CYCLE_SHARE * span
+        yield _Rise(rate, samples, float(load[last]), above)
+
+
+def _held(session: Session, thresholds: Thresholds) -> NDArray[np.bool_]:
+    """(n,) True where a load is borne and does not move."""
+    flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
+    return np.asarray(flat & ~session.resting & (session.conditions.load > CYCLE_SHARE))
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[int]:

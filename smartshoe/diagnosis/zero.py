@@ -27,8 +27,10 @@ MOST_REST_S = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Zero:
-    """``value`` of the effect's one parameter (share of full scale) with its standard deviation; ``size`` it moves the
-    reading by; ``alternatives`` that this data cannot tell from it."""
+    """``value`` of the effect's one parameter (share of full scale) with its standard deviation.
+
+    ``size`` it moves the reading by; ``alternatives`` that this data cannot tell from it.
+    """
 
     effect: Effect
     value: float

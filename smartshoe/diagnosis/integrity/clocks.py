@@ -206,8 +206,11 @@ def _correlation(load: Array, reading: Array, most: int) -> Array:
 
 
 def _lines(places: Array, lags: Array, weights: Array) -> list[tuple[float, float]]:
-    """Offset and rate to try: with four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), where
-    it halves the scatter; then the constant."""
+    """Offset and rate to try.
+
+    With four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), where it halves the scatter; then
+    the constant.
+    """
     found = []
     if places.size >= 4:
         i, j = np.triu_indices(places.size, 1)

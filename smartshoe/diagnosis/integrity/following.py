@@ -1,4 +1,4 @@
-"""Does the reading follow the load at all, and in the right direction?"""
+"""Whether the reading follows the load at all, and in the right direction."""
 
 from __future__ import annotations
 

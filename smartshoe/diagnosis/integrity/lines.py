@@ -123,9 +123,9 @@ def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[
 
 
 def _lasts(whole: float, own: Array, weight: Array, noise_power: Array) -> bool:
-    """Whether one phase and one power hold in all parts: a ringing begins anew with each move of the load, larger
-    or smaller, and dies.
+    """Whether one phase and one power hold in all parts.
 
+    A ringing begins anew with each move of the load, larger or smaller, and dies.
     ``whole`` amplitude over all parts, ``own`` (p,) and ``weight`` (p,) of each, first and second half of a stretch in
     turn; ``noise_power`` (p,) of what noise beside the line adds to its square.
     """
