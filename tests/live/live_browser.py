@@ -20,6 +20,10 @@ from websockets.sync.client import ClientConnection, connect
 PROGRAM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
+class PageGoneError(Exception):
+    """The page that a call was about has been left."""
+
+
 class Browser:
     """One tab of ``width`` by ``height``; ``errors`` are what its scripts and its console complained of."""
 
@@ -68,6 +72,8 @@ class Browser:
             elif answer.get("method") == "Log.entryAdded" and answer["params"]["entry"]["level"] == "error":
                 self.errors.append(answer["params"]["entry"]["text"])
             if answer.get("id") == self._number:
+                if "navigated" in str(answer.get("error", "")) or "context" in str(answer.get("error", "")):
+                    raise PageGoneError(answer["error"]["message"])
                 assert "error" not in answer, answer
                 return answer["result"]
 
@@ -88,9 +94,15 @@ class Browser:
     def until(self, script: str, seconds: float = 30.0) -> None:
         """Wait until an expression in the page is true."""
         end_s = time.monotonic() + seconds
-        while not self.run(f"Boolean({script})"):
+        while not self._holds(script):
             assert time.monotonic() < end_s, f"{script} did not come to be"
             time.sleep(0.05)
+
+    def _holds(self, script: str) -> bool:
+        try:
+            return bool(self.run(f"Boolean({script})"))
+        except PageGoneError:  # it is being loaded anew
+            return False
 
     def key(self, key: str) -> None:
         """Press and release a key."""
