@@ -74,7 +74,11 @@ def friction_of(recording: Recording, thresholds: Thresholds = STANDARD) -> str 
     found = branches_of(recording, thresholds)
     if found is None or found.by_curve >= thresholds.follows or found.by_branch < thresholds.follows:
         return None
-    sensor = recording.sensor
+    return _friction(found)
+
+
+def _friction(found: Branches) -> str:
+    sensor = found.recording.sensor
     half = 0.5 * float(np.median(found.ups - found.downs))
     return (
         f"the {sensor.name} does not follow this load but its direction: while the load rises it lies"
@@ -90,7 +94,7 @@ def characteristic_of(recording: Recording, thresholds: Thresholds = STANDARD) -
     if found is None or max(found.by_curve, found.by_branch) < thresholds.follows:
         return None
     if found.by_curve < thresholds.follows:
-        return friction_of(recording, thresholds)
+        return _friction(found)
     sensor, place = recording.sensor, found.place
     half_span = 0.5 * float(place[-1] - place[0])
     u = (place - 0.5 * (place[0] + place[-1])) / half_span

@@ -78,7 +78,7 @@ class Evidence:
         self.gram = self._products(self._rows, self._rows)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
-        raw = given.gram().whole
+        raw = given.gram.whole
         inverse = np.linalg.pinv(raw[own, own], rcond=1e-10, hermitian=True)
         self._absorbed = inverse @ raw[own]
         visible = raw - raw[:, own] @ self._absorbed
@@ -247,7 +247,7 @@ class Evidence:
         """Inner products of each fold."""
         given = self.given
         if len(given.sessions) > 1:
-            return list(given.gram().sessions)
+            return list(given.gram.sessions)
         session = given.sessions[0]
         return [
             marginal(

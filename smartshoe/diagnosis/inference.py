@@ -55,8 +55,7 @@ class Member:
     ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
     ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
     ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
-    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood. ``validated``: by how many
-    standard errors the error over recordings that are left out grows without it.
+    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
     """
 
     effect: Effect
@@ -66,7 +65,6 @@ class Member:
     without: Fit
     laws: tuple[Alternative, ...]
     fall: float
-    validated: float = 0.0
 
     @property
     def name(self) -> str:
@@ -321,16 +319,21 @@ def _worse(evidence: Evidence, best: Posterior) -> int | None:
     Each recording in turn (each block of a single one) is predicted from the others, with and without the member; its
     gain over them must lie above zero by most of a standard error.
     """
-    gains = {member: _validated(evidence, best, member) for member in best.members}
+    whole = evidence.left_out_errors(best.members)
+    gains = {
+        member: _in_standard_errors(evidence.left_out_errors(tuple(m for m in best.members if m != member)) - whole)
+        for member in best.members
+    }
     worst = min(gains, key=lambda member: gains[member], default=None)
     return worst if worst is not None and gains[worst] < evidence.thresholds.validated else None
 
 
 def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
     """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide."""
+    whole = [model.simulate(one.conditions) for one in sessions]
     for part in model.parts:
         less = model.without(part.name)
-        by = [model.simulate(one.conditions) - less.simulate(one.conditions) for one in sessions]
+        by = [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
         within = _spread(by, [one.fitted for one in sessions])
         if _spread(by, [one.judged for one in sessions]) > thresholds.extrapolates * max(within, thresholds.material):
             return part.name
@@ -343,10 +346,8 @@ def _spread(signals: Sequence[Array], seen: Sequence[NDArray[np.bool_]]) -> floa
     return math.sqrt(sum(float(one @ one) for one in parts) / max(sum(one.size for one in parts), 1))
 
 
-def _validated(evidence: Evidence, best: Posterior, member: int) -> float:
-    """Standard errors by which the mean error of what is left out grows without a member."""
-    less = evidence.left_out_errors(tuple(m for m in best.members if m != member))
-    gains = less - evidence.left_out_errors(best.members)
+def _in_standard_errors(gains: Array) -> float:
+    """The mean of ``gains`` (n,) over its standard error."""
     error = float(np.std(gains, ddof=1)) / math.sqrt(gains.size) if gains.size > 1 else 0.0
     return float(gains.mean()) / max(error, 1e-300)
 
@@ -361,8 +362,7 @@ def _members(
         size = apart(likelihood.sessions, less.model, extended.model)
         others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
         near = alternatives(evidence, best, member, refused)
-        sure = _validated(evidence, best, member)
-        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost, sure))
+        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
     return tuple(sorted(made, key=lambda one: -one.size))
 
 

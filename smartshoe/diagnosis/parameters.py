@@ -6,9 +6,7 @@ import numpy as np
 
 from smartshoe.diagnosis.likelihood import Fit
 from smartshoe.diagnosis.session import Scale
-from smartshoe.models.parameter import Parameter
-
-NORMAL_95 = 1.959963984540054
+from smartshoe.models.parameter import NORMAL_95, Parameter
 
 
 def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,13 +130,14 @@ class Linearised:
         """Candidates (their numbers) of an effect."""
         return tuple(k for k, one in enumerate(self.candidates) if one.name == name)
 
+    @cached_property
     def gram(self) -> Gram:
         """Inner products with flat nuisances."""
         return Gram(tuple(marginal(rows, one, self.model) for rows, one in zip(self.rows, self.sessions, strict=True)))
 
     def noise_sd(self) -> float:
         """Standard deviation of what no column reaches, noise or structure, each correlation time counted once."""
-        whole = self.gram().whole
+        whole = self.gram.whole
         part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
         found = np.linalg.solve(part, whole[1:, 0])
         left = []
