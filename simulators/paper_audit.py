@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from simulators.paper import AMBIENT_PA, DIAMETER_M, GAS_CONSTANT, MOLES, PEAK_N, TABLE_1, TABLE_2, TEMPERATURE_K
-from smartshoe.blas import on_one_thread
+from smartshoe.kernels.blas import on_one_thread
 
 Array = NDArray[np.float64]
 RATE_HZ = 100.0

@@ -14,8 +14,8 @@ from smartshoe.recording import REGIONS
 if TYPE_CHECKING:
     import numpy as np
 
-    from simulators.instron import SimulatedInstron
-    from simulators.shoe import SimulatedShoe
+    from simulators.benches.instron import SimulatedInstron
+    from simulators.benches.shoe import SimulatedShoe
 
 MACHINES = ("instron",)
 SHOES = ("walk", "stand", "run", "tiptoe")
@@ -30,19 +30,20 @@ class Provider:
     ) -> SimulatedInstron:
         """A machine (closed, to be used in a with block) for ``target`` 'instron'.
 
-        ``options`` are `simulators.options.MachineOptions`; what they leave out comes from the preset of their
+        ``options`` are `simulators.benches.options.MachineOptions`; what they leave out comes from the preset of their
         ``unit`` (default left_toe). ``bladder = {twin = "unit.json"}`` presses the unit's own calibration instead
-        (`simulators.twin`). Raises `pydantic.ValidationError` on wrong options, `UsageError` on a wrong target,
-        `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
+        (`simulators.instruments.twin`). Raises `pydantic.ValidationError` on wrong options, `UsageError` on a wrong
+        target, `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
         """
         _require(target, MACHINES, "machine")
         import numpy as np
 
-        from simulators.bladder import SimulatedBladder
-        from simulators.instron import SimulatedInstron
-        from simulators.options import MachineOptions, TwinMachineOptions, is_twin, with_preset
-        from simulators.sensing_unit import SensingUnit
-        from simulators.sensor import SimulatedHdiSensor
+        from simulators.benches.instron import SimulatedInstron
+        from simulators.benches.options import MachineOptions, TwinMachineOptions
+        from simulators.instruments.options import is_twin, with_preset
+        from simulators.instruments.sensing_unit import SensingUnit
+        from simulators.instruments.sensor import SimulatedHdiSensor
+        from simulators.plant.bladder import SimulatedBladder
 
         given = {"unit": DEFAULT_UNIT, **(options or {})}
         kind = TwinMachineOptions if is_twin(given) else MachineOptions
@@ -53,7 +54,7 @@ class Provider:
         sensor = SimulatedHdiSensor(checked.sensor.parameters(), rng)
         bladder: Any
         if isinstance(checked, TwinMachineOptions):
-            from simulators.twin import twin_of
+            from simulators.instruments.twin import twin_of
 
             bladder = twin_of(checked.bladder.twin)
         else:
@@ -66,16 +67,17 @@ class Provider:
     ) -> SimulatedShoe:
         """A shoe (closed, to be used in a with block) for ``target`` 'walk', 'stand', 'run' or 'tiptoe'.
 
-        ``options`` are `simulators.options.ShoeOptions`; raises as `open_machine` does.
+        ``options`` are `simulators.benches.options.ShoeOptions`; raises as `open_machine` does.
         """
         _require(target, SHOES, "shoe")
         import numpy as np
 
-        from simulators.bladder import SimulatedBladder
-        from simulators.options import ShoeOptions, with_preset
-        from simulators.sensing_unit import SensingUnit
-        from simulators.sensor import SimulatedHdiSensor
-        from simulators.shoe import SimulatedShoe
+        from simulators.benches.options import ShoeOptions
+        from simulators.benches.shoe import SimulatedShoe
+        from simulators.instruments.options import with_preset
+        from simulators.instruments.sensing_unit import SensingUnit
+        from simulators.instruments.sensor import SimulatedHdiSensor
+        from simulators.plant.bladder import SimulatedBladder
 
         given = dict(options or {})
         side = given.get("side", "left")
@@ -103,7 +105,7 @@ class Provider:
     def options_schema(self, kind: str) -> dict[str, Any]:
         """JSON schema of the options of ``kind`` 'machine' or 'shoe'."""
         _require(kind, ("machine", "shoe"), "kind of device")
-        from simulators.options import MachineOptions, ShoeOptions
+        from simulators.benches.options import MachineOptions, ShoeOptions
 
         return (MachineOptions if kind == "machine" else ShoeOptions).model_json_schema()
 

@@ -16,8 +16,8 @@ _HOME = {
     "Protocol": "smartshoe.protocol",
     "static_protocol": "smartshoe.protocol",
     "dynamic_protocol": "smartshoe.protocol",
-    "read": "smartshoe.logs",
-    "write": "smartshoe.logs",
+    "read": "smartshoe.files.logs",
+    "write": "smartshoe.files.logs",
     "open_shoe": "smartshoe.devices",
     "open_machine": "smartshoe.devices",
     "identify": "smartshoe.identification",
@@ -28,27 +28,30 @@ _HOME = {
     "RecursiveIdentification": "smartshoe.identification.recursive",
     "lack_of_fit": "smartshoe.identification.lack_of_fit",
     "leave_one_rate_out": "smartshoe.identification.leave_out",
-    "Calibration": "smartshoe.compensation",
-    "CalibrationStore": "smartshoe.store",
-    "Compensator": "smartshoe.compensation",
-    "compensate": "smartshoe.compensation",
-    "stack": "smartshoe.compensation",
-    "validate": "smartshoe.validation",
-    "Validation": "smartshoe.validation",
+    "Calibration": "smartshoe.calibration",
+    "CalibrationStore": "smartshoe.calibration.store",
+    "Compensator": "smartshoe.calibration",
+    "compensate": "smartshoe.calibration",
+    "stack": "smartshoe.calibration",
+    "validate": "smartshoe.calibration.validation",
+    "Validation": "smartshoe.calibration.validation",
     "GaitResult": "smartshoe.gait.result",
     "diagnose": "smartshoe.diagnosis",
     "Diagnosis": "smartshoe.diagnosis",
     "ExtendedModel": "smartshoe.models.extended",
-    "sweep": "smartshoe.sweeps",
-    "study": "smartshoe.studies",
+    "sweep": "smartshoe.runs.sweeps",
+    "study": "smartshoe.runs.studies",
     "SmartShoeError": "smartshoe.errors",
 }
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration, Compensator, compensate, stack
+    from smartshoe.calibration import Calibration, Compensator, compensate, stack
+    from smartshoe.calibration.store import CalibrationStore
+    from smartshoe.calibration.validation import Validation, validate
     from smartshoe.devices import open_machine, open_shoe
     from smartshoe.diagnosis import Diagnosis, diagnose
     from smartshoe.errors import SmartShoeError
+    from smartshoe.files.logs import read, write
     from smartshoe.gait.result import GaitResult
     from smartshoe.identification import Identification, identify
     from smartshoe.identification.lack_of_fit import lack_of_fit
@@ -59,14 +62,11 @@ if TYPE_CHECKING:
         identify_transfer_function,
         select_order,
     )
-    from smartshoe.logs import read, write
     from smartshoe.models.extended import ExtendedModel
     from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
     from smartshoe.recording import Channel, Recording
-    from smartshoe.store import CalibrationStore
-    from smartshoe.studies import study
-    from smartshoe.sweeps import sweep
-    from smartshoe.validation import Validation, validate
+    from smartshoe.runs.studies import study
+    from smartshoe.runs.sweeps import sweep
 
 __all__ = [
     "Calibration",

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import LimitError
-from smartshoe.gate import limits
+from smartshoe.files.gate import limits
 
 Array = NDArray[np.float64]
 

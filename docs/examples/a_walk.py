@@ -9,7 +9,7 @@ your own is read by ``smartshoe.read`` as before, and forces come from the calib
 import matplotlib.pyplot as plt
 import numpy as np
 
-from simulators.gait import Person, Walk, trial
+from simulators.people import Person, Walk, trial
 from smartshoe.gait import Coverage, analyse
 
 made = trial(Person(), Walk(1.3), 30.0, np.random.default_rng(1), sensors=False, noise_n=1.0)

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from simulators.bounds import STRICT_KEYS
+from simulators.effects.bounds import STRICT_KEYS
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from simulators.bounds import STRICT_KEYS
+from simulators.effects.bounds import STRICT_KEYS
 
 Array = NDArray[np.float64]
 

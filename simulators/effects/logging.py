@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from simulators.bounds import STRICT_KEYS, Finite, NotNegative, Positive, Share
+from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive, Share
 
 Array = NDArray[np.float64]
 

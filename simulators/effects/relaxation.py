@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from simulators.bounds import STRICT_KEYS, NotNegative, Positive
+from simulators.effects.bounds import STRICT_KEYS, NotNegative, Positive
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from simulators.bounds import STRICT_KEYS, Finite, NotNegative, Positive
+from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import click
 
 from smartshoe.cli.output import Talk, talk
 from smartshoe.errors import SmartShoeError
-from smartshoe.gate.limits import raise_limits
+from smartshoe.files.gate.limits import raise_limits
 
 _COMMANDS = {
     "run": "run a scenario: devices, identification, compensation, validation",

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from smartshoe.devices.base import Block
-    from smartshoe.session import SessionFolder, SessionPlan
-    from smartshoe.session.checks import PressingFault
+    from smartshoe.runs.session import SessionFolder, SessionPlan
+    from smartshoe.runs.session.checks import PressingFault
 
 
 @click.command(
@@ -55,7 +55,7 @@ def command(
 
     warm_up.begin()
     from smartshoe.cli.output import emit_json, note, progress
-    from smartshoe.session import analyse, conduct, publish
+    from smartshoe.runs.session import analyse, conduct, publish
 
     if replay is not None:
         folder = _replayed(replay, resume, options)
@@ -110,7 +110,7 @@ def _require_own_store(folder: SessionFolder, store: str | None) -> None:
 
 
 def _replayed(replay: str, resume: str | None, options: dict[str, Any]) -> SessionFolder:
-    from smartshoe.session import SessionFolder
+    from smartshoe.runs.session import SessionFolder
 
     given = [name for name in ("shoe", "machine", "unit", "protocols") if options[name]]
     if resume is not None or given:
@@ -119,8 +119,8 @@ def _replayed(replay: str, resume: str | None, options: dict[str, Any]) -> Sessi
 
 
 def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) -> SessionFolder:
-    from smartshoe.atomic import make_folder
-    from smartshoe.session import SessionFolder
+    from smartshoe.files.atomic import make_folder
+    from smartshoe.runs.session import SessionFolder
 
     if resume is None:
         for name in ("shoe", "machine", "unit"):
@@ -142,7 +142,7 @@ def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) 
 def _plan(options: dict[str, Any]) -> SessionPlan:
     import datetime
 
-    from smartshoe.session import SessionPlan, protocols_named
+    from smartshoe.runs.session import SessionPlan, protocols_named
     from smartshoe.version import __version__
 
     if options["store"] is not None and not options["serial_number"]:

@@ -11,8 +11,8 @@ import click
 from smartshoe.cli.output import figures_option
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
-    from smartshoe.store import CalibrationStore
+    from smartshoe.calibration import Calibration
+    from smartshoe.calibration.store import CalibrationStore
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -33,7 +33,7 @@ def _date_option(says: str) -> Callable[[_F], _F]:
 
 
 def _opened(folder: str | None) -> CalibrationStore:
-    from smartshoe.store import CalibrationStore
+    from smartshoe.calibration.store import CalibrationStore
 
     return CalibrationStore(folder)
 
@@ -65,9 +65,9 @@ def command() -> None:
 @_json_option
 def list_command(unit: str | None, date: str | None, store_folder: str | None, json_path: str | None) -> None:
     """Units, their calibrations, where they sit, what has expired."""
+    from smartshoe.calibration.store.dates import days_between, iso, moment
     from smartshoe.cli.output import emit_json
     from smartshoe.report.tables import new_console, table_of
-    from smartshoe.store.dates import days_between, iso, moment
 
     store, at = _opened(store_folder), moment(date or _today(), "--date")
     entries, events = store.entries(), store.events()
@@ -134,10 +134,10 @@ def show_command(
     json_path: str | None,
 ) -> None:
     """One calibration: its parameters, its file, whether it holds."""
+    from smartshoe.calibration.store.quantities import quantities
     from smartshoe.cli.output import emit_json
     from smartshoe.report.numbers import with_sd
     from smartshoe.report.tables import new_console, table_of
-    from smartshoe.store.quantities import quantities
 
     store = _opened(store_folder)
     name, says, found = _one(store, calibration, date, refuse_expired)
@@ -173,8 +173,8 @@ def compare_command(
     first: str, second: str, rates: tuple[float, ...], store_folder: str | None, json_path: str | None
 ) -> None:
     """Two calibrations: what differs, by how many sd, and how many newtons it means."""
+    from smartshoe.calibration.store.compare import RATES_N_PER_S, compare
     from smartshoe.cli.output import emit_json
-    from smartshoe.store.compare import RATES_N_PER_S, compare
 
     store = _opened(store_folder)
     (one, _, ours), (other, _, theirs) = (_one(store, name, None, False) for name in (first, second))
@@ -196,8 +196,8 @@ def drift_command(
     unit: str, out_folder: str | None, store_folder: str | None, json_path: str | None, figures: str | None
 ) -> None:
     """How a unit's parameters move over its life: trend, repairs, jumps."""
+    from smartshoe.calibration.store.drift import drift
     from smartshoe.cli.output import emit_json
-    from smartshoe.store.drift import drift
 
     store = _opened(store_folder)
     found = drift(store, _serial(store, unit, _today()))
@@ -234,8 +234,8 @@ def add_command(
     json_path: str | None,
 ) -> None:
     """Take calibrations (files that identify or diagnose wrote) into the store."""
+    from smartshoe.calibration import Calibration
     from smartshoe.cli.output import emit_json
-    from smartshoe.compensation import Calibration
     from smartshoe.errors import UsageError
 
     if len(files) > 1 and (serial_number or position):
@@ -309,10 +309,10 @@ def _serial(store: CalibrationStore, unit: str, date: str) -> str:
 
 def _one(store: CalibrationStore, said: str, date: str | None, refuse_expired: bool) -> tuple[str, str, Calibration]:
     """A calibration by its name, its unit or its file: what to call it, what to say of it, itself."""
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
+    from smartshoe.calibration.store import find
+    from smartshoe.calibration.store.dates import moment
     from smartshoe.errors import RefusedError, UsageError
-    from smartshoe.store import find
-    from smartshoe.store.dates import moment
 
     if said.endswith(".json") and Path(said).is_file():
         return said, f"file {said}", Calibration.load(said)

@@ -9,8 +9,8 @@ import click
 from smartshoe.cli.ranges import FiniteRange
 
 if TYPE_CHECKING:
-    from smartshoe.field import CheckResult
-    from smartshoe.field.examination import Examination
+    from smartshoe.gait.field import CheckResult
+    from smartshoe.gait.field.examination import Examination
 
 
 @click.command(
@@ -49,7 +49,7 @@ def command(
     from smartshoe.cli.inputs import load_calibrations, read_all
     from smartshoe.cli.output import emit_json
     from smartshoe.errors import RefusedError
-    from smartshoe.field.examination import examine_trial
+    from smartshoe.gait.field.examination import examine_trial
 
     calibrations = load_calibrations(calibration_paths)
     recordings = read_all(files, time=time, force=None, sensors=(), unit=None)

@@ -25,9 +25,9 @@ def command(
     unit: str | None,
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
+    from smartshoe.calibration import Calibration, compensated
     from smartshoe.cli.output import note
-    from smartshoe.compensation import Calibration, compensated
-    from smartshoe.logs import write
+    from smartshoe.files.logs import write
 
     calibration = Calibration.load(calibration_path)
     (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)

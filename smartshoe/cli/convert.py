@@ -26,8 +26,8 @@ def command(
     source: str, target: str, time: str | None, force: str | None, sensors: tuple[str, ...], unit: str | None
 ) -> None:
     """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
-    from smartshoe.logs import write
-    from smartshoe.logs.picks import listed
+    from smartshoe.files.logs import write
+    from smartshoe.files.logs.picks import listed
 
     (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)
     if Path(target).suffix.casefold() in PLAIN:

@@ -65,10 +65,10 @@ def command(
     **columns: Any,
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
-    from smartshoe.atomic import make_folder
     from smartshoe.cli.output import emit_json, note, progress
     from smartshoe.diagnosis import diagnose
     from smartshoe.errors import NotIdentifiableError, UsageError
+    from smartshoe.files.atomic import make_folder
 
     if design_path is not None:
         if files or held_out:
@@ -115,7 +115,7 @@ def _design(path: str, json_path: str | None) -> None:
     from smartshoe.cli.output import emit_json
     from smartshoe.diagnosis.design import design
     from smartshoe.report.diagnosis.terminal import print_design
-    from smartshoe.scenario import load, protocols_of
+    from smartshoe.runs.scenario import load, protocols_of
 
     found = design(tuple(protocols_of(*load(path)).values()))
     if not emit_json(found.to_dict(), json_path):
@@ -147,7 +147,7 @@ def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, st
 def _save_calibration(path: str, found: Diagnosis, recordings: list[Recording], unit: str | None) -> None:
     import datetime
 
-    from smartshoe.compensation.provenance import calibrated_on
+    from smartshoe.calibration.provenance import calibrated_on
 
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     calibration = found.calibration(unit=unit or recordings[0].unit or "", created=today)

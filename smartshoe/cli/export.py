@@ -32,8 +32,8 @@ def command(
     force: bool,
 ) -> None:
     """Write the compensators of calibrations (files, or folders of them) for firmware or other tools."""
+    from smartshoe.calibration.export import export_shoe, export_twins, write_files
     from smartshoe.cli.inputs import load_calibrations
-    from smartshoe.compensation.export import export_shoe, export_twins, write_files
 
     calibrations = load_calibrations(calibration_paths)
     if twin and target != "fmu":

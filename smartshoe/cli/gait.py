@@ -76,13 +76,13 @@ def command(
     sensors: tuple[str, ...],
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
-    from smartshoe.atomic import make_folder
     from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
     from smartshoe.cli.inputs import say_what_strikes, units_of, with_units
     from smartshoe.cli.output import emit_json, note, progress, show_notes
+    from smartshoe.files.atomic import make_folder
+    from smartshoe.files.logs import read
     from smartshoe.gait.analysis import analyse
     from smartshoe.gait.coverage import Coverage
-    from smartshoe.logs import read
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")

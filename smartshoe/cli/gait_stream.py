@@ -12,7 +12,7 @@ import click
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
     from smartshoe.gait.coverage import Coverage
 
 LARGE_BYTES = 64 << 20  # some forty minutes of two shoes; whole in memory they take about a gigabyte
@@ -22,7 +22,7 @@ def is_streamed(files: Sequence[str], chosen: bool | None) -> bool:
     """Whether the trial in ``files`` goes through as a stream: as ``chosen``, else where they are large."""
     if chosen is not None:
         return chosen
-    from smartshoe.logs import detect
+    from smartshoe.files.logs import detect
 
     large = [path for file in files if (path := Path(file)).is_file() and path.stat().st_size > LARGE_BYTES]
     return any(detect(path).name == "plain" for path in large)
@@ -48,13 +48,13 @@ def gait_of_stream(
     folder: Path | None,
 ) -> None:
     """Analyse ``files`` in bounded memory and say what was found."""
-    from smartshoe.atomic import json_text, write_text
     from smartshoe.cli.output import emit_json, progress
+    from smartshoe.files.atomic import json_text, write_text
+    from smartshoe.files.logs.blocks import read_blocks
     from smartshoe.gait.day import analyse_stream
     from smartshoe.gait.day_tables import tables
     from smartshoe.gait.result import Event
     from smartshoe.gait.strides import Stride
-    from smartshoe.logs.blocks import read_blocks
 
     written: dict[str, Path] = {}
     with progress() as step, ExitStack() as stack:

@@ -11,7 +11,7 @@ import click
 from smartshoe.recording import UNITS_OF_A_SHOE, Recording
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
 
 MISSING_SHARE = 0.05  # of a signal's samples, from which on a person is told
 BEYOND = 1.1  # of the largest load that a calibration has seen
@@ -52,7 +52,7 @@ def read_all(
     from smartshoe.cli.output import show_notes
     from smartshoe.devices.joining import join_pairs
     from smartshoe.errors import MissingChannelError
-    from smartshoe.logs import read
+    from smartshoe.files.logs import read
 
     def one(file: str) -> Recording:
         try:
@@ -74,7 +74,7 @@ def read_all(
 
 def say_what_strikes(recordings: Sequence[Recording]) -> None:
     """A warning on stderr for each load that looks negated, and for each signal that lacks much of its samples."""
-    from smartshoe.logs.columns import is_negative
+    from smartshoe.files.logs.columns import is_negative
 
     for recording in recordings:
         for channel in (*recording.of_role("load"), *recording.sensors):
@@ -110,7 +110,7 @@ def units_of(choices: Sequence[str]) -> dict[str, str]:
 def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
     """The recording with the named columns as the units' readings; raises `MissingChannelError` for one not there."""
     from smartshoe.errors import MissingChannelError
-    from smartshoe.logs.picks import listed
+    from smartshoe.files.logs.picks import listed
 
     for unit, column in columns.items():
         channel = recording.channels.get(column)
@@ -151,8 +151,8 @@ def load_calibrations(paths: Sequence[str]) -> list[Calibration]:
     """
     from pathlib import Path
 
-    from smartshoe.compensation import Calibration
-    from smartshoe.compensation.calibration_folder import load_folder
+    from smartshoe.calibration import Calibration
+    from smartshoe.calibration.folder import load_folder
 
     found: list[Calibration] = []
     for path in paths:

@@ -24,7 +24,7 @@ def emit_json(result: dict[str, Any], path: str | None) -> bool:
     """Write ``result`` to ``path`` (``-``: stdout) where one is given; True where stdout is taken by it."""
     if path is None:
         return False
-    from smartshoe.atomic import json_text, write_text
+    from smartshoe.files.atomic import json_text, write_text
 
     if path == "-":
         click.echo(json_text(result), nl=False)

@@ -32,12 +32,12 @@ def command(
     from smartshoe.kernels import warm_up
 
     warm_up.begin()
-    from smartshoe.atomic import json_text, make_folder
     from smartshoe.cli.output import emit_json, progress
+    from smartshoe.files.atomic import json_text, make_folder
     from smartshoe.report.tables import print_summary
-    from smartshoe.scenario import load, run, steps_of
-    from smartshoe.scenario.keys import parse_assignments
-    from smartshoe.scenario.publish import judged, publish
+    from smartshoe.runs.scenario import load, run, steps_of
+    from smartshoe.runs.scenario.keys import parse_assignments
+    from smartshoe.runs.scenario.publish import judged, publish
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")

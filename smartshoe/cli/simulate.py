@@ -14,10 +14,10 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
 
     Of a simulated trial the true loads are written too, as NAME_truth.csv.
     """
-    from smartshoe.atomic import make_folder
     from smartshoe.cli.output import progress
-    from smartshoe.logs import write
-    from smartshoe.scenario import load, simulate, simulate_trial
+    from smartshoe.files.atomic import make_folder
+    from smartshoe.files.logs import write
+    from smartshoe.runs.scenario import load, simulate, simulate_trial
 
     loaded, source = load(scenario)
     if seed is not None:

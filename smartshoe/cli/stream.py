@@ -17,7 +17,7 @@ from smartshoe.cli.ranges import FiniteRange
 
 if TYPE_CHECKING:
     from smartshoe.devices.base import Shoe
-    from smartshoe.session.streaming import StreamedForces
+    from smartshoe.runs.session.streaming import StreamedForces
 
 
 @click.command("stream", epilog="Example: smartshoe stream --shoe sim:walk --calibration left_heel.json --out walk.csv")
@@ -32,7 +32,7 @@ def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, o
     from smartshoe.cli.inputs import load_calibrations
     from smartshoe.devices import open_shoe
     from smartshoe.errors import UsageError
-    from smartshoe.session.streaming import StreamedForces
+    from smartshoe.runs.session.streaming import StreamedForces
 
     loaded = load_calibrations(calibrations)
     if out is not None and Path(out).exists():
@@ -71,7 +71,7 @@ class _StreamRun:
     """Counts and the table of one call."""
 
     def __init__(self, out: str | None) -> None:
-        from smartshoe.session.streaming import StreamTable
+        from smartshoe.runs.session.streaming import StreamTable
 
         self.is_stopped = self.has_begun = False
         self._out = out
@@ -81,7 +81,7 @@ class _StreamRun:
     def until(self, shoe: Shoe, forces: StreamedForces, duration_s: float | None) -> None:
         """Read until ``duration_s`` of the device's time have passed, or the stream ends."""
         from smartshoe.errors import DeviceError
-        from smartshoe.session.streaming import Seconds, StreamTable
+        from smartshoe.runs.session.streaming import Seconds, StreamTable
 
         start_s, due_s, lost = None, 0.0, 0
         seconds: Seconds | None = None

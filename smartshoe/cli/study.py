@@ -15,12 +15,12 @@ def command(study_file: str, out_folder: str, jobs: int | None, c3d: bool, json_
     """Analyse the trials of STUDY by subject and condition, and compare conditions within subjects."""
     from smartshoe.cli.counting import counting
     from smartshoe.cli.output import emit_json
-    from smartshoe.studies import study
+    from smartshoe.runs.studies import study
 
     with counting("trials") as progress:
         result = study(study_file, out_folder, jobs=jobs, c3d=c3d, progress=progress)
     if emit_json(result.to_dict(), json_path):
         return
-    from smartshoe.studies.terminal import print_study
+    from smartshoe.runs.studies.terminal import print_study
 
     print_study(result)

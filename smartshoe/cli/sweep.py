@@ -32,7 +32,7 @@ def command(
     """Run SCENARIO for each case of its [sweep]: values of keys, and seeds. Each case is computed once."""
     from smartshoe.cli.counting import counting
     from smartshoe.cli.output import emit_json
-    from smartshoe.sweeps import sweep
+    from smartshoe.runs.sweeps import sweep
 
     with counting("cases") as progress:
         result = sweep(scenario, out_folder, jobs=jobs, scheduler=scheduler, shard=shard, progress=progress)
@@ -41,6 +41,6 @@ def command(
     if result.results is None:
         click.echo(f"{result.computed} cases computed; {result.missing} of {result.cases} are other shards' or missing")
         return
-    from smartshoe.sweeps.terminal import print_sweep
+    from smartshoe.runs.sweeps.terminal import print_sweep
 
     print_sweep(result)

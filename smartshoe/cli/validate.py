@@ -25,10 +25,10 @@ def command(
     unit: str | None,
 ) -> None:
     """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
+    from smartshoe.calibration import Calibration
+    from smartshoe.calibration.validation import validate
     from smartshoe.cli.output import emit_json
-    from smartshoe.compensation import Calibration
     from smartshoe.report.tables import print_validation
-    from smartshoe.validation import validate
 
     calibration = Calibration.load(calibration_path)
     recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)

@@ -21,7 +21,7 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit
 
 if TYPE_CHECKING:
-    from smartshoe.wire.clock import DeviceClock
+    from smartshoe.devices.wire.clock import DeviceClock
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.blas import on_one_thread
 from smartshoe.devices.corners import follow_corners
 from smartshoe.devices.following import follow
 from smartshoe.errors import InputError
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Channel, Recording, Role
 
 Array = NDArray[np.float64]

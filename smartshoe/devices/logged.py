@@ -11,7 +11,7 @@ import numpy as np
 from smartshoe.devices.base import ChannelDescription, TestMachine
 from smartshoe.devices.joining import join
 from smartshoe.errors import DeviceError, UsageError
-from smartshoe.logs import read
+from smartshoe.files.logs import read
 from smartshoe.protocol import MachineLimits, Protocol
 from smartshoe.recording import Recording
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from smartshoe.devices.base import Bladder, Block, ChannelDescription, Shoe
 from smartshoe.errors import DeviceError, MissingChannelError, UnitError, UsageError
-from smartshoe.logs import read
+from smartshoe.files.logs import read
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

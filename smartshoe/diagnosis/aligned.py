@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.integrity import Integrity
+from smartshoe.integrity import Integrity
 from smartshoe.models.effects import Effect, effect
 from smartshoe.recording import Recording
 

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.integrity.scales import SECOND_DIFFERENCE
 from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.integrity.scales import SECOND_DIFFERENCE
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

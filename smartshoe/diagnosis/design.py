@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.blas import on_one_thread
 from smartshoe.diagnosis.baseline import USUAL
 from smartshoe.diagnosis.sensitivity import Linearised, linearised
 from smartshoe.diagnosis.session import Scale, prepare, thinning
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.errors import UsageError
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol

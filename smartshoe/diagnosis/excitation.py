@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.diagnosis.thresholds import Thresholds
-from smartshoe.loading import turning_points
-from smartshoe.masks import runs_of
+from smartshoe.signals.loading import turning_points
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 

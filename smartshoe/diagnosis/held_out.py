@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.compensation.extended import ExtendedCompensator
+from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.diagnosis.sensitivity import nuisances
 from smartshoe.diagnosis.session import Scale, Session
 from smartshoe.models.extended import ExtendedModel

@@ -23,10 +23,10 @@ from smartshoe.diagnosis.search import BREADTH, additions, allowed, search, step
 from smartshoe.diagnosis.sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.diagnosis.thresholds import Thresholds
-from smartshoe.loading import turning_points
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.signals.loading import turning_points
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.session import Session
+from smartshoe.integrity import DataFault
 from smartshoe.models.effects import coloured_noise, heteroscedastic_noise, hum, timing_jitter
 from smartshoe.models.extended import ExtendedModel
 

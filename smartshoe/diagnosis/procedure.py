@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.blas import on_one_thread
 from smartshoe.diagnosis.aligned import aligned
 from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.characteristic import characteristic_of, friction_of
@@ -16,7 +15,6 @@ from smartshoe.diagnosis.decay import decay_of
 from smartshoe.diagnosis.excitation import Excitation, excitation_of
 from smartshoe.diagnosis.held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis.inference import Inference, Progress, infer
-from smartshoe.diagnosis.integrity import Integrity, examine
 from smartshoe.diagnosis.naming import Name, names_of
 from smartshoe.diagnosis.next_experiment import next_experiment
 from smartshoe.diagnosis.noise_kinds import noise_kinds
@@ -28,7 +26,9 @@ from smartshoe.diagnosis.session import Scale, Session, at_full_rate, full_scale
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.diagnosis.zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.errors import UsageError
-from smartshoe.logs.accepted import RecordingLike, recordings_of
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of
+from smartshoe.integrity import Integrity, examine
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.held_out import Gain
-from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.thresholds import Thresholds, described
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import NotIdentifiableError
+from smartshoe.integrity import DataFault
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
@@ -22,7 +22,7 @@ from smartshoe.protocol import Protocol
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
 
 Array = NDArray[np.float64]
 Verdict = Literal["adequate", "explained", "partly_explained", "unexplained", "refused"]
@@ -193,7 +193,7 @@ class Diagnosis(Summarised):
 
         Raises `NotIdentifiableError` where the diagnosis was refused.
         """
-        from smartshoe.compensation import extended_calibration
+        from smartshoe.calibration import extended_calibration
 
         if self.model is None:
             raise NotIdentifiableError(f"there is no model to calibrate by: {self.says}")

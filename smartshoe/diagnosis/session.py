@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis.denoise import noise_sd, without_noise
 from smartshoe.diagnosis.jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.loading import turning_points
-from smartshoe.masks import bridged, runs_of
 from smartshoe.models.effects import Conditions
 from smartshoe.recording import Channel, Recording
+from smartshoe.signals.loading import turning_points
+from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
 
 Array = NDArray[np.float64]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import RefusedError, UsageError
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.gait import checks
 from smartshoe.gait.contact import LEAST_LOAD_N, ContactDetector, Contacts
 from smartshoe.gait.course import course_of
@@ -29,10 +30,9 @@ from smartshoe.gait.total import (
     total_of,
 )
 from smartshoe.gait.trial import Foot, feet_of
-from smartshoe.logs.accepted import RecordingLike, recordings_of
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def analyse(
     is estimated where it is not given. ``coverage`` is the share of the load that passes through the units, by which
     forces of feet are divided, or a `Coverage` with its course over a stance. ``reference`` is a trial whose mean
     strides are the pattern that strides are compared with. ``estimator`` is a name of
-    `smartshoe.compensation.estimators` that gives forces with error bars; None is the calibrations' own filter.
+    `smartshoe.calibration.estimators` that gives forces with error bars; None is the calibrations' own filter.
 
     Raises `InputError` and its kin for recordings that are no trial, `UsageError` for arguments out of range,
     `RefusedError` where neither a stance nor a standing load is found.
@@ -61,7 +61,7 @@ def analyse(
     if body_weight_n is not None and not (math.isfinite(body_weight_n) and body_weight_n > 0.0):
         raise UsageError(f"body_weight_n is {body_weight_n:g}: give newtons above 0")
     if estimator is not None:
-        from smartshoe.compensation.estimators import NAMES
+        from smartshoe.calibration.estimators import NAMES
 
         if estimator not in NAMES:
             raise UsageError(f"estimator {estimator!r} is not known: use one of {', '.join(NAMES)}")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.atomic import replacing
 from smartshoe.errors import UsageError
+from smartshoe.files.atomic import replacing
 
 if TYPE_CHECKING:
     from smartshoe.gait.result import GaitResult

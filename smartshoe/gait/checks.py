@@ -13,8 +13,8 @@ from smartshoe.gait.result import FootCourse, Forces
 from smartshoe.gait.strides import LONGEST_GAP_S, Stride
 from smartshoe.gait.total import SETTLED_S, total_of
 from smartshoe.gait.trial import LEAST_RATE_HZ, Foot
-from smartshoe.masks import runs_of
 from smartshoe.recording import REGIONS
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.atomic import write_text
 from smartshoe.errors import InputError, UsageError
+from smartshoe.files.atomic import write_text
 from smartshoe.gait.contact import Contacts
 
 if TYPE_CHECKING:

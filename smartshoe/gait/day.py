@@ -30,7 +30,7 @@ from smartshoe.gait.trial import Foot, feet_of
 from smartshoe.recording import Channel, Recording
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from smartshoe.atomic import replacing
+from smartshoe.files.atomic import replacing
 from smartshoe.gait.result import Event
 from smartshoe.gait.strides import Stride
 

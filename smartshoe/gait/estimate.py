@@ -1,6 +1,6 @@
 """From a unit's reading to its load: the one seam by which forces come into a trial.
 
-Behind `estimate` stands the calibration's own compensator, or an estimator of `smartshoe.compensation.estimators`.
+Behind `estimate` stands the calibration's own compensator, or an estimator of `smartshoe.calibration.estimators`.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import UnitError
-from smartshoe.masks import bridged, runs_of
 from smartshoe.recording import Channel
+from smartshoe.signals.masks import bridged, runs_of
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -56,7 +56,7 @@ def estimate(
 ) -> UnitLoad:
     """The load of unit ``name`` from its ``channel`` (n,) on an even time base of ``rate_hz``.
 
-    A channel in a unit of force is the load already. ``estimator`` is a name of `smartshoe.compensation.estimators`,
+    A channel in a unit of force is the load already. ``estimator`` is a name of `smartshoe.calibration.estimators`,
     None the calibration's own compensator. Raises `UnitError` where the calibration is for another quantity.
     """
     present = channel.present
@@ -74,14 +74,14 @@ def estimate(
             f"{name} is in {channel.unit.symbol}, its calibration is for {calibration.reading_unit.symbol}: give the"
             " calibration of this kind of reading, or the column in its unit"
         )
-    from smartshoe.compensation.estimators.estimate import gain_sd
+    from smartshoe.calibration.estimators.estimate import gain_sd
 
     readings = bridged(at, channel.in_unit(calibration.reading_unit), present)
     sd_n = None
     if estimator is None:
         load_n = calibration.compensator(rate_hz).apply(readings)
     else:
-        from smartshoe.compensation.estimators import estimator as named
+        from smartshoe.calibration.estimators import estimator as named
 
         found = named(estimator, calibration, rate_hz).estimate(readings, missing)
         load_n, sd_n = found.force_n, found.sd_n

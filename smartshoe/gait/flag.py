@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.masks import runs_of
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

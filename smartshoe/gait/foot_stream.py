@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.gait.contact import LEAST_LOAD_N, ContactDetector, Contacts
 from smartshoe.gait.estimate import BEYOND, UnitLoad, calibration_of, on_the_rail
 from smartshoe.gait.trial import Foot

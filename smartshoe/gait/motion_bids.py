@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.errors import UsageError
+from smartshoe.files.atomic import json_text, make_folder, write_text
 from smartshoe.gait.c3d import analog_signals
 
 if TYPE_CHECKING:

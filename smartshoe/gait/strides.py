@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.gait.contact import Contacts
-from smartshoe.masks import runs_of
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -16,7 +16,7 @@ from smartshoe.gait.flag import Flag
 from smartshoe.recording import REGIONS, UNITS_OF_A_SHOE, Channel, Recording
 
 if TYPE_CHECKING:
-    from smartshoe.compensation import Calibration
+    from smartshoe.calibration import Calibration
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,8 +13,8 @@ from smartshoe.identification.identification import Identification
 from smartshoe.identification.parametrisation import GreyBox
 from smartshoe.identification.prediction_error import LARGEST_DELAY_S
 from smartshoe.identification.uncertainty import CURVED, Function, profile_interval, t_quantile
-from smartshoe.loading import rate_range
 from smartshoe.models import X_OVER_NRT, Parameter
+from smartshoe.signals.loading import rate_range
 from smartshoe.units import Unit
 
 WORST_RELATIVE_SD = 1.0  # of the pole; beyond it the interval holds every relaxation time

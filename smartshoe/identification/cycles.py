@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe import loading
 from smartshoe.identification.experiment import Array, Mask
 from smartshoe.recording import Recording
+from smartshoe.signals import loading
 
 SAME_RATE = 0.10  # also of the time from mid-rise to mid-fall, which a hold would change
 SAME_PEAK = 0.05

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import NotIdentifiableError, UsageError
-from smartshoe.masks import bridged
 from smartshoe.models.first_order import Steps, steps
 from smartshoe.recording import Recording
+from smartshoe.signals.masks import bridged
 from smartshoe.units import Unit
 
 Array = NDArray[np.float64]

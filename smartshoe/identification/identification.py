@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smartshoe.compensation import Calibration, Compensator
-from smartshoe.compensation.provenance import sha256_of
+from smartshoe.calibration import Calibration, Compensator
+from smartshoe.calibration.provenance import sha256_of
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification.consistency import ConsistencyTest, consistency_test

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe import loading
 from smartshoe.errors import NotConvergedError, NotIdentifiableError
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.identification.experiment import Array, Experiment, Mask, prepare
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.identifier import identify
-from smartshoe.logs.accepted import RecordingLike, recordings_of
 from smartshoe.models.first_order import lag, shifted
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Channel, Recording
+from smartshoe.signals import loading
 
 MOVED_SD = 5.0
 

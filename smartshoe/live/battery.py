@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from smartshoe.errors import SmartShoeError
-from smartshoe.field.examination import examine
 from smartshoe.gait import analyse
+from smartshoe.gait.field.examination import examine
 from smartshoe.live.session import LiveSession
 from smartshoe.live.shoe import LiveShoe
 from smartshoe.recording import Recording

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from smartshoe.devices.base import Block
 from smartshoe.errors import InputError, SmartShoeError, UsageError
-from smartshoe.journal import AppendedFile, Journal, read_journal
+from smartshoe.files.journal import AppendedFile, Journal, read_journal
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.devices.base import Block, Shoe
 from smartshoe.devices.events import ShoeEvent
 from smartshoe.errors import UsageError

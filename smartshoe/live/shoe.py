@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.devices.base import Block, Shoe
 from smartshoe.devices.events import Dropped, Gap, ShoeEvent
 from smartshoe.gait.contact import LEAST_LOAD_N
@@ -18,7 +18,7 @@ from smartshoe.gait.insole import PLACES, centre_of_pressure
 from smartshoe.live.ring import Ring
 from smartshoe.live.steps import GaitStep, StepFollower
 from smartshoe.recording import REGIONS, Channel, Recording
-from smartshoe.session.streaming import StreamedForces
+from smartshoe.runs.session.streaming import StreamedForces
 
 Array = NDArray[np.float64]
 

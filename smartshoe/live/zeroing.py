@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.field.at_rest import check_zero
+from smartshoe.gait.field.at_rest import check_zero
 from smartshoe.live.shoe import LiveShoe
 
 Array = NDArray[np.float64]

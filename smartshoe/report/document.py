@@ -11,8 +11,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from smartshoe.atomic import write_text
 from smartshoe.errors import InputError
+from smartshoe.files.atomic import write_text
 from smartshoe.report.charts import Chart, script_text
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.wording import sentence, words

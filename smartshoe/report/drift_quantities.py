@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from smartshoe.store.drift import Drift
+from smartshoe.calibration.store.drift import Drift
 
 SHOWN = ("static_gain", "a1", "b0", "b1", "k1", "k2", "zero")
 TITLES = {

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.gait import Person, Run, Walk, trial
-from simulators.gait import measured as feet_of
+from simulators.people import Person, Run, Walk, trial
+from simulators.people import measured as feet_of
 from smartshoe.gait import analyse
 from smartshoe.recording import Recording
 

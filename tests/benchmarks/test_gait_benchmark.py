@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from table import FigureTable
 
-from simulators.gait import Person, Walk, trial
-from smartshoe.compensation import Calibration
+from simulators.people import Person, Walk, trial
+from smartshoe.calibration import Calibration
+from smartshoe.files.logs import write
 from smartshoe.gait import ContactDetector
-from smartshoe.logs import write
 from smartshoe.units import MILLIBAR
 
 pytestmark = pytest.mark.benchmark

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from table import FigureTable
 
-from simulators.gait import Person, Stand, Walk, trial
-from simulators.gait import blocks as trial_blocks
-from smartshoe.compensation import Calibration
+from simulators.people import Person, Stand, Walk, trial
+from simulators.people import blocks as trial_blocks
+from smartshoe.calibration import Calibration
 from smartshoe.gait.day import analyse_stream
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR

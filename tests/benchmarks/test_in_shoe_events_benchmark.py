@@ -9,7 +9,7 @@ import pytest
 from in_shoe_events import OURS, cases, load_peers, page, scores_of
 from table import FigureTable
 
-from smartshoe.atomic import write_text
+from smartshoe.files.atomic import write_text
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.real_data]
 CONTACT_MS, OFF_MS = 2.0, 4.0

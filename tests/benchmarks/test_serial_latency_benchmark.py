@@ -25,9 +25,9 @@ def serve(link: str, pipe: Connection) -> None:
     """The emulator's process: says when its clock began, serves until told to stop."""
     import threading
 
-    from simulators.firmware import Firmware
-    from simulators.pty_line import PtyLine
-    from simulators.serving import Emulator
+    from simulators.wire.firmware import Firmware
+    from simulators.wire.pty_line import PtyLine
+    from simulators.wire.serving import Emulator
 
     with open_shoe("sim:walk", duration_s=10.0) as walking:
         walking_there = walking

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 from table import FigureTable
 
-from smartshoe.compensation import Compensator, stack
+from smartshoe.calibration import Compensator, stack
 
 pytestmark = pytest.mark.benchmark
 UNITS, ROUNDS = 8, 15

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from table import FigureTable
 
-from smartshoe.sweeps.case import computed
-from smartshoe.sweeps.plan import Case, read_plan
-from smartshoe.sweeps.running import sweep_plan
+from smartshoe.runs.sweeps.case import computed
+from smartshoe.runs.sweeps.plan import Case, read_plan
+from smartshoe.runs.sweeps.running import sweep_plan
 
 pytestmark = pytest.mark.benchmark
 SIZES = (2_000, 20_000)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from cobs import cobs
 
-from smartshoe.wire.frames import FrameDecoder, encode_samples
-from smartshoe.wire.lines import LineDecoder, encode_lines
+from smartshoe.devices.wire.frames import FrameDecoder, encode_samples
+from smartshoe.devices.wire.lines import LineDecoder, encode_lines
 
 FRAME = 19
 FRAMES = 300_000

@@ -14,8 +14,8 @@ from smartshoe.recording import REGIONS, Recording
 
 @pytest.fixture
 def walk(tmp_path: Path) -> Path:
-    from simulators.gait import Person, Walk, trial
-    from smartshoe.logs import write
+    from simulators.people import Person, Walk, trial
+    from smartshoe.files.logs import write
 
     made = trial(Person(), Walk(), 30.0, np.random.default_rng(3), sensors=False, first_contact_s=3.0)
     write(made.recording, tmp_path / "walk.csv")

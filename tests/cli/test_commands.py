@@ -195,7 +195,7 @@ def test_recording_of_the_contract_reads_back(tmp_path: Path) -> None:
 
 def test_checks_say_what_repeats_and_what_each_rate_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from smartshoe.devices import open_machine
-    from smartshoe.logs import write
+    from smartshoe.files.logs import write
     from smartshoe.protocol import dynamic_protocol
 
     with open_machine("sim:instron", unit="left_toe", seed=5) as machine:
@@ -225,7 +225,7 @@ def test_wrong_choices_of_the_fit_are_named(
     words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from smartshoe.devices import open_machine
-    from smartshoe.logs import write
+    from smartshoe.files.logs import write
     from smartshoe.protocol import dynamic_protocol
 
     with open_machine("sim:instron", unit="left_toe", seed=5) as machine:

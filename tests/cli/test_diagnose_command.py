@@ -13,10 +13,10 @@ import pytest
 
 import smartshoe
 import smartshoe.diagnosis
-from simulators.hidden import hide
+from simulators.hidden.recordings import hide
 from smartshoe.cli import run_command
-from smartshoe.loading import rate_range
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
+from smartshoe.signals.loading import rate_range
 
 CONTRACT: dict[str, Any] = {
     "schema": None,

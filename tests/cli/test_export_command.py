@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from smartshoe.calibration import Calibration
 from smartshoe.cli import run_command
-from smartshoe.compensation import Calibration
 from smartshoe.units import MILLIBAR
 
 

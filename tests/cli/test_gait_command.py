@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simulators.gait import Person, Run, Stand, Trial, Walk, trial
+from simulators.people import Person, Run, Stand, Trial, Walk, trial
+from smartshoe.calibration import Calibration
 from smartshoe.cli import run_command
-from smartshoe.compensation import Calibration
+from smartshoe.files.logs import write
 from smartshoe.gait import Coverage
-from smartshoe.logs import write
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
@@ -201,8 +201,8 @@ def test_a_fault_is_one_sentence_and_leaves_no_file(
 
 
 def test_a_folder_of_calibrations_serves_with_the_extended_ones_before_the_plain(tmp_path: Path) -> None:
+    from smartshoe.calibration import Calibration
     from smartshoe.cli.inputs import load_calibrations
-    from smartshoe.compensation import Calibration
     from smartshoe.errors import InputError
     from smartshoe.units import MILLIBAR
 

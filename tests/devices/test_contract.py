@@ -13,8 +13,8 @@ from smartshoe.devices.base import Block
 from smartshoe.devices.checks import DeviceContractError, check_machine, check_shoe
 from smartshoe.devices.replay import ReplayedShoe
 from smartshoe.errors import DeviceError, LimitError, UsageError
-from smartshoe.logs import write
-from smartshoe.logs.formats.bluehill import write_bluehill
+from smartshoe.files.logs import write
+from smartshoe.files.logs.formats.bluehill import write_bluehill
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Recording
 
@@ -47,9 +47,9 @@ def shoe(request: pytest.FixtureRequest, tmp_path: Path) -> Shoe:
 @pytest.fixture(params=["frames", "lines"])
 def serial_shoe(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Shoe]:
     """The real backend at an emulated shoe."""
-    from simulators.firmware import Firmware
-    from simulators.pty_line import PtyLine
-    from simulators.serving import Emulator
+    from simulators.wire.firmware import Firmware
+    from simulators.wire.pty_line import PtyLine
+    from simulators.wire.serving import Emulator
 
     with open_shoe("sim:walk", duration_s=5.0) as walking:
         recording = walking.record()

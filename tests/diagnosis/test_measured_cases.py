@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Diagnosis, diagnose
 from smartshoe.diagnosis.decay import Decay, decay_of
-from smartshoe.logs import read
+from smartshoe.files.logs import read
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

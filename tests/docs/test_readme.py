@@ -74,8 +74,8 @@ def test_the_tour_on_a_real_file(tour: Path, measured: Path) -> None:
 
 def test_the_tour_on_a_pair_of_logs(tour: Path) -> None:
     from smartshoe.devices import open_machine
-    from smartshoe.logs import write
-    from smartshoe.logs.formats.bluehill import write_bluehill
+    from smartshoe.files.logs import write
+    from smartshoe.files.logs.formats.bluehill import write_bluehill
     from smartshoe.protocol import dynamic_protocol
 
     with open_machine("sim:instron", unit="left_toe", seed=5) as machine:

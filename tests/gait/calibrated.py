@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import smartshoe
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.devices import open_machine
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import UNITS_OF_A_SHOE, Recording

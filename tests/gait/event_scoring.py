@@ -58,7 +58,7 @@ def score(found_s: Array, true_s: Array, begin_s: float = -np.inf, end_s: float 
 
 
 def scores(found, made, edge_s: float = 1.2):  # type: ignore[no-untyped-def]
-    """Scores by event of a `GaitResult` against a `simulators.gait.Trial`, both feet together.
+    """Scores by event of a `GaitResult` against a `simulators.people.Trial`, both feet together.
 
     A stance cut by the record's end has no heel off that could be told: the last ``edge_s`` count for nothing.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.gait import Trial
+from simulators.people import Trial
 from smartshoe.gait import GaitResult
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from trials import analysed, loads_of, ran, recorded, times_of, walked
 
-from simulators.gait import Person, Stand, trial
-from smartshoe.compensation import Calibration
+from simulators.people import Person, Stand, trial
+from smartshoe.calibration import Calibration
 from smartshoe.errors import InputError, MissingChannelError, RefusedError, UnitError, UsageError
 from smartshoe.gait import GaitResult, analyse
 from smartshoe.units import MILLIBAR

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from event_scoring import Score, scores
 
-from simulators.gait import Person, Run, Walk, trial
+from simulators.people import Person, Run, Walk, trial
 from smartshoe.gait import analyse
 
 SPEEDS_M_PER_S = (0.8, 1.1, 1.4, 1.7, 2.0)

@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from trials import analysed, loads_of, ran, recorded, stood, times_of, walked
 
-from simulators.gait import Person, Run, Stand, Walk, trial
+from simulators.people import Person, Run, Stand, Walk, trial
 from smartshoe.errors import InputError, UsageError
 from smartshoe.gait import ContactDetector, analyse
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from trials import analysed, loads_of, recorded, walked
 
-from simulators.gait import Person, Stand, trial
+from simulators.people import Person, Stand, trial
 from smartshoe.errors import UsageError
 from smartshoe.gait import analyse
 

@@ -10,8 +10,8 @@ import pytest
 from calibrated import eight_calibrations, eight_diagnoses
 from force_scoring import peak_errors, total_error
 
-from simulators.gait import Person, Run, Stand, Tiptoe, Walk, trial
-from smartshoe.compensation import Calibration
+from simulators.people import Person, Run, Stand, Tiptoe, Walk, trial
+from smartshoe.calibration import Calibration
 from smartshoe.gait import Coverage, analyse, learn_coverage
 
 MOVES = {"walk 0.8 m/s": Walk(0.8), "walk 1.3 m/s": Walk(1.3), "walk 2.0 m/s": Walk(2.0), "run 2.68 m/s": Run(2.68)}

@@ -10,8 +10,8 @@ from calibrated import eight_calibrations
 from force_scoring import peak_errors, total_error
 from trials import analysed, loads_of, ran, recorded, stood, walked
 
-from simulators.gait import Person, Stand, Tiptoe, Walk, trial
-from smartshoe.compensation import Calibration
+from simulators.people import Person, Stand, Tiptoe, Walk, trial
+from smartshoe.calibration import Calibration
 from smartshoe.errors import InputError, UsageError
 from smartshoe.gait import Coverage, analyse, learn_coverage
 

@@ -16,10 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from trials import recorded, walked
 
-from simulators.gait import Person, Run, Stand, Walk, trial
-from smartshoe.atomic import json_text
-from smartshoe.compensation import Calibration
+from simulators.people import Person, Run, Stand, Walk, trial
+from smartshoe.calibration import Calibration
 from smartshoe.errors import InputError, RefusedError, UnitError
+from smartshoe.files.atomic import json_text
 from smartshoe.gait import Coverage, GaitResult, analyse, day
 from smartshoe.gait.day import DayResult, analyse_stream
 from smartshoe.gait.result import Event
@@ -239,7 +239,7 @@ MEMORY = """
 import sys
 from pathlib import Path
 import numpy as np
-from simulators.gait import Person, Walk, trial
+from simulators.people import Person, Walk, trial
 from smartshoe.gait.day import analyse_stream
 from smartshoe.recording import Recording
 

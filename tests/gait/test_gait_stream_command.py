@@ -9,7 +9,7 @@ import pytest
 from trials import walked
 
 from smartshoe.cli import gait_stream, run_command
-from smartshoe.logs import write
+from smartshoe.files.logs import write
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from trials import analysed, loads_of, ran, recorded, stood, times_of, walked
 
-from simulators.gait import Person, Walk, trial
-from smartshoe.atomic import json_text
+from simulators.people import Person, Walk, trial
 from smartshoe.errors import UsageError
+from smartshoe.files.atomic import json_text
 from smartshoe.gait import analyse, centre_of_pressure, memberships
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.crossing import growth, level_places, rise_places, running_median

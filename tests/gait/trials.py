@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.gait import Person, Run, Stand, Tiptoe, Trial, Walk, trial
+from simulators.people import Person, Run, Stand, Tiptoe, Trial, Walk, trial
 from smartshoe.gait import GaitResult, analyse
 from smartshoe.recording import Recording
 

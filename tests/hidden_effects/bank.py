@@ -12,9 +12,9 @@ outside    580,000 one effect that the catalogue does not have, 0.3 to 10 %
 calibrate  900,000 a mixture of these: what the confidence is calibrated on, and never judged by
 ========== ======= =========================================================================
 
-Every case has noise of 0.1-0.3 % of full scale, partly coloured, and two nuisances (`simulators.hidden`). An effect is
-drawn with a protocol that can show it, and tell it from its neighbours as far as any load history does: `SHOWN_BY`
-follows the last column of the catalogue. No effect is asked for more than it can have: `STRONGEST`, from
+Every case has noise of 0.1-0.3 % of full scale, partly coloured, and two nuisances (`simulators.hidden.recordings`). An
+effect is drawn with a protocol that can show it, and tell it from its neighbours as far as any load history does:
+`SHOWN_BY` follows the last column of the catalogue. No effect is asked for more than it can have: `STRONGEST`, from
 docs/simulated_effects.md, and what a unit and protocol cannot reach is halved (`within_reach`).
 """
 
@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from simulators.hidden import HiddenCase, hide
-from simulators.hidden_effects import EFFECTS
+from simulators.hidden.effects import EFFECTS
+from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe.models.effects import catalogue
 
 GRID_PERCENT = (0.05, 0.1, 0.3, 1.0, 3.0)

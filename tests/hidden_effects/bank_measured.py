@@ -19,7 +19,7 @@ from judging import said
 from numpy.typing import NDArray
 
 import smartshoe
-from simulators.baseline import lagged
+from simulators.hidden.baseline import lagged
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from simulators.hidden import HiddenCase
-from simulators.hidden_effects import EFFECTS
+from simulators.hidden.effects import EFFECTS
+from simulators.hidden.recordings import HiddenCase
 from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.session import Scale, prepare
 
@@ -173,7 +173,7 @@ INVERSE = {("gas_heat", "time_constant_s"): "cooling_rate"}
 
 
 def _compared(cause: Cause, case: HiddenCase) -> list[Compared]:
-    """The parameters of a named hidden effect that have a counterpart in the truth (`simulators.hidden_effects`)."""
+    """The parameters of a named hidden effect that have a counterpart in the truth (`simulators.hidden.effects`)."""
     hidden = next((effect for effect in case.effects if effect.name == cause.name), None)
     found = []
     for name, truth in hidden.catalogue.items() if hidden is not None else ():

@@ -46,7 +46,7 @@ class Job:
 @cache
 def warm_up() -> None:
     """A process's first diagnosis compiles: it is not counted."""
-    from simulators.hidden import hide
+    from simulators.hidden.recordings import hide
 
     case = hide({}, protocol="step", seed=1, recordings=1, nuisances=0)
     diagnosed(case.recordings, case.hold_out)
@@ -80,7 +80,7 @@ def diagnosed(recordings: Sequence[Recording], hold_out: Sequence[Recording]) ->
 def _own(job: Job) -> dict[str, Any]:
     from nearest import with_what_cannot_be_told
 
-    from simulators.hidden_cases import case
+    from simulators.hidden.cases import case
 
     made = case(job.kind, job.index)
     truth = with_what_cannot_be_told(made)

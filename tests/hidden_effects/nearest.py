@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
-from simulators.baseline import lagged
 from simulators.effects.memory import follow
-from simulators.hidden_cases import BankCase
-from simulators.hidden_effects.operators import cycles_done, slip
-from simulators.presets import FULL_SCALE_N
+from simulators.hidden.baseline import lagged
+from simulators.hidden.cases import BankCase
+from simulators.hidden.effects.operators import cycles_done, slip
+from simulators.instruments.presets import FULL_SCALE_N
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

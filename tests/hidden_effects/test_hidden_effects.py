@@ -20,8 +20,8 @@ from bank_scoring import FAULT_IS, Score, score
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from simulators.hidden import HiddenCase, hide
-from simulators.hidden_effects import EFFECTS
+from simulators.hidden.effects import EFFECTS
+from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe.diagnosis import Diagnosis, diagnose
 
 SEEDS = st.integers(1_000_000, 2**31 - 1)

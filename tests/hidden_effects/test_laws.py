@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from nearest import PLAIN, leaves
 
-from simulators.baseline import lagged
-from simulators.hidden_cases import case
-from simulators.hidden_effects import BY_LAW_ALONE, EFFECTS, Law, Subject, Surroundings, Warp, merged
-from simulators.hidden_machine import Chain, Departed, Given, balanced, recorded
-from simulators.hidden_plans import INSIDE, KINDS, LAWS, MOST_DEPARTURE, plan
-from simulators.hidden_protocols import build
-from simulators.scaling import SILENT
+from simulators.hidden.baseline import lagged
+from simulators.hidden.cases import case
+from simulators.hidden.effects import BY_LAW_ALONE, EFFECTS, Law, Subject, Surroundings, Warp, merged
+from simulators.hidden.machine import Chain, Departed, Given, balanced, recorded
+from simulators.hidden.plans import INSIDE, KINDS, LAWS, MOST_DEPARTURE, plan
+from simulators.hidden.protocols import build
+from simulators.hidden.scaling import SILENT
 from smartshoe.errors import SmartShoeError
 from smartshoe.protocol import Protocol, dynamic_protocol
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simulators.hidden import HiddenCase, hide
+from simulators.hidden.recordings import HiddenCase, hide
+from simulators.hidden.scaling import machine_of
 from simulators.provider import provider
-from simulators.scaling import machine_of
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.diagnosis import Cause, Diagnosis, diagnose
 from smartshoe.diagnosis.next_experiment import SEPARATED
 from smartshoe.models.twin import TwinBladder

@@ -60,14 +60,6 @@ def _child(step: int, folder: str, words: list[str], answer: int) -> None:
 def main() -> None:
     """One child a line of stdin."""
     # What is imported late is imported here, so that a child's steps are the command's.
-    import smartshoe.cli.calibrations
-    import smartshoe.cli.compensate
-    import smartshoe.cli.convert
-    import smartshoe.cli.export
-    import smartshoe.compensation
-    import smartshoe.compensation.export
-    import smartshoe.logs.columns
-    import smartshoe.store  # noqa: F401
 
     print("ready", flush=True)
     for line in sys.stdin:

@@ -13,10 +13,10 @@ from contract import ended
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.compensation import Calibration
-from smartshoe.journal import Journal, read_journal
+from smartshoe.calibration import Calibration
+from smartshoe.files.journal import Journal, read_journal
 from smartshoe.protocol import Protocol, Segment
-from smartshoe.session import SessionFolder, SessionPlan
+from smartshoe.runs.session import SessionFolder, SessionPlan
 from smartshoe.units import MILLIBAR
 
 EVERYDAY, BANK = 40, 3500

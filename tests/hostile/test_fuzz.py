@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import smartshoe
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.errors import SmartShoeError
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
@@ -119,7 +119,7 @@ def test_a_calibration_with_another_value_anywhere_is_taken_or_refused(wholes: d
 
 def test_names_of_every_kind_stay_inside(tmp_path: Path) -> None:
     from smartshoe.errors import InputError, UsageError
-    from smartshoe.gate import inside, require_file_name
+    from smartshoe.files.gate import inside, require_file_name
 
     outside = tmp_path / "outside"
     outside.mkdir()

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smartshoe.compensation import Calibration
-from smartshoe.store import CalibrationStore
+from smartshoe.calibration import Calibration
+from smartshoe.calibration.store import CalibrationStore
 from smartshoe.units import MILLIBAR
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks the commands")

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from contract import ended
 
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
+from smartshoe.calibration.store import CalibrationStore
 from smartshoe.devices import open_machine, open_shoe
 from smartshoe.errors import LimitError, OptionError, UsageError
-from smartshoe.gate import limits, raise_limits
+from smartshoe.files.gate import limits, raise_limits
 from smartshoe.protocol import Protocol, Segment
-from smartshoe.session import SessionFolder, SessionPlan
-from smartshoe.store import CalibrationStore
+from smartshoe.runs.session import SessionFolder, SessionPlan
 from smartshoe.units import MILLIBAR
 
 LONG = Protocol("long", (Segment("ramp", 100.0, 3000.0), Segment("hold", 100.0, 3000.0)))

@@ -33,7 +33,14 @@ def emulated(folder: Path, side: str) -> tuple[subprocess.Popen[str], str]:
     lines = table.read_text().splitlines()
     more = [",".join([lines[0], *(f"{side}_extra{k}_mbar" for k in range(4))])]
     table.write_text("\n".join(more + [f"{line},{line.split(',', 1)[1]}" for line in lines[1:]]))
-    words = [sys.executable, "-m", "simulators.emulator", f"replay:{table}", "--link", str(folder / f"shoe_{side}")]
+    words = [
+        sys.executable,
+        "-m",
+        "simulators.wire.emulator",
+        f"replay:{table}",
+        "--link",
+        str(folder / f"shoe_{side}"),
+    ]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     process.stdout.readline()

@@ -9,7 +9,7 @@ import pytest
 from live_browser import PROGRAM, Browser
 from serving import serving, until, walk_table
 
-from smartshoe.compensation import Calibration
+from smartshoe.calibration import Calibration
 from smartshoe.live.server import LiveServer
 from smartshoe.live.session import LiveSession
 from smartshoe.units import MILLIBAR

@@ -12,12 +12,12 @@ import pytest
 from serving import health, page, serving, told, until, walk_table
 
 import smartshoe
-from simulators.firmware import Firmware
-from simulators.pty_line import PtyLine
-from simulators.serving import Emulator
-from smartshoe.compensation import Calibration
+from simulators.wire.firmware import Firmware
+from simulators.wire.pty_line import PtyLine
+from simulators.wire.serving import Emulator
+from smartshoe.calibration import Calibration
 from smartshoe.devices import open_shoe
-from smartshoe.journal import read_journal
+from smartshoe.files.journal import read_journal
 from smartshoe.live.frames import SECONDS, view_of
 from smartshoe.units import MILLIBAR
 

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from smartshoe.compensation.extended import ExtendedCompensator
+from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import (
     Conditions,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from simulators.bladder import SimulatedBladder
-from simulators.bladder_parameters import BladderParameters
 from simulators.effects.sensing import Curve, Limit, OutputDrift
+from simulators.plant.bladder import SimulatedBladder
+from simulators.plant.bladder_parameters import BladderParameters
 from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.first_order import lag
 

@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from simulators.bladder import SimulatedBladder
-from simulators.bladder_parameters import (
+from simulators.effects.contact import ContactParameters
+from simulators.effects.damage import PermanentSetParameters
+from simulators.effects.friction import BoucWenParameters, StickSlipParameters
+from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
+from simulators.plant.bladder import SimulatedBladder
+from simulators.plant.bladder_parameters import (
     BladderParameters,
     ConditioningParameters,
     GasHeatParameters,
@@ -19,10 +23,6 @@ from simulators.bladder_parameters import (
     LeakParameters,
     SofteningParameters,
 )
-from simulators.effects.contact import ContactParameters
-from simulators.effects.damage import PermanentSetParameters
-from simulators.effects.friction import BoucWenParameters, StickSlipParameters
-from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import Array, Conditions
 from smartshoe.models.extended import ExtendedModel

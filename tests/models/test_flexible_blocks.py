@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.compensation.extended import ExtendedCompensator
+from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.models.core import Core, plain
 from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.effects._monotone_curve import KNOTS

@@ -13,11 +13,11 @@ from browser import Browser
 from looks import look, unfold
 from scipy import signal
 
+from smartshoe.calibration.validation import validate
 from smartshoe.identification import identify
 from smartshoe.recording import Recording
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.report.calibration.judgement import against_static, headline, judge, looks_like_friction
-from smartshoe.validation import validate
 
 NAME = "<script>alert(1)</script>"
 RATES = (100.0, 400.0, 800.0)

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from looks import look, unfold
 
 from smartshoe.diagnosis.held_out import Gain
-from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.result import Cause, Diagnosis, GoodnessOfFit, NextExperiment, Rival, Statement, Trace
+from smartshoe.integrity import DataFault
 from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter

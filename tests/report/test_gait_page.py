@@ -9,7 +9,7 @@ import pytest
 from browser import Browser
 from looks import look, unfold
 
-from simulators.gait import Person, Walk, trial
+from simulators.people import Person, Walk, trial
 from smartshoe.gait import Coverage, GaitResult, analyse
 from smartshoe.report.gait.page import verdict, write_gait_page
 from smartshoe.report.gait.terminal import by_foot, depends_on_coverage

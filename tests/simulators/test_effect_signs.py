@@ -6,8 +6,8 @@ import numpy as np
 import pydantic
 import pytest
 
-from simulators.hidden import hide
-from simulators.hidden_effects import EFFECTS, Options, Subject, merged
+from simulators.hidden.effects import EFFECTS, Options, Subject, merged
+from simulators.hidden.recordings import hide
 from simulators.provider import provider
 from smartshoe.protocol import Protocol, Segment
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simulators.gait import measured as feet_of
-from simulators.gait import trial
+from simulators.people import measured as feet_of
+from simulators.people import trial
 from smartshoe.errors import InputError
 from smartshoe.recording import REGIONS
 

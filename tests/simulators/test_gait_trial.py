@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulators.gait import Person, Run, Stand, Tiptoe, Walk, blocks, move_at, plan, trial
-from simulators.gait.shape import COLUMNS, PHASES, RUNNING, WALKING, covered, table
+from simulators.people import Person, Run, Stand, Tiptoe, Walk, blocks, move_at, plan, trial
+from simulators.people.shape import COLUMNS, PHASES, RUNNING, WALKING, covered, table
 from smartshoe.errors import UsageError
 from smartshoe.recording import REGIONS
 

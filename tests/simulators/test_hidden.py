@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulators.baseline import lagged, left_over, residual
-from simulators.hidden import hide
-from simulators.hidden_effects import EFFECTS
-from simulators.hidden_effects.noise import alias_hz
-from simulators.hidden_protocols import PROTOCOLS, build
+from simulators.hidden.baseline import lagged, left_over, residual
+from simulators.hidden.effects import EFFECTS
+from simulators.hidden.effects.noise import alias_hz
+from simulators.hidden.protocols import PROTOCOLS, build
+from simulators.hidden.recordings import hide
 from smartshoe.errors import UsageError
 from smartshoe.protocol import dynamic_protocol
 

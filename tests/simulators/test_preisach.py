@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulators.preisach import MEMORY, everett, loop_shape, mean_curve, relays_up
+from simulators.plant.preisach import MEMORY, everett, loop_shape, mean_curve, relays_up
 
 loads = st.lists(st.floats(0, 1000), min_size=1, max_size=20)
 shapes = st.builds(loop_shape, st.floats(5, 100), st.floats(0.05, 1), st.just(800.0)).map(lambda pair: pair[0])

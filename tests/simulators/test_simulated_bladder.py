@@ -12,8 +12,8 @@ from scipy import signal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from simulators.bladder import SimulatedBladder
-from simulators.bladder_parameters import (
+from simulators.plant.bladder import SimulatedBladder
+from simulators.plant.bladder_parameters import (
     AMBIENT_PA,
     BladderParameters,
     ConditioningParameters,

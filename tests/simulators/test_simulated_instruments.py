@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulators import presets
-from simulators.daq import MyRioParameters, SimulatedMyRio
-from simulators.gait.shape import COLUMNS
-from simulators.profiles import Gait
+from simulators.instruments import presets
+from simulators.instruments.daq import MyRioParameters, SimulatedMyRio
+from simulators.instruments.sensor import HdiParameters, SimulatedHdiSensor
+from simulators.people.profiles import Gait
+from simulators.people.shape import COLUMNS
 from simulators.provider import provider
-from simulators.sensor import HdiParameters, SimulatedHdiSensor
 from smartshoe.errors import DeviceError, LimitError, UsageError
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
 from smartshoe.recording import REGIONS

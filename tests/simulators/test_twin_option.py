@@ -9,7 +9,7 @@ import pydantic
 import pytest
 
 from simulators.provider import provider
-from smartshoe.compensation import extended_calibration
+from smartshoe.calibration import extended_calibration
 from smartshoe.errors import InputError
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import dynamic_protocol

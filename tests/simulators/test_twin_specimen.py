@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simulators.daq import MyRioParameters
-from simulators.instron import InstronParameters, SimulatedInstron
-from simulators.sensing_unit import SensingUnit
-from simulators.sensor import HdiParameters, SimulatedHdiSensor
-from simulators.twin import twin_of
-from smartshoe.compensation import Calibration, compensated, extended_calibration
+from simulators.benches.instron import InstronParameters, SimulatedInstron
+from simulators.instruments.daq import MyRioParameters
+from simulators.instruments.sensing_unit import SensingUnit
+from simulators.instruments.sensor import HdiParameters, SimulatedHdiSensor
+from simulators.instruments.twin import twin_of
+from smartshoe.calibration import Calibration, compensated, extended_calibration
 from smartshoe.errors import InputError
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel

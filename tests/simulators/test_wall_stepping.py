@@ -11,8 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from simulators.bladder import SimulatedBladder
-from simulators.bladder_parameters import (
+from simulators.effects.contact import ContactParameters
+from simulators.effects.damage import PermanentSetParameters
+from simulators.effects.friction import BoucWenParameters, StickSlipParameters
+from simulators.effects.outside import Odd
+from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
+from simulators.plant.bladder import SimulatedBladder
+from simulators.plant.bladder_parameters import (
     AMBIENT_PA,
     BladderParameters,
     ConditioningParameters,
@@ -22,13 +27,8 @@ from simulators.bladder_parameters import (
     SofteningParameters,
     TemperatureParameters,
 )
-from simulators.effects.contact import ContactParameters
-from simulators.effects.damage import PermanentSetParameters
-from simulators.effects.friction import BoucWenParameters, StickSlipParameters
-from simulators.effects.outside import Odd
-from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
-from simulators.steppers import PlainStepper, WallStepper
-from simulators.wall_stepping import nozzle_flow
+from simulators.plant.steppers import PlainStepper, WallStepper
+from simulators.plant.wall_stepping import nozzle_flow
 
 PLAIN = BladderParameters(1.341, 0.215, effective_area_m2=0.0623)
 K1 = 1.341 * 0.38113

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from smartshoe.devices.base import Block
 from smartshoe.devices.events import Gap, Restarted, ShoeEvent
 from smartshoe.devices.serial_link.inbox import joined
+from smartshoe.devices.wire.clock import DeviceClock
+from smartshoe.devices.wire.information import Information
+from smartshoe.devices.wire.samples import Samples
 from smartshoe.errors import DeviceError
 from smartshoe.units import Unit
-from smartshoe.wire.clock import DeviceClock
-from smartshoe.wire.information import Information
-from smartshoe.wire.samples import Samples
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from smartshoe.devices.serial_link.port import Port
 from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices.wire.frames import Command, FrameDecoder, encode_command
+from smartshoe.devices.wire.information import Information
+from smartshoe.devices.wire.lines import LineDecoder
+from smartshoe.devices.wire.samples import Samples
+from smartshoe.devices.wire.sniff import guess, looks_like
 from smartshoe.errors import DeviceTimeoutError
-from smartshoe.wire.frames import Command, FrameDecoder, encode_command
-from smartshoe.wire.information import Information
-from smartshoe.wire.lines import LineDecoder
-from smartshoe.wire.samples import Samples
-from smartshoe.wire.sniff import guess, looks_like
 
 # A device that is silent until it is told to start gets this long to begin by itself.
 LISTEN_S = 0.3

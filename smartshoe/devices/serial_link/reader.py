@@ -12,8 +12,8 @@ from smartshoe.devices.serial_link.inbox import Inbox
 from smartshoe.devices.serial_link.port import Port
 from smartshoe.devices.serial_link.reconnect import Backoff
 from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices.wire.samples import Samples
 from smartshoe.errors import DeviceError, DeviceTimeoutError
-from smartshoe.wire.samples import Samples
 
 # Reading waits 50 ms, writing 500 ms; only an operating system that hangs in opening a port takes longer.
 JOIN_S = 2.0

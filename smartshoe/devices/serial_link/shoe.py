@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from smartshoe.devices.serial_link.greeting import Greeting
     from smartshoe.devices.serial_link.port import Port
     from smartshoe.devices.serial_link.reader import SerialReader
-    from smartshoe.wire.clock import DeviceClock
-    from smartshoe.wire.counters import Counters
-    from smartshoe.wire.information import Information
+    from smartshoe.devices.wire.clock import DeviceClock
+    from smartshoe.devices.wire.counters import Counters
+    from smartshoe.devices.wire.information import Information
 
 EXPECTED_RATE_HZ = 200.0  # Chinimilli 2016, Section II
 SIDES = ("left", "right")

@@ -8,7 +8,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from smartshoe.blas import on_one_thread
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.solve import minimise
 from smartshoe.identification.transfer_function import delay
@@ -17,6 +16,7 @@ from smartshoe.identification.transfer_function.estimate import Ending, Transfer
 from smartshoe.identification.transfer_function.experiment import InputOutput, prepare
 from smartshoe.identification.transfer_function.problem import InitialState, OutputError, Structure, Whitened
 from smartshoe.identification.transfer_function.srivc import Settled, least_squares, reflected, srivc
+from smartshoe.kernels.blas import on_one_thread
 
 Method = Literal["srivc", "gn", "lm", "trf"]
 FALLBACK_RATIOS = (4.0, 0.25, 16.0, 1 / 16)

@@ -88,7 +88,7 @@ def _differences(residual: Array, conditions: Conditions, prediction: Array) -> 
 
     Corners of the prediction count as zero: cycles are aligned to a sample, which is too coarse for them.
     """
-    from smartshoe.loading import by_rate, cycles
+    from smartshoe.signals.loading import by_rate, cycles
 
     load = conditions.load
     for group in by_rate(cycles(conditions.time_s, load)).values():

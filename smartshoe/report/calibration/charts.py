@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.loading import Cycle, Ramp, by_rate, cycles
+from smartshoe.calibration.validation import ForceTrace, Validation
 from smartshoe.recording import Recording
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.numbers import plain
-from smartshoe.validation import ForceTrace, Validation
+from smartshoe.signals.loading import Cycle, Ramp, by_rate, cycles
 
 Array = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from smartshoe.calibration.validation import RateResult, Validation
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.numbers import plain
-from smartshoe.validation import RateResult, Validation
 
 Grade = Literal["good", "look", "bad"]
 

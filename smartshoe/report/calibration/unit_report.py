@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from smartshoe.calibration.validation import Validation
 from smartshoe.recording import Recording
-from smartshoe.validation import Validation
 
 
 @dataclass(frozen=True, slots=True)

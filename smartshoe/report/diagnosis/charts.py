@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.result import Diagnosis, Trace
-from smartshoe.masks import runs_of
 from smartshoe.protocol import Protocol
 from smartshoe.report.charts import Chart, Line, Mark, Panel, Style
 from smartshoe.report.diagnosis.sentences import file_name
@@ -24,6 +23,7 @@ from smartshoe.report.diagnosis.views import (
 )
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import words
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 

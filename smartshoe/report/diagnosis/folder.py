@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from smartshoe.atomic import json_text, make_folder, write_text
 from smartshoe.diagnosis.result import Diagnosis
+from smartshoe.files.atomic import json_text, make_folder, write_text
 from smartshoe.report.diagnosis.page import write_diagnosis_page
 from smartshoe.report.diagnosis.protocol_file import protocol_text, table_name
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from smartshoe.diagnosis.held_out import Gain
-from smartshoe.diagnosis.integrity import DataFault
 from smartshoe.diagnosis.result import Cause, Diagnosis, GoodnessOfFit
+from smartshoe.integrity import DataFault
 from smartshoe.models.effects import catalogue, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter

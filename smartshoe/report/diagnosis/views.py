@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.result import Trace
-from smartshoe.loading import Cycle, by_rate, cycles, ramps
+from smartshoe.signals.loading import Cycle, by_rate, cycles, ramps
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -10,10 +10,10 @@ from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
 from smartshoe.gait.result import FootCourse, GaitResult
 from smartshoe.gait.summary import of_main_activity
-from smartshoe.masks import runs_of
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.gait.strides import main_strides, whole_of
 from smartshoe.report.numbers import plain
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 

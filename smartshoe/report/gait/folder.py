@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.atomic import json_text, make_folder, write_text
+from smartshoe.files.atomic import json_text, make_folder, write_text
 from smartshoe.gait.result import GaitResult
 from smartshoe.report.gait.page import write_gait_page
 

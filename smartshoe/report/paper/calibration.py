@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from smartshoe.loading import by_rate, cycles
+from smartshoe.calibration.validation import ForceTrace
 from smartshoe.recording import Recording
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
-from smartshoe.validation import ForceTrace
+from smartshoe.signals.loading import by_rate, cycles
 
 Array = NDArray[np.float64]
 

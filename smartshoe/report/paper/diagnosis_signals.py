@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis.result import Trace
-from smartshoe.masks import runs_of
 from smartshoe.report.diagnosis.views import (
     BINS,
     MOST_GROUPS,
@@ -24,6 +23,7 @@ from smartshoe.report.diagnosis.views import (
     worst_cycle,
 )
 from smartshoe.report.paper.drawing import STYLE, figure_of, thin
+from smartshoe.signals.masks import runs_of
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from smartshoe.atomic import replacing
+from smartshoe.files.atomic import replacing
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
+from smartshoe.calibration.store.drift import Drift, Trend
 from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.paper.drawing import STYLE, figure_of
-from smartshoe.store.drift import Drift, Trend
 
 POINT, LINE, REPAIR, JUMP = "#2563eb", "#1f2937", "#d97706", "#dc2626"
 COLUMNS = 2

@@ -1,0 +1,1 @@
+"""Who loads a plant: a testing machine, a worn shoe."""

@@ -1,0 +1,1 @@
+"""Units with an effect that nobody told the engine of."""

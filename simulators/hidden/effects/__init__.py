@@ -1,0 +1,44 @@
+"""What can be hidden in a simulated unit: every effect of the catalogue under several laws, and some outside of it.
+
+One file a family lists its effects: to add a truth is to add an entry there. `simulators.hidden.effects.registry` says
+what an entry is made of, `simulators.hidden.effects.law` how a further law acts.
+"""
+
+from __future__ import annotations
+
+from simulators.hidden.effects import (
+    asymmetry,
+    cross_talk,
+    data,
+    dead_band,
+    gain_drift,
+    gas_heat,
+    hysteresis,
+    leak,
+    noise,
+    outside,
+    rate,
+    relaxation,
+    saturation,
+    softening,
+    static_curve,
+    tare,
+    timing,
+    zero,
+)
+from simulators.hidden.effects.law import Law, Surroundings, Warp
+from simulators.hidden.effects.registry import SHARE_OF_RANGE, Draws, Hideable, Options, Subject, merged
+
+_FAMILIES = (
+    relaxation, leak, gas_heat, static_curve, dead_band, hysteresis, asymmetry, rate, softening, gain_drift, timing,
+    zero, saturation, cross_talk, tare, noise, data, outside,
+)  # fmt: skip
+
+EFFECTS: dict[str, Hideable] = {effect.name: effect for family in _FAMILIES for effect in family.EFFECTS}
+# Without options of the machine's own, so that only a law makes them.
+BY_LAW_ALONE: dict[str, Hideable] = {effect.name: effect for effect in outside.BY_LAW_ALONE}
+
+__all__ = [
+    "BY_LAW_ALONE", "EFFECTS", "SHARE_OF_RANGE", "Draws", "Hideable", "Law", "Options", "Subject", "Surroundings",
+    "Warp", "merged",
+]  # fmt: skip

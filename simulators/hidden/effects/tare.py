@@ -1,0 +1,37 @@
+"""What the load cell shows when nothing presses."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects.registry import Draws, Hideable, signed, uniform
+
+Array = NDArray[np.float64]
+
+
+def warming_bridge(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
+    """A part of it goes as the bridge warms."""
+    part = draws["part"] * np.expm1(-at.time_s / draws["time_constant_s"])
+    return np.asarray(draws["sign"] * amount * (1.0 + part))
+
+
+def zero_return(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:
+    """It lags behind with the largest load so far: the cell's error of return."""
+    return np.asarray(draws["sign"] * amount * (1.0 + draws["part"] * np.maximum.accumulate(np.maximum(f, 0.0))))
+
+
+EFFECTS = [
+    Hideable("load_cell_tare", "tare", "machine", "load_cell_tare", "N", 5.0, 150.0,
+        lambda a, d, s: {"load_cell_tare_n": d["sign"] * a}, signed(), needs_zero=True, law="constant",
+        says="one constant", source="weight of the fixture",
+        catalogue=lambda a, d, s, hz: {"tare_n": -d["sign"] * a},  # acting load less measured load
+        laws=(
+            Law("warming_bridge", "tare", "a part of it goes as the bridge warms", "OIML R 60", warming_bridge, 0.01,
+                0.15, signed(lambda r, s: {"part": float(r.uniform(0.1, 0.4)),
+                                           "time_constant_s": float(r.uniform(30.0, 120.0))}), bends=None),
+            Law("zero_return", "tare", "a part comes with the largest load so far", "OIML R 60, zero return",
+                zero_return, 0.01, 0.15, signed(uniform(part=(-0.3, 0.3))), bends=None),
+        )),
+]  # fmt: skip

@@ -1,0 +1,1 @@
+"""What reads a plant: the sensor and its logger."""

@@ -1,0 +1,1 @@
+"""The bladder: wall, gas and contact, integrated at a fine step."""

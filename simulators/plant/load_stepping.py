@@ -1,0 +1,30 @@
+"""Hysteresis and the count of cycles on a load at the fine step, for the kernel that takes the stress ready made."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from simulators.plant.preisach import mean_curve, relays_up
+from simulators.plant.stepping import cycle_at
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def loop_and_cycles(
+    load_n: Array, shape: Array, full_n: float, turning: Array, partial: Array, state: Array, loop: Array, cycles: Array
+) -> None:
+    """Fill the loop (n,) about its mean curve, a share, and the cycles (n,) completed so far.
+
+    ``state`` (3,) is the number of turning points, whether in a cycle, and the cycles; changed in place.
+    """
+    count, in_cycle, done = int(state[0]), state[1] > 0.0, state[2]
+    for i in range(load_n.size):
+        up, count = relays_up(load_n[i], turning, partial, count, shape)
+        loop[i] = up - mean_curve(load_n[i], shape)
+        in_cycle, ended = cycle_at(load_n[i], full_n, in_cycle)
+        done += 1.0 if ended else 0.0
+        cycles[i] = done
+    state[0], state[1], state[2] = count, 1.0 if in_cycle else 0.0, done

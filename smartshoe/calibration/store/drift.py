@@ -1,0 +1,326 @@
+"""How a unit's parameters move over its life: a trend, steps at its repairs, jumps that no repair explains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.calibration import Calibration
+from smartshoe.calibration.store.calibration_store import CalibrationStore
+from smartshoe.calibration.store.dates import days_between, iso
+from smartshoe.calibration.store.entry import Entry, HistoryEvent
+from smartshoe.calibration.store.quantities import STATIC_GAIN, ZERO, quantities, require_one_reading_unit, top_load_n
+from smartshoe.errors import UsageError
+from smartshoe.models.parameter import Parameter
+
+Array = NDArray[np.float64]
+
+DAYS_OF_A_YEAR = 365.25
+ROUNDING = 1e-12
+JUMP_CHANCE = 0.01  # of a jump being told anywhere in a history that has none
+LEAST_FREEDOM = 2  # calibrations beyond levels and slope, to judge a jump by
+
+
+@dataclass(frozen=True, slots=True)
+class DriftStep:
+    """A change at a moment: ``change`` (in the quantity's unit) at a repair, or between two calibrations."""
+
+    date: datetime
+    change: Parameter
+    says: str
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether its 95 % interval leaves out zero."""
+        return _leaves_out_zero(self.change)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The step for JSON."""
+        return {"date": iso(self.date), "change": self.change.to_dict(), "says": self.says}
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """A quantity over the life: ``values`` and ``sds`` (n,) at ``days`` (n,) since the first calibration.
+
+    ``pieces`` (n,) number the stretches between ``repairs`` and ``jumps``, each with a level of its own; ``per_year``
+    is the slope that they share, None where it cannot be told; ``levels`` are what the fit says at day 0, one a piece.
+    ``scatter`` is the spread about the fit over what the sds explain (1: all of it; NaN where there is no sd or
+    nothing is left to judge by).
+    """
+
+    name: str
+    unit: str
+    days: Array
+    values: Array
+    sds: Array
+    pieces: NDArray[np.intp]
+    per_year: Parameter | None
+    levels: Array
+    repairs: tuple[DriftStep, ...]
+    jumps: tuple[DriftStep, ...]
+    scatter: float
+    says: str
+
+    @property
+    def moves(self) -> bool:
+        """Whether the slope's 95 % interval leaves out zero."""
+        return self.per_year is not None and _leaves_out_zero(self.per_year)
+
+    def fitted(self, days: Array, piece: int) -> Array:
+        """The fit at ``days`` (m,) in a piece."""
+        slope = 0.0 if self.per_year is None else self.per_year.value / DAYS_OF_A_YEAR
+        return np.asarray(self.levels[piece] + slope * days)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The trend for JSON."""
+        return {
+            "unit": self.unit,
+            "values": [float(value) for value in self.values],
+            "sds": [float(sd) if math.isfinite(sd) else None for sd in self.sds],
+            "per_year": None if self.per_year is None else self.per_year.to_dict(),
+            "repairs": [step.to_dict() for step in self.repairs],
+            "jumps": [step.to_dict() for step in self.jumps],
+            "scatter": self.scatter if math.isfinite(self.scatter) else None,
+            "says": self.says,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """A unit's life: its calibrations, what happened to it, and a trend for every quantity that all of them have."""
+
+    serial_number: str
+    entries: tuple[Entry, ...]
+    events: tuple[HistoryEvent, ...]
+    trends: dict[str, Trend]
+    top_load_n: float
+    says: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema smartshoe.drift/1."""
+        return {
+            "schema": "smartshoe.drift/1",
+            "serial_number": self.serial_number,
+            "calibrations": [entry.to_dict() for entry in self.entries],
+            "events": [event.to_dict() for event in self.events],
+            "top_load_n": self.top_load_n,
+            "trends": {name: trend.to_dict() for name, trend in self.trends.items()},
+            "says": self.says,
+        }
+
+
+def drift(store: CalibrationStore, serial_number: str) -> Drift:
+    """How the unit's parameters moved; raises `UsageError` where there are fewer than two calibrations of it."""
+    entries, events = store.history(serial_number), store.events(serial_number)
+    if not entries:
+        store.latest(serial_number)  # says what the store has instead
+    if len(entries) < 2:
+        raise UsageError(
+            f"unit {serial_number} has one calibration in {store}: a drift needs two at least, add another"
+        )
+    calibrations = [entry.calibration() for entry in entries]
+    require_one_reading_unit(calibrations)
+    days = np.array([days_between(entries[0].date, entry.date) for entry in entries])
+    repairs = [event for event in events if event.kind == "repaired"]
+    lives = np.array([sum(event.date <= entry.date for event in repairs) for entry in entries], dtype=np.intp)
+    trends = {
+        name: _trend(name, unit, days, values, sds, lives, entries, repairs)
+        for name, unit, values, sds in _followed(calibrations)
+    }
+    top_n = top_load_n(calibrations)
+    return Drift(serial_number, entries, events, trends, top_n, _says(serial_number, entries, trends, top_n))
+
+
+def _followed(calibrations: Sequence[Calibration]) -> list[tuple[str, str, Array, Array]]:
+    every = [quantities(calibration) for calibration in calibrations]
+    found = []
+    for name, first in every[0].items():
+        if all(name in other for other in every):
+            values = np.array([other[name].value for other in every])
+            sds = np.array([other[name].sd for other in every])
+            if np.ptp(values) > 0.0 or np.any(sds > 0.0):  # c = 1, fixed in all of them, does not drift
+                found.append((name, first.unit, values, sds))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _TrendFit:
+    """Weighted least squares: theta (p,), its covariance with the scatter in it, degrees of freedom, scatter."""
+
+    theta: Array
+    covariance: Array
+    freedom: int
+    scatter: float
+
+    def parameter(self, contrast: Array, unit: str) -> Parameter:
+        """contrast @ theta with its interval (Student's t: the scatter between calibrations is itself estimated)."""
+        from scipy.stats import t
+
+        value = float(contrast @ self.theta)
+        sd = math.sqrt(max(float(contrast @ self.covariance @ contrast), 0.0))
+        if self.freedom < 1:
+            return Parameter(value, math.nan, (math.nan, math.nan), unit)
+        return Parameter.from_sd(value, sd, unit, float(t.ppf(0.975, self.freedom)))
+
+
+def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
+    """None where the design does not determine every coefficient.
+
+    What the sds do not explain widens the error bars (Birge 1932: never narrows them): a calibration's sd knows
+    nothing of how the unit was placed under the anvil.
+    """
+    known = bool(np.isfinite(sds).all() and (sds > 0.0).all())
+    weight = 1.0 / sds if known else np.ones(values.size)
+    size = np.linalg.norm(design * weight[:, None], axis=0)
+    if not (size > 0.0).all() or np.linalg.matrix_rank(design * weight[:, None] / size) < design.shape[1]:
+        return None
+    scaled = design * weight[:, None] / size
+    theta = np.linalg.lstsq(scaled, values * weight, rcond=None)[0]
+    left = values * weight - scaled @ theta
+    freedom = values.size - design.shape[1]
+    rounding = ROUNDING * float(np.abs(values * weight).max())  # what is exact is known no better than its digits
+    spread = max(math.sqrt(float(left @ left) / freedom), rounding) if freedom > 0 else math.nan
+    widen = max(spread, 1.0) if known and freedom > 0 else spread if freedom > 0 else 1.0
+    covariance = widen**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(size, size)
+    return _TrendFit(theta / size, covariance, freedom, spread if known else math.nan)
+
+
+def _trend(
+    name: str,
+    unit: str,
+    days: Array,
+    values: Array,
+    sds: Array,
+    lives: NDArray[np.intp],
+    entries: Sequence[Entry],
+    repairs: Sequence[HistoryEvent],
+) -> Trend:
+    # Numbered without gaps: of two repairs with no calibration between, the last one counts.
+    pieces = np.unique(lives, return_inverse=True)[1].astype(np.intp)
+    jumped: set[int] = set()
+    while (at := _jump(days, values, sds, pieces)) is not None:
+        jumped.add(at)
+        pieces[at:] += 1
+    found, slope_of = _fit_of(days, values, sds, pieces)
+    slope = None
+    levels = found.theta[: int(pieces[-1]) + 1].copy()
+    if slope_of is not None:
+        slope = found.parameter(slope_of * DAYS_OF_A_YEAR, f"{unit}/year")
+        levels -= float(slope_of @ found.theta) * float(days.mean())
+    at_repairs, jumps = [], []
+    for k in (int(at) + 1 for at in np.flatnonzero(np.diff(pieces))):
+        contrast = np.zeros(found.theta.size)
+        contrast[[pieces[k] - 1, pieces[k]]] = -1.0, 1.0
+        change = found.parameter(contrast, unit)
+        if k in jumped:
+            between = f"between {iso(entries[k - 1].date)} and {iso(entries[k].date)}"
+            said = f"{_amount(name, change)} {between}, which no repair explains"
+            jumps.append(DriftStep(entries[k].date, change, said))
+        else:
+            when = repairs[int(lives[k]) - 1].date
+            at_repairs.append(DriftStep(when, change, f"{_amount(name, change)} at the repair of {iso(when)}"))
+    return Trend(
+        name, unit, days, values, sds, pieces, slope, levels, tuple(at_repairs), tuple(jumps), found.scatter,
+        _trend_says(name, slope, at_repairs, jumps, values),
+    )  # fmt: skip
+
+
+def _fit_of(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) -> tuple[_TrendFit, Array | None]:
+    """Levels of the pieces (at the mean day) and a slope that they share; the contrast of the slope per day.
+
+    Where the slope is not determined (each piece has one date) the levels alone, and None.
+    """
+    levels = (pieces[:, None] == np.arange(int(pieces[-1]) + 1)).astype(float)
+    span = float(np.ptp(days)) or 1.0
+    found = _fit(np.column_stack([levels, (days - days.mean()) / span]), values, sds)
+    if found is not None:
+        per_day = np.zeros(found.theta.size)
+        per_day[-1] = 1.0 / span
+        return found, per_day
+    found = _fit(levels, values, sds)
+    if found is None:  # a level a piece is always determined: nothing but broken numbers gets here
+        raise UsageError(
+            "the calibrations hold numbers that no level fits: look at them with smartshoe calibrations list"
+        )
+    return found, None
+
+
+def _jump(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) -> int | None:
+    """The first calibration after the strongest step within a piece, where chance makes one less than `JUMP_CHANCE`.
+
+    Every gap between two calibrations is tried, and the chance is multiplied by their number (Bonferroni).
+    """
+    from scipy.stats import t
+
+    gaps = [k for k in range(1, values.size) if pieces[k] == pieces[k - 1] and days[k] > days[k - 1]]
+    best: tuple[float, int] | None = None
+    for k in gaps:
+        split = pieces + (np.arange(values.size) >= k)
+        found, slope_of = _fit_of(days, values, sds, split)
+        if slope_of is None or found.freedom < LEAST_FREEDOM:
+            continue
+        contrast = np.zeros(found.theta.size)
+        contrast[[split[k] - 1, split[k]]] = -1.0, 1.0
+        change = found.parameter(contrast, "")
+        sd = math.sqrt(float(contrast @ found.covariance @ contrast))
+        chance = 2.0 * float(t.sf(abs(change.value) / sd, found.freedom)) * len(gaps) if sd > 0.0 else 1.0
+        if chance < JUMP_CHANCE and (best is None or chance < best[0]):
+            best = chance, k
+    return None if best is None else best[1]
+
+
+def _leaves_out_zero(change: Parameter) -> bool:
+    low, high = change.ci95
+    return low > 0.0 or high < 0.0
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _amount(name: str, change: Parameter) -> str:
+    low, high = change.ci95
+    bounds = f" (95 %: {low:.3g} to {high:.3g})" if math.isfinite(low) else ""
+    return f"{_words(name)} changed by {change.value:.3g} {change.unit}{bounds}"
+
+
+def _trend_says(
+    name: str, slope: Parameter | None, repairs: Sequence[DriftStep], jumps: Sequence[DriftStep], values: Array
+) -> str:
+    said = []
+    if slope is None:
+        said.append(f"{_words(name)}: no trend can be told apart from the repairs")
+    elif not math.isfinite(slope.sd):
+        said.append(f"{_words(name)}: {slope.value:.3g} {slope.unit}, from too few calibrations for an interval")
+    else:
+        low, high = slope.ci95
+        size = float(np.abs(values).mean())
+        share = f", {100 * slope.value / size:.2g} % a year" if name != ZERO else ""
+        verb = ("rises" if slope.value > 0.0 else "falls") if _leaves_out_zero(slope) else "shows no trend"
+        said.append(f"{_words(name)} {verb}: {slope.value:.3g} {slope.unit} (95 %: {low:.3g} to {high:.3g}){share}")
+    said += [step.says for step in repairs if step.is_significant]
+    said += [step.says for step in jumps]
+    return "; ".join(said)
+
+
+def _says(serial_number: str, entries: Sequence[Entry], trends: dict[str, Trend], top_n: float) -> str:
+    """One sentence: what the drift of the static gain means in newtons."""
+    span = days_between(entries[0].date, entries[-1].date)
+    start = f"unit {serial_number}, {len(entries)} calibrations over {span:.0f} days"
+    gain = trends.get(STATIC_GAIN)
+    if gain is None or gain.per_year is None or not math.isfinite(gain.per_year.sd):
+        return f"{start}: too few between repairs to tell a trend of the static gain"
+    share = gain.per_year.value / float(np.abs(gain.values).mean())
+    low, high = (bound / float(np.abs(gain.values).mean()) * top_n for bound in gain.per_year.ci95)
+    verdict = "drifts" if gain.moves else "shows no drift beyond its errors"
+    said = (
+        f"{start}: the static gain {verdict}, {share * top_n:.2g} N a year at {top_n:.0f} N ({low:.2g} to {high:.2g})"
+    )
+    return "; ".join([said, *(jump.says for jump in gain.jumps)])

@@ -1,6 +1,0 @@
-"""Integrity of the data: faults of clocks, loggers and converters, found before any model is asked."""
-
-from smartshoe.diagnosis.integrity.examination import examine
-from smartshoe.diagnosis.integrity.fault import DataFault, Integrity
-
-__all__ = ["DataFault", "Integrity", "examine"]

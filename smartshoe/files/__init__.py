@@ -1,0 +1,1 @@
+"""Files of every format, read behind one gate and written whole."""

@@ -1,0 +1,104 @@
+"""Vendor files to `Recording` and back: `read` and `write` for every format, told by content first, suffix second."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from smartshoe.errors import FormatError, InputError, UsageError
+from smartshoe.files.atomic import replacing
+from smartshoe.files.gate import foreign_code, require_regular_file
+from smartshoe.files.logs.formats import formats
+from smartshoe.files.logs.sheet import Column, Format, Sheet, require_sound
+from smartshoe.recording import Recording
+
+_HEAD_BYTES = 1 << 16
+
+
+def _head(path: Path) -> bytes:
+    require_regular_file(path)
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}): check its permissions") from error
+    if not head.strip():
+        raise InputError(f"{path} is empty: give a file with samples in it")
+    return head
+
+
+def detect(path: Path | str) -> Format:
+    """The format of the file at ``path``.
+
+    Raises `InputError` where it cannot be read, `FormatError` where no format fits.
+    """
+    path = Path(path)
+    head = _head(path)
+    for format_ in formats():
+        if format_.sniff(path, head):
+            return format_
+    for format_ in formats():
+        # A text suffix on a file that is no text says nothing; others give a reader that can name the fault.
+        if path.suffix.casefold() in format_.suffixes and not format_.is_text:
+            return format_
+    raise FormatError(
+        f"{path} is binary and in no known format: give a {', '.join(format_.title for format_ in formats())}"
+    )
+
+
+def read_sheet(path: Path | str) -> Sheet:
+    """The columns of any readable file as they stand in it; raises `InputError` and its kin.
+
+    The one place where a format's reader runs, ours or another's: whatever goes wrong in it is told in one sentence.
+    """
+    path = Path(path)
+    format_ = detect(path)
+    with foreign_code(path, format_.title, "export it again"):
+        sheet = format_.read(path)
+    require_sound(sheet)
+    return sheet
+
+
+def read(
+    path: Path | str,
+    *,
+    time: str | None = None,
+    force: str | None = None,
+    sensors: Sequence[str] = (),
+    unit: str | None = None,
+    name: str | None = None,
+    partly: bool = False,
+) -> Recording:
+    """Any readable file as a `Recording`.
+
+    ``time``, ``force`` and ``sensors`` choose columns where names and units do not tell: ``NAME``, ``NAME[unit]``
+    or, by 1-based number, ``3`` and ``3[bar]``; the time also ``rows[49Hz]``, or ``NAME[49Hz]`` for a column that
+    counts samples at that rate. A reference that is a pressure is taken for the force on 1 cm². Where the file is
+    ``partly`` what the choices are of (one of two logs), those that name no column of it are passed over. ``unit``
+    names the sensing unit (``left_toe``) and ``name`` the recording in place of what the file says. Raises
+    `InputError` and its kin, naming file and line.
+    """
+    from smartshoe.files.logs.columns import recording_from
+
+    sheet = read_sheet(path)
+    chosen = (sensors,) if isinstance(sensors, str) else tuple(sensors)
+    return recording_from(sheet, time=time, force=force, sensors=chosen, unit=unit, name=name, partly=partly)
+
+
+def write(recording: Recording, path: Path | str) -> None:
+    """Write ``recording`` in the format that the suffix of ``path`` names, whole or not at all.
+
+    ``.csv`` and ``.txt`` are the plain table. Raises `UsageError` for a suffix that no writable format has.
+    """
+    path = Path(path)
+    writable = [format_ for format_ in formats() if format_.write is not None]
+    for format_ in writable:
+        if format_.write is not None and path.suffix.casefold() in format_.suffixes:
+            with replacing(path) as temporary:
+                format_.write(recording, temporary)
+            return
+    suffixes = [suffix for format_ in writable for suffix in format_.suffixes]
+    raise UsageError(f"{path} has no suffix of a writable format: end it in one of {', '.join(suffixes)}")
+
+
+__all__ = ["Column", "Format", "Sheet", "detect", "read", "read_sheet", "write"]

@@ -1,0 +1,91 @@
+"""What the verbs take for a recording: a `Recording`, the path of a readable file, or a pandas DataFrame."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
+
+import numpy as np
+
+from smartshoe.errors import InputError, UsageError
+from smartshoe.recording import TIME_NAME, Recording, split_column
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RecordingLike: TypeAlias = Union[Recording, str, "os.PathLike[str]", "pd.DataFrame"]
+
+
+def recording_of(given: Any, argument: str = "recording") -> Recording:
+    """``given`` as a recording.
+
+    A path is read as `smartshoe.read` does, a DataFrame as a plain table with the same columns (``time_s`` may be its
+    index). Raises `UsageError` for anything else, naming ``argument`` and the type, and what reading raises.
+    """
+    if isinstance(given, Recording):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        from smartshoe.files.logs import read
+
+        return read(Path(given))
+    if _is_frame(given):
+        return _from_frame(given, argument)
+    raise UsageError(
+        f"{argument} is of type {type(given).__name__}: give a Recording, a path or a DataFrame with a plain table's"
+        " columns"
+    )
+
+
+def recordings_of(given: Any, argument: str = "recordings") -> list[Recording]:
+    """One recording, or several in any iterable, as a list; raises as `recording_of` does."""
+    several = isinstance(given, Iterable) and not isinstance(
+        given, (Recording, str, bytes, os.PathLike, Mapping, np.ndarray)
+    )
+    if not several or _is_frame(given):
+        return [recording_of(given, argument)]
+    return [recording_of(one, f"{argument}[{index}]") for index, one in enumerate(given)]
+
+
+def _is_frame(given: Any) -> bool:
+    pandas = sys.modules.get("pandas")  # where nobody has imported it, nothing can be a DataFrame
+    return pandas is not None and isinstance(given, pandas.DataFrame)
+
+
+def _from_frame(frame: pd.DataFrame, argument: str) -> Recording:
+    from smartshoe.files.logs.columns import recording_from
+    from smartshoe.files.logs.sheet import Column, Sheet, require_sound
+
+    if f"{TIME_NAME}_s" not in frame.columns and frame.index.name == f"{TIME_NAME}_s":
+        frame = frame.reset_index()
+    if f"{TIME_NAME}_s" not in frame.columns:
+        raise InputError(f"{argument}: the DataFrame has no column time_s: give the time in seconds under that name")
+    if not frame.columns.is_unique:
+        raise InputError(
+            f"{argument}: the DataFrame has a column {frame.columns[frame.columns.duplicated()][0]!r} twice"
+        )
+    columns = []
+    for label in frame.columns:
+        name, unit = split_column(str(label))
+        columns.append(Column(name, unit.symbol if unit else "", _numbers(frame, label, argument), label=str(label)))
+    sheet = Sheet(Path(argument), "plain", columns)
+    require_sound(sheet)
+    return replace(recording_from(sheet, name="recording"), source="")
+
+
+def _numbers(frame: pd.DataFrame, label: Any, argument: str) -> Any:
+    kind = getattr(frame[label].dtype, "kind", "O")
+    try:
+        if kind not in "iufbO":
+            raise TypeError(str(frame[label].dtype))
+        return np.array(frame[label].to_numpy(dtype=float, na_value=np.nan))
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{argument}: column {label!r} of the DataFrame holds no numbers ({frame[label].dtype}): convert or drop it"
+        ) from error
+
+
+__all__ = ["RecordingLike", "recording_of", "recordings_of"]

@@ -1,0 +1,86 @@
+"""What an HDF5 file itself holds: nothing that lies in another file, nothing larger than it can hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from smartshoe.errors import FormatError
+from smartshoe.files.gate import foreign_code, limits, require_regular_file, require_values
+
+_DEEPEST = 32
+_OBJECTS_PER_COLUMN = 25  # groups, scales, strings and references beside the columns
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """The `h5py.File` at ``path``, read only; whatever HDF5 raises within the block is a `FormatError`."""
+    import h5py
+
+    require_regular_file(path)
+    with foreign_code(path, "HDF5 file", "write it again"), h5py.File(path, "r") as file:
+        yield file
+
+
+def vectors(path: Path, file: Any, *, deep: bool) -> list[tuple[str, Any]]:
+    """The numeric datasets (name, `h5py.Dataset`), with ``deep`` those of groups too (``group/name``).
+
+    Raises `FormatError` for a link or a dataset whose data lie in another file (external links, external storage,
+    virtual datasets): a file from elsewhere must not choose what is opened here. Raises `InputError` where more is
+    declared than the limits or the file's size allow.
+    """
+    import h5py
+
+    size = path.stat().st_size
+    found: list[tuple[str, Any]] = []
+    declared = 0
+    for name, item in _objects(path, file, deep=deep):
+        if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "biuf":
+            continue
+        _require_own_data(path, name, item)
+        # A chunk is unpacked whole, however little of it is asked for.
+        chunk = 1
+        for length in item.chunks or ():
+            chunk *= length
+        require_values(path, chunk, size, item_bytes=item.dtype.itemsize)
+        declared += int(item.size or 0)
+        require_values(path, declared, size)
+        found.append((name, item))
+    return found
+
+
+def _objects(path: Path, group: Any, *, deep: bool) -> Iterator[tuple[str, Any]]:
+    import h5py
+
+    seen: set[Any] = set()
+    waiting: list[tuple[str, Any, int]] = [("", group, 0)]
+    count = 0
+    while waiting:
+        prefix, current, depth = waiting.pop()
+        for name in current:
+            count += 1
+            if count > _OBJECTS_PER_COLUMN * limits().columns or depth > _DEEPEST:
+                raise FormatError(f"{path} holds too many objects, or too deep: write the measured channels alone")
+            link = current.get(name, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                raise FormatError(
+                    f"{path}: {prefix + name!r} is a link to another file: write a file that holds its own data"
+                )
+            if not isinstance(link, h5py.HardLink):
+                continue  # a soft link leads to what is met by its own name
+            item = current[name]
+            if isinstance(item, h5py.Group):
+                key = h5py.h5o.get_info(item.id).addr
+                if deep and key not in seen:
+                    waiting.append((f"{prefix}{name}/", item, depth + 1))
+                seen.add(key)
+            else:
+                yield prefix + name, item
+
+
+def _require_own_data(path: Path, name: str, dataset: Any) -> None:
+    created = dataset.id.get_create_plist()
+    if created.get_external_count() > 0 or dataset.is_virtual:
+        raise FormatError(f"{path}: the data of {name!r} lie in another file: write a file that holds its own data")

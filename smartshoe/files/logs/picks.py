@@ -1,0 +1,125 @@
+"""Which column of a sheet a user's words mean, and its unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.files.logs.sheet import Column, Sheet
+from smartshoe.units import Unit, declared, find_unit
+
+MOST_NAMES = 10  # of columns in an error
+_CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Pick:
+    """A column by its ``index``, and the ``unit`` in which its values are."""
+
+    index: int
+    unit: Unit | None  # what the user's brackets say, else what the file says
+
+
+def unit_in_file(column: Column) -> Unit | None:
+    """The unit that the file gives the column, as declared where the table does not know it; None without one."""
+    text = column.unit.strip()
+    if not text.strip("()[]{} "):
+        return None
+    return find_unit(text) or declared(text.strip("()[]{} "))
+
+
+def titles(sheet: Sheet) -> str:
+    """The sheet's columns as a person reads them."""
+    return listed([column.label or column.name or "''" for column in sheet.columns])
+
+
+def listed(names: Sequence[str]) -> str:
+    """The names, at most `MOST_NAMES` of them, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
+
+
+def _titled(columns: Sequence[Column], wanted: str) -> list[int]:
+    """The columns of that name or header text: exactly, or else apart from case."""
+    for alike in (str, str.casefold):
+        found = [i for i, c in enumerate(columns) if alike(wanted) in (alike(c.label), alike(c.name)) and wanted]
+        if found:
+            return found
+    return []
+
+
+def names_a_column(sheet: Sheet, choice: str) -> bool:
+    """Whether a user's ``choice`` names a column of the sheet, by name or number; units are not looked at."""
+    bracket = _CHOICE.fullmatch(choice)
+    bases = (choice.strip(), bracket["base"].strip()) if bracket else (choice.strip(),)
+    return any(_titled(sheet.columns, base) or _numbered(sheet, base) for base in bases)
+
+
+def _numbered(sheet: Sheet, base: str) -> list[int]:
+    if base.isascii() and base.isdigit() and 1 <= int(base) <= len(sheet.columns):
+        return [int(base) - 1]
+    return []
+
+
+def pick(sheet: Sheet, choice: str, option: str) -> Pick:
+    """The column that a user's ``choice`` names; raises `InputError` where none or several fit."""
+    columns = sheet.columns
+    bracket = _CHOICE.fullmatch(choice)
+    base, said = choice.strip(), None
+    found = _titled(columns, base)
+    if not found and bracket:
+        base, said = bracket["base"].strip(), find_unit(bracket["unit"])
+        if said is None:
+            raise UnitError(
+                f"{sheet.path}: unit {bracket['unit']!r} in {option} {choice!r} is not known: use one such as s, N,"
+                " kN, mbar, bar, V, counts, ohm or mm"
+            )
+        found = _titled(columns, base)
+        if len(found) > 1:
+            found = [i for i in found if unit_in_file(columns[i]) == said] or found
+    if len(found) > 1:
+        raise InputError(
+            f"{sheet.path}: {option} {choice!r} fits {len(found)} columns: add the unit in brackets, or rename one"
+            f" of them (columns: {titles(sheet)})"
+        )
+    found = found or _numbered(sheet, base)
+    if not found:
+        raise MissingChannelError(
+            f"{sheet.path} has no column {base!r} for {option}: choose one of its columns ({titles(sheet)}) by name"
+            f" or by number from 1 to {len(columns)}"
+        )
+    return _united(sheet, found[0], said, option)
+
+
+def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:
+    column = sheet.columns[index]
+    of_file = unit_in_file(column)
+    if said is not None and of_file is not None and of_file.quantity != "unknown" and said != of_file:
+        raise UnitError(
+            f"{sheet.path}: column {column.name!r} is in {of_file.symbol} by the file, {option} says {said.symbol}:"
+            " leave the unit out"
+        )
+    return Pick(index, said or of_file)
+
+
+def need_unit(sheet: Sheet, found: Pick, option: str, example: str) -> Unit:
+    """The pick's unit; raises `InputError` where neither file nor user gives one."""
+    if found.unit is None:
+        name = sheet.columns[found.index].name
+        raise InputError(
+            f"{sheet.path} gives column {name!r} no unit: add it in brackets, for example {option} '{name}[{example}]'"
+        )
+    return found.unit
+
+
+def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example: str) -> Unit:
+    """The pick's unit; raises `UnitError` where it is of another ``quantity``, and as `need_unit` does."""
+    in_unit = need_unit(sheet, found, option, example)
+    if in_unit.quantity != quantity:
+        raise UnitError(
+            f"{sheet.path}: column {sheet.columns[found.index].name!r} for {option} is in {in_unit.symbol}, which is"
+            f" no {quantity}: choose a column in a unit such as {example}"
+        )
+    return in_unit

@@ -1,0 +1,21 @@
+"""Checks in the field: zero before use, auto-zero in swing, body weight, units that do not answer, temperature."""
+
+from smartshoe.gait.field.at_rest import ZeroReading, check_zero, zero
+from smartshoe.gait.field.body_weight import check_body_weight
+from smartshoe.gait.field.finding import CheckResult
+from smartshoe.gait.field.silence import check_units
+from smartshoe.gait.field.swing_zero import SwingZero
+from smartshoe.gait.field.temperature import sealed_air_pa_per_k, temperature_of_zeros, temperature_sensitivity
+
+__all__ = [
+    "CheckResult",
+    "SwingZero",
+    "ZeroReading",
+    "check_body_weight",
+    "check_units",
+    "check_zero",
+    "sealed_air_pa_per_k",
+    "temperature_of_zeros",
+    "temperature_sensitivity",
+    "zero",
+]

@@ -1,0 +1,64 @@
+"""Swings of a foot, from the sum of its units, wherever the zero has gone: flat valleys between stances.
+
+Coarse on purpose: what is needed is a stretch in which the foot is surely off the ground, not the moment of toe off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.gait.field.finding import Array, Mask
+
+SHORTEST_S, LONGEST_S = 0.15, 1.0  # a sprinter's swing is longer, a valley of 1 s and more is a foot that rests
+ENTER, LEAVE = 0.10, 0.25  # of the rise above the valley
+FLAT = 0.03  # of the rise: how far a swing's middle may spread or slope; a foot that still bears load does not keep so
+FROM, TO = 0.4, 0.8  # of a swing: the shoe has let go and the heel is not yet down
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """Samples ``start`` up to ``stop`` below the threshold, ``middle`` of them surely off the ground."""
+
+    start: int
+    stop: int
+    middle: slice
+
+
+def is_low(total: Array, low: float, rise: float) -> Mask:
+    """(n,) below the valley's threshold, with hysteresis between ``ENTER`` and ``LEAVE`` of ``rise``."""
+    below, above = total < low + ENTER * rise, total > low + LEAVE * rise
+    index = np.arange(total.size)
+    last_below = np.maximum.accumulate(np.where(below, index, -1))
+    last_above = np.maximum.accumulate(np.where(above, index, -1))
+    return last_below > last_above
+
+
+def swings(total: Array, sample_rate_hz: float, least_rise: float) -> list[Swing]:
+    """Swings that begin and end within ``total`` (n,): some seconds of a foot's summed load, in any unit.
+
+    The valley is the lowest level there is, so an offset changes nothing. ``least_rise``, in the same unit: what rises
+    less than this above the valley is no step.
+    """
+    low, high = (float(x) for x in np.quantile(total, (0.02, 0.98)))
+    rise = high - low
+    if not rise >= least_rise > 0.0:
+        return []
+    state = is_low(total, low, rise)
+    edges = np.flatnonzero(np.diff(state.astype(np.int8)))
+    found = []
+    for start, stop in zip(edges[:-1] + 1, edges[1:] + 1, strict=True):
+        count = int(stop - start)
+        if not state[start] or not SHORTEST_S <= count / sample_rate_hz <= LONGEST_S:
+            continue
+        middle = slice(int(start) + round(FROM * count), int(start) + max(round(TO * count), round(FROM * count) + 2))
+        if _is_flat(total[middle], rise):
+            found.append(Swing(int(start), int(stop), middle))
+    return found
+
+
+def _is_flat(part: Array, rise: float) -> bool:
+    third = max(part.size // 3, 1)
+    slope = float(part[-third:].mean() - part[:third].mean())
+    return bool(part.std() <= FLAT * rise and abs(slope) <= FLAT * rise)

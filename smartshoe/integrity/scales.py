@@ -1,0 +1,134 @@
+"""Scales that faults do not move: local noise, lattice step, corners. All are medians of something."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.integrity.fault import Array
+
+BLOCK = 32
+CUT = 3.0  # medians of the absolute value
+CUT_SHORT = 0.93  # what is left of a normal deviate's root mean square
+SAME_GAP = 0.01  # of the logarithm
+COMMON = 0.2  # of the commonest gap's number
+OFTEN, CANDIDATES, SAMPLE = 3, 40, 2000
+FEW, FEW_FIT, MANY_FIT = 50, 0.98, 0.75  # three gaps of ten fit any step
+SECOND_DIFFERENCE = 6.0**0.5  # standard deviation of white noise's, over the noise's own
+
+
+def five_point_median(values: Array) -> Array:
+    """(n,) running median of five; the ends repeat."""
+    v = np.concatenate([values[:1], values[:1], values, values[-1:], values[-1:]])
+    a, b, c, d, e = v[:-4], v[1:-3], v[2:-2], v[3:-1], v[4:]
+    # The median of five is the median of e and the two middle ones that pairs leave (six comparisons).
+    low_ab, high_ab = np.minimum(a, b), np.maximum(a, b)
+    low_de, high_de = np.minimum(d, e), np.maximum(d, e)
+    low, high = np.maximum(low_ab, low_de), np.minimum(high_ab, high_de)
+    out: Array = np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c))
+    return out
+
+
+def local_scale(deviation: Array, step: float = 0.0, block: int = BLOCK) -> Array:
+    """(n,) root mean square of ``deviation`` near each sample, large ones cut short: largest of three blocks.
+
+    The largest, so that the sample at the foot of a noisy stretch is judged by that stretch. What is beyond three
+    medians and one lattice ``step`` counts as that much.
+    """
+    n = deviation.size
+    if n == 0:
+        return np.zeros(0)
+    blocks = max(1, n // block)
+    size = np.abs(deviation[: blocks * block]) if n >= block else np.abs(deviation)
+    size = size.reshape(blocks, -1)
+    limit = CUT * np.median(size, axis=1, keepdims=True) + step
+    body = np.sqrt(np.mean(np.minimum(size, limit) ** 2, axis=1)) / CUT_SHORT
+    wide = body.copy()
+    wide[1:] = np.maximum(wide[1:], body[:-1])
+    wide[:-1] = np.maximum(wide[:-1], body[1:])
+    out: Array = wide[np.minimum(np.arange(n) // block, blocks - 1)]
+    return out
+
+
+def white_noise(values: Array, step: float) -> Array:
+    """(n,) local standard deviation of white noise, from second differences."""
+    second = np.zeros(values.size)
+    if values.size > 2:
+        second[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / SECOND_DIFFERENCE
+    return local_scale(second, step)
+
+
+def slope_change(values: Array, noise: Array, near: int) -> Array:
+    """(n,) the largest change of increment (per sample) within ``near`` samples, noise left out.
+
+    A corner between straight lines counts in full, a sharp step by its own second difference.
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    n = values.size
+    padded = np.concatenate([np.full(near, values[0]), values, np.full(near, values[-1])])
+    wide = np.abs(padded[2 * near :] - 2.0 * values + padded[:n]) / near
+    wide = np.maximum(wide - 6.0 * SECOND_DIFFERENCE * noise / near, 0.0)
+    sharp = np.zeros(n)
+    sharp[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+    sharp = np.maximum(sharp - 6.0 * SECOND_DIFFERENCE * noise, 0.0)
+    out: Array = maximum_filter1d(np.maximum(wide, sharp), 2 * near + 1, mode="nearest")
+    return out
+
+
+def own_corner(values: Array, near: int) -> Array:
+    """(n,) change of slope (per sample) from the ``near`` samples before each to those after, itself left out.
+
+    So a spike is judged by its neighbours' lines, and the tip of a triangle by its own two flanks.
+    """
+    reach = max(near, 4)
+    n = values.size
+    padded = np.concatenate([np.full(reach, values[0]), values, np.full(reach, values[-1])])
+    after = padded[2 * reach : 2 * reach + n] - padded[reach + 2 : reach + 2 + n]
+    before = padded[reach - 2 : reach - 2 + n] - padded[:n]
+    out: Array = np.abs(after - before) / (reach - 2)
+    return out
+
+
+def lattice_step(levels: Array, count: NDArray[np.intp]) -> float:
+    """The step of the lattice on which values lie; 0 where there is none that can be told.
+
+    ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left
+    out where most occur often: a spike need not lie on the lattice.
+    """
+    often = count > 1
+    if often.sum() >= 3 and count[often].sum() > 0.7 * count.sum():
+        levels = levels[often]
+    if levels.size < 3:
+        return 0.0
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-9 * np.max(np.abs(levels))]  # two readings of one level that differ by rounding
+    if gaps.size < 2:
+        return 0.0
+    # One step is a gap that occurs often, and the largest of which the others are multiples; values off the lattice
+    # have made some gaps what they are.
+    place, number = np.unique(np.rint(np.log(gaps) / SAME_GAP).astype(np.int64), return_counts=True)
+    often_enough = number >= min(OFTEN, int(number.max()))
+    offered = np.concatenate([place[often_enough][:CANDIDATES], place[number >= COMMON * number.max()][:CANDIDATES]])
+    some = gaps[:: max(1, gaps.size // SAMPLE)]
+    steps = [_refined(some, float(np.exp(SAME_GAP * candidate))) for candidate in np.unique(offered)[::-1]]
+    # A ramp without noise takes every tenth step, say: what fits all gaps comes before what fits most.
+    shares = [float(_fits(some, step).mean()) if step > 0.0 else 0.0 for step in steps]
+    for least in (FEW_FIT,) if gaps.size < FEW else (FEW_FIT, MANY_FIT):
+        for step, share in zip(steps, shares, strict=True):
+            if share > least:
+                return step
+    return 0.0
+
+
+def _fits(gaps: Array, step: float) -> NDArray[np.bool_]:
+    """(g,) which gaps are multiples of ``step``, one at least."""
+    multiple = np.rint(gaps / step)
+    out: NDArray[np.bool_] = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < 0.15)
+    return out
+
+
+def _refined(gaps: Array, step: float) -> float:
+    """The step by the gaps that are its multiples, 0 where none is."""
+    near = gaps[_fits(gaps, step)]
+    return float(np.median(near / np.rint(near / step))) if near.size else 0.0

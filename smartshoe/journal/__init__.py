@@ -1,7 +1,0 @@
-"""Data that must not be lost: appended to a file, checked, on disk before anyone is told of it."""
-
-from smartshoe.journal.appending import AppendedFile
-from smartshoe.journal.journal import Contents, Journal, read_journal
-from smartshoe.journal.records import Record
-
-__all__ = ["AppendedFile", "Contents", "Journal", "Record", "read_journal"]

@@ -1,0 +1,1 @@
+"""What a person starts: a scenario, a session, a sweep, a study."""

@@ -1,0 +1,28 @@
+"""Scenarios: a TOML file that says which devices, protocols and steps; read, checked and run."""
+
+from smartshoe.runs.scenario.run import (
+    ScenarioResult,
+    UnitResult,
+    check_simulated,
+    protocols_of,
+    run,
+    simulate,
+    simulate_trial,
+    steps_of,
+)
+from smartshoe.runs.scenario.schema import Scenario, checked, load, read_tables
+
+__all__ = [
+    "Scenario",
+    "ScenarioResult",
+    "UnitResult",
+    "check_simulated",
+    "checked",
+    "load",
+    "protocols_of",
+    "read_tables",
+    "run",
+    "simulate",
+    "simulate_trial",
+    "steps_of",
+]

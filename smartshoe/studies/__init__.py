@@ -1,5 +1,0 @@
-"""Studies: many trials by subject and condition, compared within subjects."""
-
-from smartshoe.studies.running import StudyResult, study
-
-__all__ = ["StudyResult", "study"]

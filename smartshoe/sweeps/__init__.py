@@ -1,5 +1,0 @@
-"""Sweeps: one scenario many times, over designs of its keys and over seeds, on all cores or a cluster."""
-
-from smartshoe.sweeps.running import SweepResult, sweep
-
-__all__ = ["SweepResult", "sweep"]

@@ -1,0 +1,62 @@
+"""Figures of merit and segments on cases whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.calibration import Calibration
+from smartshoe.calibration.validation import metrics, validate
+from smartshoe.recording import Recording
+from smartshoe.signals import loading
+from smartshoe.units import MILLIBAR
+
+
+@settings(max_examples=20)
+@given(a=st.floats(0.1, 1e3), b=st.floats(0.1, 1e3))
+def test_an_ellipse_encloses_pi_a_b(a, b):
+    angle = np.linspace(0.0, 2 * np.pi, 2000, endpoint=False)
+    # A polygon of n corners in an ellipse lacks 2 pi^2 / (3 n^2) of its area.
+    assert metrics.loop_area(a * np.cos(angle), b * np.sin(angle)) == pytest.approx(np.pi * a * b, rel=2e-6)
+
+
+@settings(max_examples=20)
+@given(
+    rates=st.lists(st.sampled_from([50.0, 100.0, 200.0, 400.0, 600.0, 800.0]), min_size=1, max_size=4),
+    noise_n=st.floats(0.0, 5.0),
+    seed=st.integers(0, 2**31),
+)
+def test_drawn_rates_are_recovered_from_noisy_triangles(rates, noise_n, seed):
+    at, load = [0.0], [0.0]
+    for rate in rates:
+        start = at[-1] + 2.0
+        at += [start, start + 800.0 / rate, start + 1600.0 / rate]
+        load += [0.0, 800.0, 0.0]
+    time_s = np.arange(0.0, at[-1] + 2.0, 0.01)
+    noisy = np.interp(time_s, at, load) + np.random.default_rng(seed).normal(0.0, noise_n, time_s.size)
+    found = loading.cycles(time_s, noisy)
+    # Two end samples of sd 5 N each over 640 N: 1.1 % of rate sd a ramp; four and more of those.
+    assert [cycle.rate_n_per_s for cycle in found] == pytest.approx(rates, rel=0.05)
+
+
+def test_the_static_line_may_have_an_offset() -> None:
+    """A sensor that is a line with a zero of its own leaves the best static line no error."""
+    time_s = np.arange(0.0, 12.0, 0.01)
+    load_n = np.interp(time_s, [2.0, 6.0, 10.0], [0.0, 800.0, 0.0])
+    recording = Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=0.5 * load_n + 30.0)
+    found = validate(recording, Calibration(0.2, 2.1, 0.4, reading_unit=MILLIBAR))
+    assert found.static_gain == pytest.approx(2.0)
+    assert found.static_offset_n == pytest.approx(-60.0)
+    assert found.overall.rmse_static_n == pytest.approx(0.0, abs=1e-9)
+    assert found.traces[0].static_n == pytest.approx(load_n, abs=1e-9)
+
+
+@pytest.mark.parametrize(("height", "counts"), [(0.2, False), (0.4, True), (0.55, True)])
+def test_a_ramp_counts_from_three_tenths_of_the_records_load_range_on(height: float, counts: bool) -> None:
+    top_n = 1000.0 * height
+    time_s = np.arange(0.0, 40.0, 0.01)
+    load_n = np.interp(time_s, [2, 12, 22, 25, 29, 33], [0.0, 1000.0, 0.0, 0.0, top_n, 0.0])
+    found = [cycle.rate_n_per_s for cycle in loading.cycles(time_s, load_n)]
+    assert found == pytest.approx([100.0, top_n / 4.0] if counts else [100.0], rel=1e-6)

@@ -1,0 +1,160 @@
+"""The device's clock on the host's: within a millisecond under 100 ppm and tens of milliseconds of jitter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from smartshoe.devices.wire.clock import KEPT_BINS, DeviceClock
+from smartshoe.errors import UsageError
+
+Array = NDArray[np.float64]
+RATE_HZ = 200
+SKEW_PPM = 100.0
+BLOCK = 20
+LAWS = (
+    "uniform, 0 to 20 ms",
+    "exponential, 20 ms",
+    "half normal, 20 ms",
+    "normal, 20 ms about 100",
+    "lognormal, median 10 ms",
+    "radio packets of 50 ms, exponential 5 ms",
+    "USB timer of 16 ms, uniform 4 ms",
+    "exponential, 20 ms; a stall of 1 s every 10 s",
+)
+
+
+def _delays(law: str, time_s: Array, rng: np.random.Generator) -> Array:
+    n = time_s.size
+    match LAWS.index(law):
+        case 0:
+            return rng.uniform(0.0, 0.02, n)
+        case 1:
+            return rng.exponential(0.02, n)
+        case 2:
+            return np.abs(rng.normal(0.0, 0.02, n))
+        case 3:
+            return np.maximum(rng.normal(0.1, 0.02, n), 0.0)
+        case 4:
+            return 0.01 * rng.lognormal(0.0, 1.0, n)
+        case 5:
+            return np.ceil(time_s / 0.05) * 0.05 - time_s + rng.exponential(0.005, n)
+        case 6:
+            return np.ceil(time_s / 0.016) * 0.016 - time_s + rng.uniform(0.0, 0.004, n)
+        case _:
+            delays = rng.exponential(0.02, n)
+            for start in rng.integers(0, n, n // (10 * RATE_HZ)):
+                stop = min(start + RATE_HZ, n)
+                delays[start:stop] += np.linspace(1.0, 0.0, RATE_HZ)[: stop - start]
+            return delays
+
+
+@dataclass
+class Run:
+    """A stream of ``duration_s``: true times of its samples, the device's, and their errors by the fit."""
+
+    law: str
+    duration_s: float
+    seed: int
+
+    def __post_init__(self) -> None:
+        rng = np.random.default_rng(self.seed)
+        self.true_s = np.arange(round(self.duration_s * RATE_HZ)) / RATE_HZ
+        self.device_s = 7.0 + self.true_s / (1.0 + SKEW_PPM * 1e-6)
+        # A serial line keeps the order.
+        arrival_s = np.maximum.accumulate(self.true_s + 0.01 + _delays(self.law, self.true_s, rng))
+        self.clock = DeviceClock()
+        self.live_s = np.empty_like(self.true_s)
+        for start in range(0, self.true_s.size, BLOCK):
+            here = slice(start, start + BLOCK)
+            self.clock.update(self.device_s[here], arrival_s[here])
+            self.live_s[here] = self.clock.host_time(self.device_s[here])
+
+    def final_error_s(self) -> float:
+        """Largest error of a sample's time about the one constant, by the last line, over its window."""
+        last = slice(-min(self.true_s.size, KEPT_BINS * RATE_HZ // 4), None)
+        error = self.clock.host_time(self.device_s[last]) - self.true_s[last]
+        return float(np.ptp(error)) / 2.0
+
+    def live_error_s(self, from_s: float) -> float:
+        """The same of each sample's time as it was at its arrival."""
+        error = (self.live_s - self.true_s)[self.true_s >= from_s]
+        return float(np.ptp(error)) / 2.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_minute_is_timed_within_a_millisecond(law: str) -> None:
+    run = Run(law, 60.0, 1)
+    fit = run.clock.fit
+    assert fit is not None
+    assert run.final_error_s() < 1e-3
+    assert abs(fit.skew_ppm - SKEW_PPM) < 4.0 * fit.skew_sd_ppm
+    assert (fit.sd_s(run.device_s) < 2e-3).all()
+    assert fit.samples > 0.99 * run.true_s.size
+
+
+@settings(max_examples=8)
+@given(st.floats(-1e4, 1e5), st.floats(-300.0, 300.0), st.integers(1, 60))
+def test_without_jitter_the_line_is_found_whatever_the_batches(offset_s: float, skew_ppm: float, batch: int) -> None:
+    device_s = np.arange(3000) / RATE_HZ
+    host_s = offset_s + device_s * (1.0 + skew_ppm * 1e-6)
+    clock = DeviceClock()
+    for start in range(0, 3000, batch):
+        clock.update(device_s[start : start + batch], host_s[start : start + batch])
+    # Up to a constant: a skew moves the least delay of a quarter of a second by some microseconds.
+    error_s = clock.host_time(device_s) - host_s
+    assert np.ptp(error_s) < 2e-6
+    assert np.abs(error_s).max() < 5e-5
+
+
+def test_the_constant_stays_one_where_the_level_changes() -> None:
+    run = Run(LAWS[3], 120.0, 3)
+    steps = np.diff(run.live_s - run.true_s)[round(20 * RATE_HZ) :]
+    assert np.abs(steps).max() < 5e-4
+
+
+def test_a_temperature_is_followed() -> None:
+    # 1 ppm of change a minute, for an hour: a single line would be off by tens of milliseconds.
+    rng = np.random.default_rng(2)
+    true_s = np.arange(3600 * 20) / 20
+    device_s = true_s * (1 - 1e-4) - 0.5 * (1e-6 / 60) * true_s**2
+    arrival_s = true_s + rng.uniform(0.0, 0.02, true_s.size)
+    clock = DeviceClock()
+    errors = []
+    for start in range(0, true_s.size, 60):
+        here = slice(start, start + 60)
+        clock.update(device_s[here], arrival_s[here])
+        errors.append(float((clock.host_time(device_s[here]) - true_s[here]).mean()))
+    assert np.ptp(errors[30:]) / 2 < 3e-3
+    assert np.ptp(device_s - true_s) > 0.1
+
+
+def test_gaps_and_single_samples_are_taken() -> None:
+    clock = DeviceClock()
+    assert clock.fit is None
+    with pytest.raises(UsageError, match="no line"):
+        clock.host_time(0.0)
+    clock.update([], [])
+    clock.update(5.0, 105.0)
+    assert clock.host_time(6.0) == pytest.approx(106.0)
+    clock.update([600.0, 600.5], 700.5)
+    assert clock.host_time(601.0) == pytest.approx(701.0, abs=0.6)
+    clock.reset()
+    assert clock.fit is None
+
+
+@pytest.mark.bank
+@pytest.mark.parametrize("law", LAWS)
+def test_the_table_of_the_guide(law: str) -> None:
+    """``pytest -m bank tests/devices/wire/test_wire_clock.py -s`` prints docs/wire.md's rows (a minute)."""
+    seeds = (1, 2)
+    finals = [max(Run(law, duration, seed).final_error_s() for seed in seeds) for duration in (10.0, 60.0)]
+    long = [Run(law, 600.0, seed) for seed in seeds]
+    cells = [*finals, max(run.final_error_s() for run in long), max(run.live_error_s(30.0) for run in long)]
+    print(f"\n| {law} | " + " | ".join(f"{1e3 * cell:.2f} ms" for cell in cells) + " |")
+    assert all(cell < 1e-3 for cell in cells[:3])

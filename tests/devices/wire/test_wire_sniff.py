@@ -1,0 +1,56 @@
+"""What bytes look like: the right decoder is chosen, and an error says what is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.devices.wire.frames import encode_samples
+from smartshoe.devices.wire.framing import framed
+from smartshoe.devices.wire.lines import encode_lines
+from smartshoe.devices.wire.sniff import guess, looks_like
+
+RNG = np.random.default_rng(1)
+READINGS = RNG.integers(0, 4096, (60, 4))
+FRAMES = encode_samples(np.arange(60), np.arange(60) * 5000, READINGS)
+LINES = encode_lines(np.arange(60) * 5, READINGS)
+
+
+@pytest.mark.parametrize(
+    ("data", "format_", "says"),
+    [
+        (b"", None, "no bytes at all"),
+        (bytes(300), None, "wrong baud rate"),
+        (b"\xff" * 200 + bytes(100), None, "wrong baud rate"),
+        (FRAMES[7:], "frames", "frames, 59 whole and 1 damaged"),
+        (LINES[3:], "lines", "text lines of 5 numbers"),
+        (encode_lines(np.arange(60) * 5, READINGS[:, :3]), "lines", "text lines of 4 numbers, not 5"),
+        (encode_samples(np.arange(9), np.arange(9), READINGS[:9, :2]), "frames", "frames of 2 readings, not 4"),
+        (framed(b"\x55hello, it is me") * 5, "frames", "type 0x55"),
+        (b"rst:0x1 (POWERON_RESET),boot:0x13\r\nets Jun  8 2016\r\nload\r\n", None, "without numbers"),
+        (b"hello " * 50, None, "text without an end of line"),
+        (bytes(RNG.integers(128, 256, 512).tolist()), None, "binary without a zero byte in 512"),
+        (b"\x7f\x81\x93\xaa\x00\xf1" * 80, None, "another protocol or baud rate"),
+    ],
+)
+def test_bytes_are_told(data: bytes, format_: str | None, says: str) -> None:
+    assert guess(data) == format_
+    assert says in looks_like(data)
+
+
+def test_frames_with_another_checksum_are_told() -> None:
+    harmed = bytearray(FRAMES)
+    harmed[16::19] = bytes(max(byte ^ 0x55, 1) for byte in harmed[16::19])
+    assert guess(bytes(harmed)) is None
+    assert "checksum" in looks_like(bytes(harmed))
+
+
+@settings(max_examples=200)
+@given(st.binary(max_size=300))
+def test_any_bytes_look_like_something(data: bytes) -> None:
+    clause = looks_like(data)
+    assert clause
+    assert "\n" not in clause
+    guess(data)

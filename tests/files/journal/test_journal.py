@@ -1,0 +1,141 @@
+"""A journal keeps what it acknowledged: through cuts, damage, a full disk and a second writer."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smartshoe.errors import FormatError, InputError, UsageError
+from smartshoe.files.journal import AppendedFile, Journal, read_journal
+
+RECORDS = st.lists(st.tuples(st.integers(0, 255), st.binary(max_size=60)), min_size=1, max_size=8)
+
+
+def _written(path: Path, records: list[tuple[int, bytes]]) -> list[int]:
+    """The journal of ``records`` at ``path``; returns the file's size after each."""
+    ends = []
+    with Journal(path) as journal:
+        for kind, payload in records:
+            journal.append(kind, payload)
+            ends.append(path.stat().st_size)
+    return ends
+
+
+def _content(path: Path) -> list[tuple[int, bytes]]:
+    return [(record.kind, record.payload) for record in read_journal(path).records]
+
+
+@settings(max_examples=40)
+@given(RECORDS, st.data())
+def test_a_journal_that_is_cut_anywhere_keeps_every_whole_record_and_goes_on(
+    records: list[tuple[int, bytes]], data: st.DataObject
+) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "journal"
+        ends = _written(path, records)
+        cut = data.draw(st.integers(0, path.stat().st_size))
+        path.write_bytes(path.read_bytes()[:cut])
+        whole = [record for record, end in zip(records, ends, strict=True) if end <= cut]
+        assert _content(path) == whole
+        with Journal(path) as journal:
+            journal.append(7, b"after")
+        assert _content(path) == [*whole, (7, b"after")]
+        assert read_journal(path).notes == ()
+
+
+@settings(max_examples=60)
+@given(RECORDS, st.data())
+def test_a_flipped_bit_costs_its_own_record_and_no_other(records: list[tuple[int, bytes]], data: st.DataObject) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "journal"
+        ends = _written(path, records)
+        first = ends[0] - 12 - len(records[0][1])
+        at = data.draw(st.integers(first, ends[-1] - 1))
+        damaged = bytearray(path.read_bytes())
+        damaged[at] ^= 1 << data.draw(st.integers(0, 7))
+        path.write_bytes(damaged)
+        hit = next(index for index, end in enumerate(ends) if at < end)
+        kept = [record for index, record in enumerate(records) if index != hit]
+        # A payload that looks like a record, marker and checksum and all, is not made by this test.
+        assert _content(path) == kept
+        assert read_journal(path).notes
+
+
+def test_what_follows_damage_is_not_cut_off_when_the_journal_is_opened_again(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    ends = _written(path, [(1, b"first"), (1, b"second"), (1, b"third")])
+    damaged = bytearray(path.read_bytes())
+    damaged[ends[0] + 3] ^= 0xFF
+    path.write_bytes(damaged)
+    with Journal(path) as journal:
+        assert len(journal.recovered.records) == 2
+        journal.append(1, b"fourth")
+    assert [payload for _, payload in _content(path)] == [b"first", b"third", b"fourth"]
+
+
+def test_a_second_writer_is_kept_out(tmp_path: Path) -> None:
+    with Journal(tmp_path / "journal") as journal:
+        journal.append(1, b"kept")
+        with pytest.raises(UsageError, match="another session"):
+            Journal(tmp_path / "journal")
+    assert _content(tmp_path / "journal") == [(1, b"kept")]
+
+
+def test_a_file_that_is_no_journal_is_refused_and_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    path.write_bytes(b"time_s,force_n\n0,0\n")
+    with pytest.raises(FormatError, match="no journal"):
+        Journal(path)
+    assert path.read_bytes() == b"time_s,force_n\n0,0\n"
+
+
+def test_an_appended_file_does_not_overwrite(tmp_path: Path) -> None:
+    (tmp_path / "walk.csv").write_text("kept")
+    with pytest.raises(UsageError, match="is there already"):
+        AppendedFile(tmp_path / "walk.csv", new=True)
+    assert (tmp_path / "walk.csv").read_text() == "kept"
+
+
+FILL = """
+import sys
+from smartshoe.errors import InputError
+from smartshoe.files.journal import Journal
+journal = Journal(sys.argv[1])
+try:
+    for number in range(1000):
+        journal.append(1, number.to_bytes(4, "little") * 50)
+        print(number, flush=True)
+except InputError as error:
+    print(error, file=sys.stderr)
+    sys.exit(3)
+"""
+
+
+def test_a_full_disk_ends_with_one_sentence_and_every_acknowledged_record(tmp_path: Path) -> None:
+    path, room = tmp_path / "journal", 10_000
+    done = subprocess.run(
+        [sys.executable, "-c", FILL, str(path)],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, room)),
+    )
+    acknowledged = [int(line) for line in done.stdout.split()]
+    assert done.returncode == 3
+    assert "takes no more data" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert 40 < len(acknowledged) < 60
+    contents = read_journal(path)
+    assert [int.from_bytes(record.payload[:4], "little") for record in contents.records] == acknowledged
+    assert contents.torn_bytes == 0  # what did not fit was taken back
+
+
+def test_a_journal_that_cannot_be_read_says_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="does not exist"):
+        read_journal(tmp_path / "none")

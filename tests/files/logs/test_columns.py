@@ -1,0 +1,183 @@
+"""How a column becomes time, load or sensor: by the user's word, else by unit and name, never by a guess."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.files.logs import read, write
+from smartshoe.files.logs.columns import recording_from
+from smartshoe.files.logs.sheet import Column, Sheet
+from smartshoe.recording import Recording
+
+RAMP = np.array([0.0, 1.0, 2.0])
+
+
+def sheet(*titles: str, format_: str = "tdms", header: bool = True) -> Sheet:
+    columns = []
+    for title in titles:
+        name, _, unit = title.partition("|")
+        columns.append(Column(name, unit, RAMP.copy()))
+    return Sheet(Path("log.tdms"), format_, columns, has_header=header)
+
+
+def roles(recording) -> dict[str, str]:
+    return {channel.name: channel.role for channel in recording.channels.values()}
+
+
+def test_units_alone_tell_the_roles() -> None:
+    found = recording_from(sheet("Untitled|ms", "Cell|N", "Commanded load|N", "HDI|mbar", "T1|°C", "Travel|mm"))
+    assert found.time_s.tolist() == [0.0, 0.001, 0.002]
+    assert roles(found) == {
+        "force": "load", "command": "command", "pressure": "sensor", "T1": "auxiliary", "Travel": "auxiliary"
+    }  # fmt: skip
+
+
+def test_names_stay_where_the_file_tells_roles() -> None:
+    log = sheet("time|s", "cell|N", "port 3|mbar", format_="hdf5")
+    log.columns[1].role, log.columns[2].role = "load", "sensor"
+    assert roles(recording_from(log)) == {"cell": "load", "port 3": "sensor"}
+
+
+def test_two_loads_are_left_to_the_user() -> None:
+    found = recording_from(sheet("time|s", "Cell A|N", "Cell B|kN"))
+    with pytest.raises(MissingChannelError, match="--force"):
+        _ = found.load
+    chosen = recording_from(sheet("time|s", "Cell A|N", "Cell B|kN"), force="Cell B")
+    assert chosen.force_n.tolist() == [0.0, 1000.0, 2000.0]
+    assert roles(chosen) == {"Cell A": "auxiliary", "force": "load"}
+
+
+def test_a_voltage_is_no_load_beside_a_force() -> None:
+    found = recording_from(sheet("time|s", "force|V", "cell|N"))
+    assert (found.load.unit.symbol, found["force_other"].unit.symbol) == ("N", "V")
+
+
+@pytest.mark.parametrize("choice", ["Pin", "pin", "Pin[V]", "3", "3[V]"])
+def test_a_sensor_of_any_unit_by_name_or_number(choice: str) -> None:
+    found = recording_from(sheet("time|s", "Load|N", "Pin|V", "Other|mbar"), sensors=[choice])
+    assert (found.sensor.name, found.sensor.unit.symbol) == ("Pin", "V")
+    assert found["Other"].role == "auxiliary"
+
+
+def test_a_header_name_wins_over_a_number() -> None:
+    found = recording_from(sheet("time|s", "3|V", "Pin|V"), sensors=["3"])
+    assert found.sensor.name == "3"
+
+
+def test_the_unit_in_brackets_tells_namesakes_apart() -> None:
+    found = recording_from(sheet("time|s", "Force|V", "Force|N"), force="Force[N]")
+    assert found.load.unit.symbol == "N"
+    with pytest.raises(InputError, match="fits 2 columns"):
+        recording_from(sheet("time|s", "Force|V", "Force|N"), force="Force")
+
+
+def test_numbers_with_units_where_there_is_no_header() -> None:
+    bare = sheet("1", "2", "3", "4", header=False)
+    found = recording_from(bare, time="1[ms]", force="2[kN]", sensors=["3[V]", "4[mm]"])
+    assert roles(found) == {"force": "load", "sensor_3": "sensor", "sensor_4": "sensor"}
+    one = recording_from(bare, time="1[ms]", sensors=["4[mm]"])
+    assert one.sensor.name == "sensor"
+
+
+FAULTS = [
+    ({"time": "9[s]"}, MissingChannelError, "no column '9'.*from 1 to 4"),
+    ({"force": "Missing[N]"}, MissingChannelError, "no column 'Missing' for --force"),
+    ({"force": "bare"}, InputError, r"no unit.*'bare\[N\]'"),
+    ({"sensors": ["bare"]}, InputError, r"no unit.*'bare\[mbar\]'"),
+    ({"time": "bare"}, InputError, r"no unit.*'bare\[s\]'"),
+    ({"force": "Pin"}, UnitError, "is in V, which is no force"),
+    ({"time": "Load"}, UnitError, "is in N, which is no time"),
+    ({"force": "Load[kN]"}, UnitError, "is in N by the file"),
+    ({"force": "bare[furlong]"}, UnitError, "furlong"),
+    ({"force": "Load", "sensors": ["Load"]}, InputError, "chosen twice"),
+]
+
+
+@pytest.mark.parametrize(("choices", "error", "says"), FAULTS)
+def test_choices_that_do_not_fit(choices, error, says: str) -> None:
+    with pytest.raises(error, match=says) as caught:
+        recording_from(sheet("time|s", "Load|N", "Pin|V", "bare"), **choices)
+    assert caught.value.exit_status == 3
+    assert "log.tdms" in str(caught.value)
+
+
+def test_compression_logged_negative_is_turned_only_in_machine_logs() -> None:
+    for format_, sign in (("tdms", 1.0), ("labview", 1.0), ("bluehill", 1.0), ("plain", -1.0), ("hdf5", -1.0)):
+        log = sheet("time|s", "force|N", format_=format_)
+        log.columns[1].values = -RAMP
+        found = recording_from(log)
+        assert found.force_n.tolist() == (sign * RAMP).tolist()
+        assert bool(found.notes) == (sign > 0)
+        assert not np.signbit(found.force_n[0]) or sign < 0
+
+
+def test_a_doubled_first_row_is_dropped_in_bluehill_logs_only() -> None:
+    for format_ in ("bluehill", "tdms"):
+        log = sheet("time|s", "force|N", format_=format_)
+        log.columns[0].values = np.array([0.0, 0.0, 1.0])
+        if format_ == "bluehill":
+            assert recording_from(log).time_s.tolist() == [0.0, 1.0]
+        else:
+            with pytest.raises(InputError, match=r"sample 2: time repeats \(0 s, then 0 s\)"):
+                recording_from(log)
+
+
+def test_a_channel_without_samples() -> None:
+    log = sheet("time|s", "force|N", "spare|V")
+    log.columns[2].values = np.full(3, np.nan)
+    found = recording_from(log)
+    assert list(found.channels) == ["force"]
+    assert "spare" in found.notes[0]
+    with pytest.raises(InputError, match="every sample of column 'spare'"):
+        recording_from(log, sensors=["spare"])
+
+
+def test_rows_without_times_take_a_rate() -> None:
+    found = recording_from(sheet("row|", "Load|N", "Pin|V"), time="rows[50Hz]")
+    assert found.time_s.tolist() == [0.0, 0.02, 0.04]
+    assert "row" in found.channels
+    counted = sheet("row|", "Load|N", "Pin|V")
+    counted.columns[0].values = np.array([10.0, 12.0, 13.0])
+    assert recording_from(counted, time="row[0.05 kHz]").time_s == pytest.approx([0.2, 0.24, 0.26])
+    with pytest.raises(InputError, match="no rate above 0"):
+        recording_from(counted, time="row[0Hz]")
+
+
+def test_a_pressure_as_the_reference_is_the_force_on_a_square_centimetre() -> None:
+    found = recording_from(sheet("time|s", "chamber|bar", "taxel|counts"), force="chamber", sensors=["taxel"])
+    assert found.load.values.tolist() == RAMP.tolist()  # as logged
+    assert found.force_n == pytest.approx(10.0 * RAMP)
+    assert "1 cm²" in found.notes[-1]
+
+
+def test_a_choice_that_the_other_log_of_a_pair_holds_is_passed_over() -> None:
+    choices = {"time": "row[50Hz]", "force": "chamber", "sensors": ["taxel"]}
+    machine = recording_from(sheet("row|", "chamber|bar"), partly=True, **choices)
+    logger = recording_from(sheet("time|s", "taxel|counts"), partly=True, **choices)
+    assert len(machine.of_role("load")) == 1
+    assert not machine.sensors
+    assert len(logger.sensors) == 1
+    assert not logger.of_role("load")
+
+
+@pytest.mark.parametrize("ending", ["csv", "mat", "h5", "tdms", "lvm"])
+def test_a_file_whose_time_is_not_taken_is_written_with_the_time_that_was(ending: str, tmp_path: Path) -> None:
+    count = 50
+    table = ["time_s,force_n,pressure_mbar"] + [f"{0.5 * k!r},{float(k)!r},{2.0 * k!r}" for k in range(count)]
+    (tmp_path / "dyn.csv").write_text("\n".join(table) + "\n")
+    taken = read(tmp_path / "dyn.csv", time="rows[49Hz]")
+    write(taken, tmp_path / f"o.{ending}")
+    again = read(tmp_path / f"o.{ending}")
+    np.testing.assert_array_equal(again.time_s, np.arange(count) / 49.0)
+    np.testing.assert_array_equal(again.force_n, taken.force_n)
+    np.testing.assert_array_equal(again["time_other"].values, 0.5 * np.arange(count))
+
+
+def test_two_columns_of_one_name_are_refused_before_one_is_lost() -> None:
+    channel = Recording.from_arrays(time_s=RAMP, force_n=RAMP)["force"]
+    with pytest.raises(InputError, match="time_s"):
+        Recording(RAMP, {"time": channel})
+    with pytest.raises(InputError, match="two columns force_n"):
+        Recording(RAMP, {"force": channel, "same": channel})

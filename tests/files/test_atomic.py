@@ -1,0 +1,151 @@
+"""Files are written whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from smartshoe.errors import UsageError
+from smartshoe.files.atomic import make_folder, replacing, write_text
+
+
+def test_a_failure_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
+    target = tmp_path / "result.json"
+    write_text(target, "old")
+
+    def fail_half_way() -> None:
+        with replacing(target) as temporary:
+            temporary.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail_half_way()
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_places_that_cannot_be_written_are_refused_in_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is a directory"):
+        write_text(tmp_path, "x")
+    with pytest.raises(UsageError, match="cannot be written"):
+        write_text(tmp_path / "missing" / "x.json", "x")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="--out"):
+        make_folder(tmp_path / "file" / "below")
+
+
+@pytest.mark.parametrize("device", ["/dev/null", "/dev/zero"])
+def test_a_device_is_written_to_and_never_replaced(device: str) -> None:
+    before = Path(device).stat()
+    write_text(device, "x")
+    after = Path(device).stat()
+    assert stat.S_ISCHR(after.st_mode)
+    assert (after.st_ino, after.st_rdev, after.st_mode) == (before.st_ino, before.st_rdev, before.st_mode)
+
+
+@pytest.mark.parametrize("name", ["/dev/stdout", "/dev/fd/1", "link"])
+def test_standard_output_by_its_name_is_appended_to(name: str, tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("/dev/stdout")
+    code = (
+        f"from smartshoe.files.atomic import write_text; print('one'); write_text({name!r}, 'two\\n'); print('three')"
+    )
+    with (tmp_path / "out.txt").open("w") as out:
+        subprocess.run([sys.executable, "-c", code], stdout=out, check=True, cwd=tmp_path)
+    assert (tmp_path / "out.txt").read_text() == "one\ntwo\nthree\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "out.txt"]
+
+
+def test_a_pipe_gets_the_whole_text_and_without_a_reader_a_refusal(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(UsageError, match="cannot be written"):
+        write_text(pipe, "x")
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_text(pipe, "whole")
+    assert os.read(reader, 100) == b"whole"
+    os.close(reader)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+def test_a_link_stays_and_the_file_that_it_leads_to_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    target, link = tmp_path / "far" / "result.json", tmp_path / "result.json"
+    target.write_text("old")
+    link.symlink_to(Path("far") / "result.json")
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+    assert [path.name for path in target.parent.iterdir()] == ["result.json"]
+
+
+def test_a_link_in_a_circle_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises(UsageError, match="leads to itself"):
+        write_text(tmp_path / "a", "x")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may lay another's link")
+def test_a_strangers_link_in_a_folder_of_everybody_is_not_followed(tmp_path: Path) -> None:
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o1777)
+    (tmp_path / "mine").write_text("old")
+    (shared / "result.json").symlink_to(tmp_path / "mine")
+    os.lchown(shared / "result.json", 12345, 12345)
+    with pytest.raises(UsageError, match="somebody else"):
+        write_text(shared / "result.json", "new")
+    assert (tmp_path / "mine").read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["n" * 250 + ".csv", "m" * 300 + ".csv", "a\0b"])
+def test_a_name_is_written_or_refused_in_one_sentence(name: str, tmp_path: Path) -> None:
+    if len(name) < 255 and "\0" not in name:
+        write_text(tmp_path / name, "x")
+        assert (tmp_path / name).read_text() == "x"
+        return
+    with pytest.raises(UsageError, match="cannot be written"):
+        write_text(tmp_path / name, "x")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "x.json").write_text("old")
+
+    def fill_the_disk() -> None:
+        with replacing(tmp_path / "x.json") as temporary:
+            temporary.write_text("half")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(UsageError, match="free some space"):
+        fill_the_disk()
+    assert (tmp_path / "x.json").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.json"]
+
+
+def test_the_content_reaches_the_disk_before_its_name_and_the_name_before_the_return(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pulled plug keeps what was synced: the content, then the rename, then the folder, in this order."""
+    target, steps = tmp_path / "x.json", []
+    fsync, rename = os.fsync, Path.replace
+
+    def synced(handle: int) -> None:
+        of_folder = stat.S_ISDIR(os.fstat(handle).st_mode)
+        steps.append("folder" if of_folder else os.pread(handle, 100, 0).decode())
+        fsync(handle)
+
+    def renamed(self: Path, to: Path) -> Path:
+        steps.append("rename")
+        return rename(self, to)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(Path, "replace", renamed)
+    write_text(target, "whole")
+    assert steps == ["whole", "rename", "folder"]

@@ -1,0 +1,79 @@
+"""Input that a laboratory brings on a bad day: one sentence each, and no fault where a sensor is merely another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import diagnose
+from smartshoe.integrity import examine
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+TIME_S = np.arange(0.0, 60.0, 0.01)
+TRIANGLE = np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0)
+LOAD_N = 800.0 * TRIANGLE + 0.3 * np.random.default_rng(0).standard_normal(TIME_S.size)
+READING = 100.0 * TRIANGLE + 0.05 * np.random.default_rng(1).standard_normal(TIME_S.size)
+
+
+def _recording(**columns: Array) -> Recording:
+    return Recording.from_arrays(time_s=TIME_S, **columns)
+
+
+def test_a_load_that_is_only_commanded_is_no_reference() -> None:
+    found = examine([_recording(command_n=LOAD_N, pressure_mbar=READING)])
+    assert "command is what was asked for, not what was measured" in found.refusals[0]
+
+
+def test_a_load_that_is_negative_in_compression_is_told_as_such() -> None:
+    found = examine([_recording(force_n=-LOAD_N, pressure_mbar=READING)])
+    assert [fault.kind for fault in found.faults] == ["wrong_sign"]
+    assert "the load is negative in compression" in found.faults[0].says
+    diagnosed = diagnose(_recording(force_n=-LOAD_N, pressure_mbar=READING))
+    assert diagnosed.verdict == "refused"
+    assert "turn its sign" in diagnosed.limits[0]
+
+
+def test_a_pressure_that_falls_under_a_positive_load_is_no_negative_load() -> None:
+    found = examine([_recording(force_n=LOAD_N, pressure_mbar=-READING)])
+    assert [fault.kind for fault in found.faults] == ["wrong_sign"]
+    assert "the pressure falls as the load rises" in found.faults[0].says
+
+
+@pytest.mark.parametrize(("load", "reading"), [(1.0, 0.0), (0.0, 1.0)], ids=["reading", "load"])
+def test_a_channel_that_is_constant_is_refused(load: float, reading: float) -> None:
+    found = examine([_recording(force_n=40.0 + load * LOAD_N, pressure_mbar=3.0 + reading * READING)])
+    assert [fault.kind for fault in found.faults] == ["does_not_follow_load"]
+    assert ("the reading is constant" if load else "the load covers 0 N only") in found.refusals[0]
+
+
+def test_thousands_of_short_recordings_are_refused_each_and_a_long_one_among_them_stays() -> None:
+    whole = _recording(force_n=LOAD_N, pressure_mbar=READING)
+    found = examine([*(whole.taken(slice(k, k + 60)) for k in range(2000)), whole])
+    assert found.refusals == ()
+    assert {fault.kind for fault in found.faults} == {"short_recording"}
+    assert len(found.faults) == 2000
+    assert found.usable[-1].all()
+
+
+def test_one_cycle_is_enough_for_integrity() -> None:
+    found = examine([_recording(force_n=LOAD_N, pressure_mbar=READING).between(3.0, 9.0)])
+    assert (found.faults, found.refusals) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("name", "reading"),
+    [
+        ("pressure_ohm", 900.0 / (1.0 + 9.0 * TRIANGLE)),
+        ("pressure_mm", 20.0 + 5.0 * TRIANGLE + 0.1 * TIME_S),
+        ("pressure_mbar", 300.0 + READING),
+        ("pressure_mbar", READING + 40.0 * np.exp(-TIME_S / 30.0)),
+    ],
+    ids=["falls with load", "never returns", "far from zero", "starts loaded"],
+)
+def test_a_sensor_that_is_merely_another_has_no_fault(name: str, reading: Array) -> None:
+    noise = 5e-4 * np.ptp(reading) * np.random.default_rng(2).standard_normal(TIME_S.size)
+    found = examine([_recording(force_n=LOAD_N, **{name: reading + noise})])
+    assert (found.faults, found.refusals) == ((), ())

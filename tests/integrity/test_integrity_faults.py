@@ -1,0 +1,293 @@
+"""Each fault of the data, hidden in a simulated unit's recording at a drawn strength, is found, named and masked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from test_integrity_clean import simulated
+
+from smartshoe.integrity import Integrity, examine
+from smartshoe.integrity.lines import aliases
+from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
+from smartshoe.recording import Channel, Recording
+
+Array = NDArray[np.float64]
+
+PROTOCOLS = st.sampled_from([static_protocol((100.0, 500.0, 800.0)), dynamic_protocol()])
+SEEDS = st.integers(0, 999)
+NOISES_PERCENT = st.sampled_from([0.05, 0.1, 0.3])
+RECALL, FALSELY_MASKED = 0.95, 0.005
+STEP_MBAR = 0.03  # of the simulated converter
+
+
+def recorded(protocol: Protocol, seed: int, noise_percent: float = 0.05) -> Recording:
+    """A left toe: 100 mbar over its range, so that a per cent is a millibar."""
+    return simulated(protocol, seed, sensor={"noise_percent": noise_percent})
+
+
+def with_reading(recording: Recording, reading: Array) -> Recording:
+    sensor = recording.sensor
+    return recording.with_channel(Channel.from_values(sensor.name, reading, sensor.unit, sensor.role))
+
+
+def on_lattice(reading: Array) -> Array:
+    return np.asarray(np.rint(reading / STEP_MBAR) * STEP_MBAR)
+
+
+def kinds(found: Integrity) -> set[str]:
+    return {fault.kind for fault in found.faults}
+
+
+def recall_and_false(found: Integrity, bad: NDArray[np.bool_], touched: NDArray[np.bool_]) -> tuple[float, float]:
+    """Share of ``bad`` samples that are masked (1 where one is missed), and of samples that were not ``touched``."""
+    masked = ~found.usable[0]
+    missed = int((~masked[bad]).sum())
+    # One sample missed of a handful says nothing of a share.
+    return 1.0 if missed <= 1 else 1.0 - missed / int(bad.sum()), float(masked[~touched].mean())
+
+
+@settings(max_examples=12)
+@given(PROTOCOLS, SEEDS, NOISES_PERCENT, st.floats(16.0, 300.0), st.floats(-3.3, -2.0))
+def test_spikes(protocol, seed, noise_percent, deviations, share_exponent):
+    rng = np.random.default_rng(seed)
+    recording = recorded(protocol, seed, noise_percent)
+    at = rng.choice(len(recording), max(3, int(len(recording) * 10**share_exponent)), replace=False)
+    reading = recording.sensor.values.copy()
+    reading[at] += rng.choice([-1.0, 1.0], at.size) * rng.uniform(1.0, 2.0, at.size) * deviations * noise_percent
+    found = examine([with_reading(recording, reading)])
+    bad = np.zeros(reading.size, dtype=bool)
+    bad[at] = True
+    recall, false = recall_and_false(found, bad, bad)
+    assert kinds(found) == {"spikes"}
+    assert recall >= RECALL
+    assert false < FALSELY_MASKED
+
+
+@settings(max_examples=8)
+@given(PROTOCOLS, SEEDS, st.floats(40.0, 300.0))
+def test_spikes_of_the_reference_load(protocol, seed, size_n):
+    rng = np.random.default_rng(seed)
+    recording = recorded(protocol, seed)
+    at = rng.choice(len(recording), 15, replace=False)
+    load = recording.load.values.copy()
+    load[at] += rng.choice([-1.0, 1.0], 15) * size_n
+    found = examine([recording.with_channel(replace(recording.load, values=load))])
+    bad = np.zeros(load.size, dtype=bool)
+    bad[at] = True
+    recall, false = recall_and_false(found, bad, bad)
+    assert kinds(found) == {"spikes"}
+    assert "reference load" in found.faults[0].says
+    assert recall >= RECALL
+    assert false < FALSELY_MASKED
+
+
+@settings(max_examples=12)
+@given(PROTOCOLS, SEEDS, NOISES_PERCENT, st.integers(10, 100), st.floats(0.01, 0.1))
+def test_held_samples(protocol, seed, noise_percent, length, share):
+    rng = np.random.default_rng(seed)
+    recording = recorded(protocol, seed, noise_percent)
+    reading = recording.sensor.values.copy()
+    touched = np.zeros(reading.size, dtype=bool)
+    for start in rng.integers(1, reading.size - length - 1, max(3, int(share * reading.size / length))):
+        reading[start : start + length] = reading[start - 1]
+        touched[start : start + length] = True
+    bad = np.abs(reading - recording.sensor.values) > 8.0 * noise_percent + 8.0 * STEP_MBAR
+    found = examine([with_reading(recording, reading)])
+    assert "held_samples" in kinds(found)
+    if bad.any():
+        recall, false = recall_and_false(found, bad, touched)
+        assert recall >= RECALL
+        assert false < FALSELY_MASKED
+
+
+@settings(max_examples=12)
+@given(
+    PROTOCOLS,
+    SEEDS,
+    NOISES_PERCENT,
+    st.integers(3, 200),
+    st.floats(0.005, 0.05),
+    st.sampled_from(["rail", "rest", "0"]),
+)
+def test_dropouts(protocol, seed, noise_percent, length, share, level):
+    rng = np.random.default_rng(seed)
+    recording = recorded(protocol, seed, noise_percent)
+    reading = recording.sensor.values.copy()
+    value = {"rail": -12.5, "rest": float(np.median(reading[:30])), "0": 0.0}[level]
+    touched = np.zeros(reading.size, dtype=bool)
+    for start in rng.integers(1, reading.size - length - 1, max(3, int(share * reading.size / length))):
+        reading[start : start + length] = value
+        touched[start : start + length] = True
+    loaded = recording.sensor.values > 8.0 + 30.0 * noise_percent  # below, a dropout is rest
+    bad = touched & loaded
+    if bad.sum() < 3:
+        return
+    found = examine([with_reading(recording, reading)])
+    recall, false = recall_and_false(found, bad, touched)
+    assert "dropouts" in kinds(found)
+    assert recall >= RECALL
+    assert false < FALSELY_MASKED
+
+
+@settings(max_examples=8)
+@given(PROTOCOLS, SEEDS, st.floats(0.5, 5.0))
+def test_a_coarse_lattice_is_a_fault(protocol, seed, step_percent):
+    recording = recorded(protocol, seed)
+    step = 0.84 * step_percent  # the unit reaches 84 mbar
+    found = examine([with_reading(recording, np.rint(recording.sensor.values / step) * step)])
+    assert kinds(found) == {"quantisation"}
+    said = float(found.faults[0].says.split(" of ")[1].split(" mbar")[0])
+    assert said == pytest.approx(step, rel=1e-3)
+    assert found.usable[0].all()
+
+
+def test_a_lattice_that_noise_dithers_is_none():
+    recording = recorded(dynamic_protocol(), 5, 0.3)
+    step = 0.024  # 12 bits over 100 mbar
+    assert examine([with_reading(recording, np.rint(recording.sensor.values / step) * step)]).faults == ()
+
+
+@settings(max_examples=8)
+@given(PROTOCOLS, SEEDS, st.floats(0.04, 0.5))
+def test_saturation(protocol, seed, cut):
+    recording = recorded(protocol, seed)
+    reading = recording.sensor.values
+    top = float((1.0 - cut) * reading.max())
+    found = examine([with_reading(recording, np.minimum(reading, top))])
+    assert kinds(found) == {"saturation"}
+    recall, false = recall_and_false(found, reading > top, reading >= top)
+    assert recall >= RECALL
+    assert false < FALSELY_MASKED
+
+
+@settings(max_examples=8)
+@given(PROTOCOLS, SEEDS, st.floats(4.0, 10.0))
+def test_a_rail_below_which_the_sensor_does_not_go(protocol, seed, rail_mbar):
+    recording = recorded(protocol, seed)
+    reading = recording.sensor.values
+    found = examine([with_reading(recording, np.maximum(reading, rail_mbar))])
+    assert kinds(found) == {"low_rail"}
+    on = (reading < rail_mbar) & (recording.load.values > 20.0)
+    assert recall_and_false(found, on, reading <= rail_mbar)[0] >= RECALL
+
+
+@settings(max_examples=12)
+@given(
+    PROTOCOLS,
+    SEEDS,
+    st.floats(0.03, 2.0),
+    st.one_of(st.sampled_from([50.0, 60.0, 150.0]), st.floats(3.0, 47.0)),
+    st.floats(0.5, 2.5),
+)
+def test_hum_at_any_frequency_also_folded(protocol, seed, amplitude_mbar, frequency_hz, phase):
+    recording = recorded(protocol, seed)
+    hum = amplitude_mbar * np.sin(2 * np.pi * frequency_hz * recording.time_s + phase)
+    found = examine([with_reading(recording, on_lattice(recording.sensor.values + hum))])
+    assert kinds(found) == {"hum"}
+    folded = abs(frequency_hz - 100.0 * np.rint(frequency_hz / 100.0))
+    said = float(found.faults[0].says.split(" at ")[1].split(" Hz")[0])
+    assert said == pytest.approx(folded, abs=0.05)
+
+
+def test_names_the_mains_frequency_that_a_line_may_be():
+    assert aliases(50.0, 100.0, 100.0)[0] == "50 Hz mains"
+    assert aliases(40.0, 100.0, 100.0)[0] == "60 Hz mains"
+    assert aliases(7.0, 100.0, 100.0) == []
+
+
+@settings(max_examples=8)
+@given(SEEDS, st.floats(0.25, 2.0), st.sampled_from([-1.0, 1.0]), st.floats(-0.002, 0.002))
+def test_two_clocks(seed, size_s, sign, rate):
+    recording = recorded(dynamic_protocol(), seed)
+    lag_s = sign * size_s
+    t = recording.time_s
+    middle = 0.5 * (t[0] + t[-1])
+    late = np.interp(t - lag_s - rate * (t - middle), t, recording.sensor.values)
+    found = examine([with_reading(recording, on_lattice(late)).between(3.0, float(t[-1]) - 3.0)])
+    assert "two_clocks" in kinds(found)
+    assert found.clock_offset_s[0] == pytest.approx(lag_s, abs=0.12)
+
+
+def test_a_lag_of_a_sample_or_two_is_left_to_the_model():
+    recording = recorded(dynamic_protocol(), 1)
+    late = np.concatenate([recording.sensor.values[:2], recording.sensor.values[:-2]])
+    assert examine([with_reading(recording, late)]).faults == ()
+
+
+def test_wrong_sign_and_the_sign_of_what_is_no_pressure():
+    recording = recorded(dynamic_protocol(), 1)
+    assert kinds(examine([with_reading(recording, -recording.sensor.values)])) == {"wrong_sign"}
+    counts = Recording.from_arrays(
+        time_s=recording.time_s, force_n=recording.force_n, toe_counts=250.0 - recording.sensor.values
+    )
+    assert kinds(examine([counts])) == set()
+
+
+@pytest.mark.parametrize("what", ["constant", "noise", "load at rest"])
+def test_a_reading_that_does_not_follow_is_refused(what):
+    recording = recorded(dynamic_protocol(), 1)
+    noise = np.random.default_rng(0).standard_normal(len(recording))
+    if what == "load at rest":
+        recording = recording.with_channel(replace(recording.load, values=0.3 * noise))
+    else:
+        recording = with_reading(recording, 12.0 + (noise if what == "noise" else 0.0 * noise))
+    found = examine([recording])
+    assert kinds(found) == {"does_not_follow_load"}
+    assert len(found.refusals) == 1
+    assert not found.usable[0].any()
+
+
+def test_refusals_need_every_recording_to_fail():
+    good = recorded(dynamic_protocol(), 1)
+    found = examine([good, good.taken(slice(0, 40)), good.without("force")])
+    assert found.refusals == ()
+    assert [fault.kind for fault in found.faults] == ["short_recording", "no_reference"]
+    assert [fault.recording for fault in found.faults] == [1, 2]
+    assert [mask.any() for mask in found.usable] == [True, False, False]
+    assert "--force" in examine([good.without("force")]).refusals[0]
+
+
+def test_missing_samples_gaps_and_uneven_steps():
+    recording = recorded(dynamic_protocol(), 1)
+    reading = recording.sensor.values.copy()
+    reading[1000:1040] = np.nan
+    found = examine([with_reading(recording, reading)])
+    assert kinds(found) == {"missing_samples"}
+    assert np.flatnonzero(~found.usable[0]).tolist() == list(range(1000, 1040))
+    fault = found.faults[0]
+    assert (fault.start_s, fault.stop_s) == pytest.approx((10.0, 10.39))
+
+    kept = np.ones(len(recording), dtype=bool)
+    kept[3000:3050] = False
+    found = examine([recording.taken(kept)])
+    assert kinds(found) == {"gaps"}
+    assert found.usable[0].all()
+
+    moved = recording.time_s + 0.004 * np.random.default_rng(0).uniform(-1, 1, len(recording))
+    load, pressure = (np.interp(moved, recording.time_s, c.values) for c in (recording.load, recording.sensor))
+    found = examine([Recording.from_arrays(time_s=moved, force_n=load, pressure_mbar=on_lattice(pressure))])
+    assert kinds(found) == {"uneven_sampling"}
+
+
+def test_mostly_dropped_out_is_refused():
+    recording = recorded(dynamic_protocol(), 1)
+    reading = np.where(np.random.default_rng(0).random(len(recording)) < 0.7, np.nan, recording.sensor.values)
+    found = examine([with_reading(recording, reading)])
+    assert len(found.refusals) == 1
+    assert not found.usable[0].any()
+
+
+def test_a_fault_as_the_contract_writes_it():
+    recording = recorded(dynamic_protocol(), 1)
+    reading = recording.sensor.values.copy()
+    reading[4000] += 20.0
+    written = examine([with_reading(recording, reading)]).faults[0].to_dict()
+    assert set(written) == {"kind", "where", "share", "says"}
+    assert written["kind"] == "spikes"
+    assert written["where"].endswith(", 40-40 s")
+    assert written["share"] == pytest.approx(1 / len(recording))

@@ -1,0 +1,168 @@
+"""Each fault of a pressing is seen while the unit lies there, named, and asks for a bounded number of repeats."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bench_sessions import SHORT, bench_plan
+
+from smartshoe.devices import open_shoe
+from smartshoe.devices.base import Shoe
+from smartshoe.errors import InputError, RefusedError
+from smartshoe.files.logs import write
+from smartshoe.protocol import dynamic_protocol
+from smartshoe.recording import Channel, Recording
+from smartshoe.runs.session import SessionFolder, Unattended, conduct, machine_run
+from smartshoe.runs.session.checks import AT_THE_END, Pressing, PressingFault, first_fault
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> Pressing:
+    with SessionFolder.begin(tmp_path_factory.mktemp("pressed"), bench_plan()) as folder:
+        conduct(folder)
+        attempt = folder.attempts()[0]
+        return Pressing("left_toe", SHORT, attempt.stream(), attempt.load())
+
+
+def _changed(evidence: Pressing, change: Callable[[Channel], np.ndarray]) -> Pressing:
+    channel = evidence.reading
+    made = replace(channel, values=change(channel))
+    return replace(evidence, stream=evidence.stream.with_channel(made))
+
+
+def _kind(evidence: Pressing) -> str | None:
+    found = first_fault(AT_THE_END, evidence)
+    return None if found is None else found.kind
+
+
+def test_a_good_pressing_has_no_fault(pressed: Pressing) -> None:
+    assert _kind(pressed) is None
+
+
+def test_a_reading_at_the_end_of_its_range_is_saturation(pressed: Pressing) -> None:
+    assert pressed.reading.range_ is not None
+    high = pressed.reading.range_[1]
+    assert _kind(_changed(pressed, lambda c: np.minimum(c.values * 1.3, high))) == "saturation"
+    assert _kind(_changed(pressed, lambda c: np.minimum(c.values * 1.1, high))) is None
+
+
+def test_the_unit_that_is_really_pressed_is_named(pressed: Pressing) -> None:
+    found = first_fault(AT_THE_END, replace(pressed, unit="left_heel"))
+    assert found is not None
+    assert found.kind == "wrong_unit"
+    assert "left_toe is pressed, not left_heel" in found.says
+    assert _kind(replace(pressed, unit="left_heel", load=None)) == "wrong_unit"
+
+
+def test_a_unit_that_reads_nothing_has_no_contact(pressed: Pressing) -> None:
+    rng = np.random.default_rng(1)
+    assert _kind(_changed(pressed, lambda c: rng.normal(0.0, 0.05, c.values.size))) in ("no_contact", "wrong_unit")
+    assert _kind(replace(_changed(pressed, lambda c: 0.001 * c.values), load=None)) == "no_contact"
+
+
+def test_another_tests_log_is_not_taken(pressed: Pressing) -> None:
+    load = pressed.load
+    assert load is not None
+    half = load.with_channel(replace(load.load, values=0.5 * load.load.values))
+    assert _kind(replace(pressed, load=half)) == "other_test"
+    rng = np.random.default_rng(2)
+    steps = 400.0 + np.cumsum(rng.normal(0.0, 20.0, len(load)))
+    other = load.with_channel(replace(load.load, values=np.clip(steps, 0.0, 800.0) / max(steps.max(), 800.0) * 800.0))
+    assert _kind(replace(pressed, load=other)) == "other_test"
+
+
+def test_a_test_that_was_stopped_early_has_too_few_repeats(pressed: Pressing) -> None:
+    load = pressed.load
+    assert load is not None
+    assert _kind(replace(pressed, load=load.between(0.0, 12.0))) == "too_few_repeats"
+
+
+def test_a_stream_that_misses_a_part_of_the_test_is_seen(pressed: Pressing) -> None:
+    stream = pressed.stream
+    late = stream.between(stream.time_s[0] + 6.0, stream.time_s[-1])
+    assert _kind(replace(pressed, stream=late)) == "stream_too_short"
+
+
+def test_a_connection_that_was_lost_for_a_second_is_seen_and_single_samples_are_not(pressed: Pressing) -> None:
+    stream = pressed.stream
+    rng = np.random.default_rng(4)
+    assert _kind(replace(pressed, stream=stream.taken(rng.random(len(stream)) > 0.05))) is None
+    hole = (stream.time_s > stream.time_s[0] + 6.0) & (stream.time_s < stream.time_s[0] + 7.0)
+    assert _kind(replace(pressed, stream=stream.taken(~hole))) == "stream_too_short"
+
+
+def test_a_zero_that_moves_is_told_and_may_be_accepted(pressed: Pressing) -> None:
+    # Five millibar over the session, of a span of 87.
+    found = first_fault(AT_THE_END, _changed(pressed, lambda c: c.values + np.linspace(0.0, 5.0, c.values.size)))
+    assert found is not None
+    assert (found.kind, found.grave) == ("zero_drift", False)
+
+
+class _Counting(Unattended):
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, int]] = []
+
+    def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
+        self.asked.append((finding.kind, repeats_left))
+        return super().wants_repeat(finding, repeats_left)
+
+
+def test_a_fault_that_stays_ends_the_session_after_the_last_repeat(tmp_path: Path) -> None:
+    small = "sim:stand"  # 800 N are 85 % of the range: 1000 N are beyond it
+    heavy = replace(dynamic_protocol((800.0,), peak_n=1000.0, rest_s=1.0), name="heavy")
+    operator = _Counting()
+    with SessionFolder.begin(tmp_path, bench_plan(shoe=small, protocols=(heavy,), largest_repeats=1)) as folder:
+        with pytest.raises(RefusedError, match="pressed 2 times: left_toe reads the end of its range"):
+            conduct(folder, operator)
+        assert [attempt.state for attempt in folder.attempts()] == ["rejected", "rejected"]
+    assert operator.asked == [("saturation", 1), ("saturation", 0)]
+
+
+def test_the_wrong_unit_under_the_anvil_is_pressed_again_once_it_is_put_right(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = machine_run.machine_at
+
+    def misplaced(url: str, shoe: Shoe, unit: str) -> machine_run.MachineSide:
+        return real(url, shoe, "left_heel")
+
+    monkeypatch.setattr("smartshoe.runs.session.procedure.machine_at", misplaced)
+
+    class PutsItRight(_Counting):
+        def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
+            bench = shoes[0].bench  # type: ignore[attr-defined]
+            bench.unit = "left_toe"
+            return super().wants_repeat(finding, repeats_left)
+
+    shoes: list[Shoe] = []
+
+    def keeps(url: str) -> Shoe:
+        shoes.append(open_shoe(url))
+        return shoes[0]
+
+    monkeypatch.setattr("smartshoe.runs.session.procedure.open_shoe", keeps)
+    operator = PutsItRight()
+    with SessionFolder.begin(tmp_path, bench_plan()) as folder:
+        conduct(folder, operator)
+        assert [attempt.state for attempt in folder.attempts()] == ["rejected", "accepted"]
+    assert operator.asked == [("wrong_unit", 2)]
+
+
+def test_a_recording_with_another_tests_log_is_refused_as_input(tmp_path: Path, pressed: Pressing) -> None:
+    load = pressed.load
+    assert load is not None
+    write(pressed.stream, tmp_path / "stream.csv")
+    rng = np.random.default_rng(3)
+    shuffled = Recording.from_arrays(
+        time_s=load.time_s, force_n=np.abs(800.0 * np.sin(np.cumsum(rng.normal(0.0, 0.05, len(load)))))
+    )
+    write(shuffled, tmp_path / "log.csv")
+    plan = bench_plan(shoe=f"replay:{tmp_path / 'stream.csv'}", machine=f"log:{tmp_path / 'log.csv'}")
+    os.utime(tmp_path / "log.csv", (1.0, 1.0))
+    with SessionFolder.begin(tmp_path / "session", plan) as folder, pytest.raises(InputError, match="log of this test"):
+        conduct(folder)
