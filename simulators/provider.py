@@ -30,16 +30,16 @@ class Provider:
     ) -> SimulatedInstron:
         """A machine (closed, to be used in a with block) for ``target`` 'instron'.
 
-        ``options`` are `simulators.benches.options.MachineOptions`; what they leave out comes from the preset of their
-        ``unit`` (default left_toe). ``bladder = {twin = "unit.json"}`` presses the unit's own calibration instead
-        (`simulators.instruments.twin`). Raises `pydantic.ValidationError` on wrong options, `UsageError` on a wrong
-        target, `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
+        ``options`` are `simulators.benches.machine_options.MachineOptions`; what they leave out comes from the preset
+        of their ``unit`` (default left_toe). ``bladder = {twin = "unit.json"}`` presses the unit's own calibration
+        instead (`simulators.instruments.twin`). Raises `pydantic.ValidationError` on wrong options, `UsageError` on
+        a wrong target, `InputError` where the twin's file is no calibration. Without ``rng`` the seed is 0.
         """
         _require(target, MACHINES, "machine")
         import numpy as np
 
         from simulators.benches.instron import SimulatedInstron
-        from simulators.benches.options import MachineOptions, TwinMachineOptions
+        from simulators.benches.machine_options import MachineOptions, TwinMachineOptions
         from simulators.instruments.options import is_twin, with_preset
         from simulators.instruments.sensing_unit import SensingUnit
         from simulators.instruments.sensor import SimulatedHdiSensor
@@ -67,13 +67,13 @@ class Provider:
     ) -> SimulatedShoe:
         """A shoe (closed, to be used in a with block) for ``target`` 'walk', 'stand', 'run' or 'tiptoe'.
 
-        ``options`` are `simulators.benches.options.ShoeOptions`; raises as `open_machine` does.
+        ``options`` are `simulators.benches.shoe_options.ShoeOptions`; raises as `open_machine` does.
         """
         _require(target, SHOES, "shoe")
         import numpy as np
 
-        from simulators.benches.options import ShoeOptions
         from simulators.benches.shoe import SimulatedShoe
+        from simulators.benches.shoe_options import ShoeOptions
         from simulators.instruments.options import with_preset
         from simulators.instruments.sensing_unit import SensingUnit
         from simulators.instruments.sensor import SimulatedHdiSensor
@@ -105,7 +105,8 @@ class Provider:
     def options_schema(self, kind: str) -> dict[str, Any]:
         """JSON schema of the options of ``kind`` 'machine' or 'shoe'."""
         _require(kind, ("machine", "shoe"), "kind of device")
-        from simulators.benches.options import MachineOptions, ShoeOptions
+        from simulators.benches.machine_options import MachineOptions
+        from simulators.benches.shoe_options import ShoeOptions
 
         return (MachineOptions if kind == "machine" else ShoeOptions).model_json_schema()
 

@@ -30,6 +30,8 @@ class Room:
 
     def warmer_k(self, time_s: Array) -> Array:
         """Temperature (n,) above the start."""
+        if not (self.drift_k_per_s or self.warming_k or self.swing_k):
+            return np.zeros(time_s.size)
         swing = self.swing_k * np.sin(2.0 * np.pi * time_s / self.swing_period_s)
         settled = -self.warming_k * np.expm1(-time_s / self.warming_time_constant_s)
         return np.asarray(self.drift_k_per_s * time_s + settled + swing)

@@ -17,6 +17,7 @@ from smartshoe.identification.consistency import ConsistencyTest, consistency_te
 from smartshoe.identification.estimator import ParameterFit
 from smartshoe.identification.experiment import Array, Direction
 from smartshoe.identification.residual_tests import ResidualTest, residual_tests
+from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models import Parameter, StandardLinearSolid, discretise
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Recording
@@ -168,7 +169,7 @@ class Identification(Summarised):
             for experiment, kept in zip(problem.experiments, problem.kept, strict=True)
         }
 
-    @property
+    @cached_property
     def fit_percent_by_recording(self) -> Mapping[str, float]:
         """``fit_percent`` of each recording."""
         problem = self.fit.problem
@@ -311,6 +312,7 @@ class Identification(Summarised):
         }
 
 
+@on_one_thread
 def fit_percent(y: Array, error: Array) -> float:
     """100 (1 - ||error||/||y - mean y||), as MATLAB's compare has it."""
     spread = float(np.linalg.norm(y - y.mean())) if y.size else 0.0

@@ -34,6 +34,7 @@ class TrialSection:
     notes: list[str]
     charts: list[Chart]
     page: str
+    columns: tuple[str, ...] = COLUMNS
 
 
 def section(

@@ -53,17 +53,19 @@ def turning_points(load_n: Array, threshold_n: float) -> list[int]:
     points = [0]
     low = high = 0
     direction = 0
-    for k in range(1, load_n.size):
-        if load_n[k] > load_n[high]:
-            high = k
-        if load_n[k] < load_n[low]:
-            low = k
-        if direction >= 0 and load_n[high] - load_n[k] > threshold_n:
+    loads = load_n.tolist()  # plain numbers: a pass over an array's own costs eight times as much
+    lowest = highest = loads[0] if loads else 0.0
+    for k, load in enumerate(loads):
+        if load > highest:
+            high, highest = k, load
+        if load < lowest:
+            low, lowest = k, load
+        if direction >= 0 and highest - load > threshold_n:
             points.append(high)
-            direction, low, high = -1, k, k
-        elif direction <= 0 and load_n[k] - load_n[low] > threshold_n:
+            direction, low, high, lowest, highest = -1, k, k, load, load
+        elif direction <= 0 and load - lowest > threshold_n:
             points.append(low)
-            direction, low, high = 1, k, k
+            direction, low, high, lowest, highest = 1, k, k, load, load
     points.append(load_n.size - 1)
     return points
 

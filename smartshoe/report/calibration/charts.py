@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,16 +63,25 @@ def _smooth(values: Array) -> Array:
     return np.asarray(np.convolve(padded, np.full(width, 1.0 / width), mode="valid"))
 
 
-def residual_loop(validation: Validation, fastest: bool) -> tuple[float, Array, dict[str, Array]] | None:
-    """(rate, loads, errors by "raw up", "raw down", "corrected up", "corrected down") at the slowest or fastest rate.
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualLoop:
+    """What a unit's estimates miss at ``rate_n_per_s`` over loads ``at_n`` (n,), the mean over the rate's cycles.
 
-    The mean over the rate's cycles of estimate less load, in N; None where the record has no cycle.
+    ``errors_n`` (n,) are estimate less load, by "raw up", "raw down", "corrected up", "corrected down".
     """
+
+    rate_n_per_s: float
+    at_n: Array
+    errors_n: Mapping[str, Array]
+
+
+def residual_loops(validation: Validation) -> tuple[ResidualLoop, ...]:
+    """The loops at the slowest and at the fastest rate; one where there is one rate, none without cycles."""
     groups = _cycles_by_rate(validation)
-    if not groups:
-        return None
-    rate = max(groups) if fastest else min(groups)
-    group = groups[rate]
+    return tuple(_residual_loop(rate, groups[rate]) for rate in sorted({min(groups), max(groups)} if groups else ()))
+
+
+def _residual_loop(rate_n_per_s: float, group: Sequence[tuple[ForceTrace, Cycle]]) -> ResidualLoop:
     low = max(float(trace.load_n[cycle.start : cycle.stop].min()) for trace, cycle in group)
     high = min(float(trace.load_n[cycle.start : cycle.stop].max()) for trace, cycle in group)
     at_n = low + SHARE * (high - low)
@@ -83,15 +93,12 @@ def residual_loop(validation: Validation, fastest: bool) -> tuple[float, Array, 
                 for trace, cycle in group
             ]
             found[f"{kind} {way}"] = np.mean(each, axis=0)
-    return rate, at_n, found
+    return ResidualLoop(rate_n_per_s, at_n, found)
 
 
-def loop_chart(unit: UnitReport, fastest: bool, limits: tuple[float, float]) -> Chart | None:
+def loop_chart(unit: UnitReport, loop: ResidualLoop, limits: tuple[float, float]) -> Chart:
     """What the static line and the filter miss against load, loading and unloading apart."""
-    loop = residual_loop(unit.validation, fastest)
-    if loop is None:
-        return None
-    rate, at_n, errors = loop
+    errors = loop.errors_n
     widths = {kind: float(np.abs(errors[f"{kind} up"] - errors[f"{kind} down"]).max()) for kind in ("raw", "corrected")}
     says = (
         f"The static line's loop (shaded) is {plain(widths['raw'], 2)} N wide, the corrected one"
@@ -104,9 +111,9 @@ def loop_chart(unit: UnitReport, fastest: bool, limits: tuple[float, float]) -> 
         Line("corrected, loading", errors["corrected up"], "corrected"),
         Line("corrected, unloading", errors["corrected down"], "corrected", "dashed"),
     ]
-    name = f"Residual loop at {rate:g} N/s"
+    name = f"Residual loop at {loop.rate_n_per_s:g} N/s"
     panel = Panel("estimate − load (N)", lines, limits)
-    return Chart(name, says, "load (N)", at_n, [panel], group=f"loops {unit.name}")
+    return Chart(name, says, "load (N)", loop.at_n, [panel], group=f"loops {unit.name}")
 
 
 def signals(unit: UnitReport, recording: Recording) -> Chart:
@@ -154,10 +161,11 @@ def response(unit: UnitReport) -> Chart:
                  marks=[Mark(*GAIT_HZ, "mark", "gait")])  # fmt: skip
 
 
-def common_limits(units: Sequence[UnitReport]) -> tuple[tuple[float, float], tuple[float, float]]:
+def common_limits(
+    units: Sequence[UnitReport], loops: Iterable[ResidualLoop]
+) -> tuple[tuple[float, float], tuple[float, float]]:
     """One scale for every unit's loops and one for their errors by rate, so that units compare at a glance."""
-    loops = [loop for unit in units for fast in (False, True) if (loop := residual_loop(unit.validation, fast))]
-    widest = max((float(np.abs(error).max()) for _, _, errors in loops for error in errors.values()), default=1.0)
+    widest = max((float(np.abs(error).max()) for loop in loops for error in loop.errors_n.values()), default=1.0)
     worst = max(
         (max(rate.rmse_static_n, rate.rmse_compensated_n) for unit in units for rate in unit.validation.rates),
         default=1.0,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
@@ -14,7 +15,9 @@ from smartshoe.report.calibration.judgement import Judgement
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.charts import Chart
 from smartshoe.report.document import polylines, write_document
-from smartshoe.report.trial import COLUMNS, TrialSection
+
+if TYPE_CHECKING:
+    from smartshoe.report.trial import TrialSection
 
 CARD_WIDTH, CARD_HEIGHT = 120.0, 56.0
 
@@ -46,12 +49,9 @@ class UnitCard:
         return judgement.error_percent(self.unit.validation)
 
 
-def _small_loop(unit: UnitReport, most_n: float) -> Markup | None:
-    """The fastest residual loop without axes, all units on one scale of ``most_n`` newton either way."""
-    found = charts.residual_loop(unit.validation, fastest=True)
-    if found is None:
-        return None
-    _, at_n, errors = found
+def _small_loop(loop: charts.ResidualLoop, most_n: float) -> Markup:
+    """The loop without axes, all units on one scale of ``most_n`` newton either way."""
+    at_n, errors = loop.at_n, loop.errors_n
     x = CARD_WIDTH * (at_n - at_n[0]) / max(float(np.ptp(at_n)), 1e-12)
     curves = []
     for kind in ("raw", "corrected"):
@@ -66,19 +66,17 @@ def _small_loop(unit: UnitReport, most_n: float) -> Markup | None:
 
 def cards(units: Sequence[UnitReport]) -> list[UnitCard]:
     """A card a unit, worst first, by grade and then by what is left."""
-    loops, errors = charts.common_limits(units)
+    loops = [charts.residual_loops(unit.validation) for unit in units]
+    widest, errors = charts.common_limits(units, [loop for own in loops for loop in own])
     made = []
-    for number, unit in enumerate(units, 1):
-        shown = [
-            charts.error_by_rate(unit, errors),
-            charts.loop_chart(unit, False, loops),
-            charts.loop_chart(unit, True, loops) if len(unit.validation.rates) > 1 else None,
-        ]
+    for number, (unit, own) in enumerate(zip(units, loops, strict=True), 1):
+        by_rate = charts.error_by_rate(unit, errors)
+        shown = [*([] if by_rate is None else [by_rate]), *(charts.loop_chart(unit, loop, widest) for loop in own)]
         folded = [charts.signals(unit, recording) for recording in unit.recordings] + [charts.response(unit)]
         made.append(
             UnitCard(
-                unit, judgement.judge(unit), f"unit-{number}", _small_loop(unit, loops[1]),
-                [chart for chart in shown if chart is not None], folded,
+                unit, judgement.judge(unit), f"unit-{number}", _small_loop(own[-1], widest[1]) if own else None,
+                shown, folded,
             )
         )  # fmt: skip
     return sorted(made, key=lambda card: (judgement.WORST_FIRST.index(card.judged.grade), -card.left_percent))
@@ -111,7 +109,6 @@ def write_page(
             "headline": says,
             "cards": made,
             "trial": trial,
-            "trial_columns": COLUMNS,
             "commands": commands,
             "session": session,
             "good_percent": judgement.GOOD_PERCENT,

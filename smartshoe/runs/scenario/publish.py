@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from smartshoe.calibration.provenance import calibrated_on
 from smartshoe.files.atomic import make_folder, write_text
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.report.calibration.judgement import headline, judge
-from smartshoe.report.trial import TrialSection
 from smartshoe.report.wording import sentence
 from smartshoe.runs.scenario.run import ScenarioResult, UnitResult, diagnosed_on
 from smartshoe.version import __version__
+
+if TYPE_CHECKING:
+    from smartshoe.report.trial import TrialSection
 
 
 def _publish_diagnosis(
@@ -35,13 +38,13 @@ def _publish_diagnosis(
 
 def _publish_trial(result: ScenarioResult, folder: Path) -> TrialSection | None:
     """The trial's recording, true loads and own page in a folder of their own."""
+    trial = result.trial
+    if trial is None:
+        return None
     from smartshoe.files.logs import write
     from smartshoe.report.gait.folder import publish_gait
     from smartshoe.report.trial import section
 
-    trial = result.trial
-    if trial is None:
-        return None
     own = make_folder(folder / "trial")
     write(trial.recording, own / f"{trial.name}.csv")
     true = trial.recorded.true_loads()
@@ -105,7 +108,7 @@ def _unit_report(result: ScenarioResult, unit: UnitResult, diagnosed: DiagnosisL
         command = f"smartshoe simulate {result.source} --out recordings && {command}"
     return UnitReport(
         unit.name,
-        unit.identification.to_dict(),
+        unit.identified,
         unit.validation,
         list(unit.recordings.values()),
         unit.fitted,

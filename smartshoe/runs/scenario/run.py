@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,11 @@ class UnitResult:
     truth: dict[str, Any] = field(default_factory=dict)
     diagnosis: Diagnosis | None = None
 
+    @cached_property
+    def identified(self) -> dict[str, Any]:
+        """`Identification.to_dict`, which result, page and terminal all show."""
+        return self.identification.to_dict()
+
     def to_dict(self) -> dict[str, Any]:
         """The unit's part of ``result.json``."""
         return {
@@ -62,7 +68,7 @@ class UnitResult:
             "fitted": list(self.fitted),
             "judged": list(self.judged),
             "device": self.truth,
-            "identification": self.identification.to_dict(),
+            "identification": self.identified,
             "validation": self.validation.to_dict(),
             "diagnosis": self.diagnosis.to_dict() if self.diagnosis else None,
         }

@@ -1,4 +1,4 @@
-"""What a scenario may say of a testing machine and of a worn shoe; unknown keys and values out of bounds are errors."""
+"""What a scenario may say of a worn shoe; unknown keys and values out of bounds are errors."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from simulators.benches.instron import InstronParameters
 from simulators.benches.shoe import ShoeParameters
-from simulators.effects.bounds import Finite, NotNegative, Positive
-from simulators.effects.room import NeighbourUnit, Room
-from simulators.instruments.options import DaqOptions, Options, SensorOptions, TwinOptions, UnitOptions
+from simulators.effects.bounds import NotNegative, Positive
+from simulators.instruments.options import Options, UnitOptions
 from simulators.people.person import BODY_WEIGHT_N
 from simulators.people.profiles import Gait
-from simulators.plant.bladder_parameters import BladderParameters
 from smartshoe.files.gate import limits
 
 
@@ -21,35 +18,6 @@ def _within_limits(duration_s: float) -> float:
     if duration_s > limits().duration_s:
         raise ValueError(f"give {limits().duration_s} s at most, or raise the limit with --limit duration_s=...")
     return duration_s
-
-
-class MachineOptions(Options):
-    """An Instron with one unit on its anvil."""
-
-    unit: str
-    bladder: BladderParameters
-    sensor: SensorOptions
-    daq: DaqOptions = DaqOptions()
-    load_noise_n: NotNegative = 0.3
-    corner_s: Annotated[float, Field(ge=0, le=1)] = 0.04
-    fine_rate_hz: Annotated[float, Field(ge=1000, le=100_000)] = 1000.0
-    frame_stiffness_n_per_m: Positive = 5e6
-    extension_noise_m: NotNegative = 2e-7
-    bluehill_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 100.0
-    bluehill_clock_offset_s: NotNegative = 0.35
-    load_cell_tare_n: Finite = 0.0
-    room: Room = Room()
-    neighbour: NeighbourUnit = NeighbourUnit()
-
-    def parameters(self) -> InstronParameters:
-        """The machine's own part."""
-        return InstronParameters(**{k: v for k, v in self if k not in ("unit", "bladder", "sensor", "daq")})
-
-
-class TwinMachineOptions(MachineOptions):
-    """An Instron with a twin on its anvil."""
-
-    bladder: TwinOptions  # type: ignore[assignment]
 
 
 class ShoeOptions(Options):
