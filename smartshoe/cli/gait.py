@@ -11,6 +11,17 @@ from smartshoe.cli.output import figures_option
 LEAST_WEIGHT_N = 150.0  # of a person who walks: below, it is more likely in kg
 
 
+class _EstimatorOption(click.Option):
+    """Names the estimators that are there when help is asked for: the registry is not read before."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from smartshoe.calibration.estimators import estimator_names
+
+        *others, last = estimator_names()
+        self.help = (self.help or "").format(f"{', '.join(others)} or {last}")
+        return super().get_help_record(ctx)
+
+
 @click.command(
     "gait",
     epilog="Example: smartshoe gait walk.csv --calibration left_heel.json --calibration left_toe.json --out out/walk",
@@ -37,7 +48,8 @@ LEAST_WEIGHT_N = 150.0  # of a person who walks: below, it is more likely in kg
 @click.option(
     "--estimator",
     metavar="NAME",
-    help="Forces with error bars: static, lead, inverse, kalman, smoother or imm; without it the calibrations' filter.",
+    cls=_EstimatorOption,
+    help="Forces with error bars, by {}; without it the calibrations' filter.",
 )
 @click.option("--time", metavar="COLUMN", help="The time column, by name or 1-based number: '1[ms]'.")
 @click.option(
@@ -96,7 +108,6 @@ def command(
     if streamed:
         refuse_with(
             {
-                "--estimator": estimator,
                 "--reference": reference,
                 "--c3d": c3d_path,
                 "--figures": figures,
@@ -120,7 +131,7 @@ def command(
         covered = Coverage(coverage) if course_path is None else Coverage.load(course_path)
     folder = make_folder(out_folder) if out_folder is not None else None
     if streamed:
-        gait_of_stream(files, calibrations, body_weight_n, covered, time, json_path, folder)
+        gait_of_stream(files, calibrations, body_weight_n, covered, time, json_path, folder, estimator)
         return
     written: dict[str, Path] = {}
     with progress() as step:

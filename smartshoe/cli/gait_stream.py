@@ -46,6 +46,7 @@ def gait_of_stream(
     time: str | None,
     json_path: str | None,
     folder: Path | None,
+    estimator: str | None,
 ) -> None:
     """Analyse ``files`` in bounded memory and say what was found."""
     from smartshoe.cli.output import emit_json, progress
@@ -53,7 +54,7 @@ def gait_of_stream(
     from smartshoe.files.logs.blocks import read_blocks
     from smartshoe.gait.day import analyse_stream
     from smartshoe.gait.day_tables import tables
-    from smartshoe.gait.result import Event
+    from smartshoe.gait.events import Event
     from smartshoe.gait.strides import Stride
 
     written: dict[str, Path] = {}
@@ -68,7 +69,7 @@ def gait_of_stream(
                 write(events, strides)
 
         sources = [read_blocks(file, time=time) for file in files]
-        found = analyse_stream(sources, calibrations, body_weight_n, coverage, told)
+        found = analyse_stream(sources, calibrations, body_weight_n, coverage, told, estimator)
     if folder is not None:
         written = {"result": folder / "gait.json"} | {name: folder / f"{name}.csv" for name in ("strides", "events")}
         write_text(written["result"], json_text(found.to_dict()))

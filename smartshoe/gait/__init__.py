@@ -9,6 +9,7 @@ _HOME = {
     "analyse": "smartshoe.gait.analysis",
     "analyse_stream": "smartshoe.gait.day",
     "GaitResult": "smartshoe.gait.result",
+    "DayResult": "smartshoe.gait.result",
     "Contacts": "smartshoe.gait.contact",
     "ContactDetector": "smartshoe.gait.contact",
     "memberships": "smartshoe.gait.membership",
@@ -24,12 +25,13 @@ if TYPE_CHECKING:
     from smartshoe.gait.day import analyse_stream
     from smartshoe.gait.insole import centre_of_pressure
     from smartshoe.gait.membership import memberships
-    from smartshoe.gait.result import GaitResult
+    from smartshoe.gait.result import DayResult, GaitResult
 
 __all__ = [
     "ContactDetector",
     "Contacts",
     "Coverage",
+    "DayResult",
     "GaitResult",
     "analyse",
     "analyse_stream",

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.gait.flag import Flag, spans_of, where_text
 from smartshoe.gait.labels import clock_flags, label_flags
-from smartshoe.gait.result import FootCourse, Forces
+from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import LONGEST_GAP_S, Stride
-from smartshoe.gait.total import SETTLED_S, total_of
+from smartshoe.gait.total import SETTLED_S, TotalForce
 from smartshoe.gait.trial import LEAST_RATE_HZ, Foot
 from smartshoe.recording import REGIONS
 from smartshoe.signals.masks import runs_of
+
+if TYPE_CHECKING:
+    from smartshoe.gait.force_sums import Forces
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,26 +32,24 @@ LEAST_DRIFT_S = 10.0
 STANDING_DRIFT = 0.02  # of the total, from the first fifth of a standing to its last
 
 
-def all_of(
+def window_flags(
     feet: Mapping[str, Foot],
-    courses: Mapping[str, FootCourse],
+    series: Mapping[str, FootSeries],
     strides: Sequence[Stride],
     spans: Sequence[tuple[float, float]],
-    forces: Forces,
     loaded: Mapping[str, bool],
-    coverage: float,
-    body_weight_n: float | None,
+    total: TotalForce | None,
 ) -> list[Flag]:
-    """Every flag of a trial, those about whole shoes first."""
+    """What a window shows, those about whole shoes first."""
     flags: list[Flag] = []
     if len(feet) == 1:
         flags += _one_shoe(next(iter(feet)))
     for name, foot in feet.items():
-        flags += _shoe(foot, courses[name], loaded[name], bool(strides or spans))
-    labels = label_flags(feet, courses, strides)
+        flags += _shoe(foot, series[name], loaded[name], bool(strides or spans))
+    labels = label_flags(feet, series, strides)
     flags += labels
     if not labels:
-        flags += clock_flags(feet, courses, strides)
+        flags += clock_flags(feet, series, strides)
     if not strides and not spans:
         first = next(iter(feet.values()))
         flags.append(
@@ -57,18 +59,22 @@ def all_of(
             )
         )
     for name, foot in feet.items():
-        flags += _units(foot, courses[name])
-        flags += _gaps(foot, courses[name])
-    flags += _standing_drift(feet, courses, spans)
-    flags += _rates(feet, courses)
-    flags += _weight(forces, coverage, body_weight_n)
-    if strides and len({stride.runs for stride in strides}) == 2:
-        runs = sum(stride.runs for stride in strides)
-        main = "running" if runs > len(strides) / 2 else "walking"
+        flags += _units(foot, series[name])
+        flags += _gaps(foot, series[name])
+    if total is not None and len(feet) > 1:
+        flags += _standing_drift(total, spans)
+    return flags + _rates(feet, series)
+
+
+def trial_flags(forces: Forces, coverage: float, given_n: float | None, walks: int, runs: int) -> list[Flag]:
+    """What only the whole trial shows: a body weight that cannot be, and strides of two kinds."""
+    flags = _weight(forces, coverage, given_n)
+    if walks and runs:
+        main = "running" if runs > walks else "walking"
         flags.append(
             Flag(
                 "mixed_strides",
-                f"{len(strides) - runs} strides are walking and {runs} running: the summary is of the {main} ones",
+                f"{walks} strides are walking and {runs} running: the summary is of the {main} ones",
             )
         )
     return flags
@@ -92,7 +98,7 @@ def _one_shoe(foot: str) -> list[Flag]:
     ]
 
 
-def _shoe(foot: Foot, course: FootCourse, loaded: bool, moving: bool) -> list[Flag]:
+def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Flag]:
     flags: list[Flag] = []
     absent = [region for region in REGIONS if region not in foot.regions]
     if absent:
@@ -131,7 +137,7 @@ def _shoe(foot: Foot, course: FootCourse, loaded: bool, moving: bool) -> list[Fl
                 foot=foot.name,
             )
         )
-    if len(course.contacts) == 0 and moving and not loaded:
+    if len(series.contacts) == 0 and moving and not loaded:
         flags.append(
             Flag(
                 "no_stance",
@@ -140,7 +146,7 @@ def _shoe(foot: Foot, course: FootCourse, loaded: bool, moving: bool) -> list[Fl
                 foot=foot.name,
             )
         )
-    elif course.contacts.floor_time_s.size == 0 and foot.is_force:
+    elif series.contacts.floor_time_s.size == 0 and foot.is_force:
         flags.append(
             Flag(
                 "no_swing",
@@ -157,9 +163,9 @@ def _late(absent: Sequence[str]) -> str:
     return f", {' and '.join(told)}, and compared with a whole shoe it is no equal" if told else ""
 
 
-def _units(foot: Foot, course: FootCourse) -> list[Flag]:
+def _units(foot: Foot, series: FootSeries) -> list[Flag]:
     flags: list[Flag] = []
-    whole = float(course.usual_peak.sum())
+    whole = float(series.usual_peak.sum())
     for column, (region, unit) in enumerate(zip(foot.regions, foot.units, strict=True)):
         if unit.saturated.any():
             spans = spans_of(foot.time_s, unit.saturated)
@@ -182,7 +188,7 @@ def _units(foot: Foot, course: FootCourse) -> list[Flag]:
                     foot.name, region, where_text(spans),
                 )
             )  # fmt: skip
-        if whole > 0 and len(course.contacts) and course.usual_peak[column] < SILENT * whole:
+        if whole > 0 and len(series.contacts) and series.usual_peak[column] < SILENT * whole:
             flags.append(
                 Flag(
                     "silent_unit",
@@ -194,13 +200,13 @@ def _units(foot: Foot, course: FootCourse) -> list[Flag]:
     return flags
 
 
-def _gaps(foot: Foot, course: FootCourse) -> list[Flag]:
-    missing = course.missing
+def _gaps(foot: Foot, series: FootSeries) -> list[Flag]:
+    missing = series.missing
     if not missing.any():
         return []
     start, stop = runs_of(missing)
     long = (stop - start) / foot.rate_hz > 0.5 * LONGEST_GAP_S
-    inside = np.array([bool((course.state[a:b] != 0).any()) for a, b in zip(start, stop, strict=True)], dtype=bool)
+    inside = np.array([bool((series.state[a:b] != 0).any()) for a, b in zip(start, stop, strict=True)], dtype=bool)
     flags: list[Flag] = []
     for kind, which, says in (
         ("gap_in_stance", long & inside, "within stances: strides that lose more than 0.1 s count in no mean"),
@@ -221,14 +227,9 @@ def _gaps(foot: Foot, course: FootCourse) -> list[Flag]:
     return flags
 
 
-def _standing_drift(
-    feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], spans: Sequence[tuple[float, float]]
-) -> list[Flag]:
+def _standing_drift(total: TotalForce, spans: Sequence[tuple[float, float]]) -> list[Flag]:
     """Said where the total of standing runs away: a body that stands weighs the same at its end as at its begin."""
-    forces = {name: course.force_n for name, course in courses.items() if course.force_n is not None}
-    if len(forces) < 2:
-        return []
-    time_s, total_n = total_of(feet, forces)
+    time_s, total_n = total.time_s, total.force_n
     for start_s, end_s in spans:
         first, last = np.searchsorted(time_s, [start_s + SETTLED_S, end_s - SETTLED_S])
         part = total_n[first:last]
@@ -249,11 +250,11 @@ def _standing_drift(
     return []
 
 
-def _rates(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse]) -> list[Flag]:
+def _rates(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> list[Flag]:
     faster: list[tuple[float, float, str]] = []
     for name, foot in feet.items():
         for unit in foot.units:
-            if unit.rate_n_per_s and len(courses[name].contacts):
+            if unit.rate_n_per_s and len(series[name].contacts):
                 rate = float(np.quantile(np.abs(np.diff(unit.load)), FAST_QUANTILE)) * foot.rate_hz
                 if rate > FAST * unit.rate_n_per_s:
                     faster.append((rate, unit.rate_n_per_s, unit.name))

@@ -1,32 +1,35 @@
 """`analyse_stream`: a trial too long for memory, a day, block by block to what `analyse` says of a short one.
 
 The contacts are those of the same detector, fed as the blocks arrive. Once contacts and floors on both sides of a
-stretch of `STRETCH_S` are known, it goes through the steps of `analyse` with some seconds of its neighbours in sight;
-its events and strides are handed on, its numbers are added up, and it is forgotten.
+window of `WINDOW_S` are known, it is analysed as a short trial is, with some seconds of its neighbours in sight; its
+events and strides are handed on, its numbers are added up, and it is forgotten.
 """
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.errors import InputError, RefusedError, UsageError
+from smartshoe.errors import InputError, UsageError
+from smartshoe.gait.analysis import checked, require_steps
 from smartshoe.gait.arriving import Piece, joined_head, pieces
+from smartshoe.gait.checks import trial_flags
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.coverage import Coverage
-from smartshoe.gait.day_sums import DaySums
+from smartshoe.gait.day_flags import DayFlags
+from smartshoe.gait.events import Event, events_of
+from smartshoe.gait.flag import Flag
 from smartshoe.gait.foot_stream import FootStream
-from smartshoe.gait.result import Event, GaitResult
-from smartshoe.gait.stretch import look
+from smartshoe.gait.result import DayResult
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.trial import Foot, feet_of
+from smartshoe.gait.trial_sums import TrialSums
+from smartshoe.gait.window import analyse_window
 from smartshoe.recording import Channel, Recording
 
 if TYPE_CHECKING:
@@ -34,42 +37,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-STRETCH_S = 120.0
+WINDOW_S = 120.0
 HEAD_S = 60.0  # looked at before anything is told: which columns, at what rate, of which sign
 LISTED = 2000  # strides, and the events up to the last of them, that a result lists
 PEAKS = 1000  # stances whose peaks are what is usual
-Told = Callable[[Sequence[Event], Sequence[Stride]], None]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DayResult(GaitResult):
-    """A long trial: numbers and flags of the whole.
-
-    ``events`` and ``strides`` are the first ones, up to ``listed_s``, of ``event_count`` and ``stride_count``. It keeps
-    no course against time.
-    """
-
-    duration_s: float
-    recorded_s: float
-    event_count: int
-    stride_count: int
-    listed_s: float | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Schema smartshoe.gait/1 with an object ``stream`` beside it."""
-        return super().to_dict() | {
-            "stream": {
-                "duration_s": self.duration_s,
-                "recorded_s": self.recorded_s,
-                "events": self.event_count,
-                "strides": self.stride_count,
-                "listed_to_s": self.listed_s,
-            }
-        }
-
-    def columns(self) -> dict[str, Any]:
-        """Raises `UsageError`: forces against time are not kept."""
-        raise UsageError("a streamed trial keeps no forces against time: analyse a part of it with analyse()")
+Report = Callable[[Sequence[Event], Sequence[Stride]], None]
 
 
 def analyse_stream(
@@ -77,22 +49,22 @@ def analyse_stream(
     calibrations: Calibration | Sequence[Calibration] = (),
     body_weight_n: float | None = None,
     coverage: float | Coverage = 1.0,
-    told: Told | None = None,
+    told: Report | None = None,
+    estimator: str | None = None,
 ) -> DayResult:
     """The trial whose recording comes in consecutive ``blocks`` of any size, in memory that does not grow with it.
 
     ``blocks`` of both shoes, or a list of two iterables, one for each shoe. ``told`` is called with events and strides
     in order as they are known, some minutes after they happened; the other arguments are those of `analyse`, with
     whose result this one agrees whatever the blocks' size. Recording that stops for more than 10 s ends what is under
-    way, and the analysis goes on after it. Raises what `analyse` raises.
+    way, and the analysis goes on after it. What an ``estimator`` must know of a reading's noise and of how fast loads
+    change is that of the first minute. Raises what `analyse` raises.
     """
-    covered = coverage if isinstance(coverage, Coverage) else Coverage(coverage)
-    if body_weight_n is not None and not (math.isfinite(body_weight_n) and body_weight_n > 0.0):
-        raise UsageError(f"body_weight_n is {body_weight_n:g}: give newtons above 0")
+    covered = checked(body_weight_n, coverage, estimator)
     given = list(calibrations) if isinstance(calibrations, Sequence) else [calibrations]
     sources = _sources(_several(blocks))
-    feet, flags = feet_of([head for head, _ in sources], given)
-    day = _Day(feet, sources, given, covered, body_weight_n, told)
+    feet, flags = feet_of([head for head, _ in sources], given, estimator)
+    day = _Day(feet, sources, covered, body_weight_n, told)
     day.run()
     return day.result(flags)
 
@@ -120,13 +92,11 @@ class _Day:
         self,
         feet: Mapping[str, Foot],
         sources: Sequence[tuple[Recording, Iterator[Recording]]],
-        calibrations: Sequence[Calibration],
         coverage: Coverage,
         body_weight_n: float | None,
-        told: Told | None,
+        told: Report | None,
     ) -> None:
         self.feet, self.coverage, self.body_weight_n, self._told = feet, coverage, body_weight_n, told
-        self._calibrations = {calibration.unit: calibration for calibration in calibrations}
         self.label = sources[0][0].label
         self._channels: dict[str, tuple[Channel, ...]] = {}
         self._of_source: list[list[tuple[str, slice]]] = []
@@ -147,7 +117,7 @@ class _Day:
                 raise UsageError(f"two recordings are called {head.label}: give each a name of its own")
             self._of_source.append(own)
             self._pieces.append(pieces(blocks, tuple(names), feet[own[0][0]].rate_hz))
-        self.sums = DaySums(feet, coverage)
+        self.sums, self.flags = TrialSums(feet, coverage.share), DayFlags()
         self._peaks: dict[str, deque[Array]] = {name: deque(maxlen=PEAKS) for name in feet}
         self._streams: dict[str, FootStream] = {}
         self._settled_s = self._run_s = 0.0
@@ -191,7 +161,7 @@ class _Day:
     def _begin(self, running: Mapping[int, Piece]) -> None:
         self._settled_s = min(self._at(k, piece) for k, piece in running.items())
         self._streams = {
-            name: FootStream(self.feet[name], self._channels[name], self._calibrations, self._at(k, piece))
+            name: FootStream(self.feet[name], self._channels[name], self._at(k, piece))
             for k, piece in running.items()
             for name, _ in self._of_source[k]
         }
@@ -203,19 +173,19 @@ class _Day:
         self._settle(at_end=False)
 
     def _tell(self, foot: str, told: Contacts) -> None:
-        self.sums.floors(foot, told)
-        self._events += _events(foot, told)
+        self.sums.add_contacts(foot, told)
+        self._events += events_of({foot: told})
 
     def _end(self) -> None:
         for name, stream in self._streams.items():
             self._tell(name, stream.finish())
         end_s = max(stream.end_s - 1.0 / stream.rate_hz for stream in self._streams.values())
-        self.sums.run(self._run_s, end_s)
+        self.flags.add_run(self._run_s, end_s)
         self._settle(at_end=True)
 
     def _settle(self, *, at_end: bool) -> None:
         while self._streams:
-            end_s = self._settled_s + STRETCH_S
+            end_s = self._settled_s + WINDOW_S
             last_s = max(stream.end_s for stream in self._streams.values())
             if at_end and last_s <= end_s:
                 end_s = np.inf
@@ -230,9 +200,14 @@ class _Day:
         windows = {name: windows[name] for name in self.feet if name in windows and windows[name][0].time_s.size > 1}
         strides: tuple[Stride, ...] = ()
         if windows:
-            stretch = look(windows, self._settled_s, end_s, self._peaks, self.coverage, self.body_weight_n)
-            self.sums.add(stretch)
-            strides = stretch.strides
+            window = analyse_window(
+                {name: foot for name, (foot, _) in windows.items()},
+                {name: contacts for name, (_, contacts) in windows.items()},
+                self.coverage, self.body_weight_n, peaks=self._peaks, start_s=self._settled_s, end_s=end_s,
+            )  # fmt: skip
+            self.sums.add(window)
+            self.flags.add(window)
+            strides = window.strides
         events = sorted((e for e in self._events if e.time_s < end_s), key=lambda e: (e.time_s, e.foot, e.event))
         self._events = [event for event in self._events if event.time_s >= end_s]
         self.event_count += len(events)
@@ -254,32 +229,25 @@ class _Day:
         until_s = self._listed[-1].end_s
         self._listed_events = [event for event in self._listed_events if event.time_s <= until_s]
 
-    def result(self, flags: Sequence[Any]) -> DayResult:
+    def result(self, flags: Sequence[Flag]) -> DayResult:
         """What it all comes to; raises `RefusedError` where neither a stance nor a standing load was found."""
         sums = self.sums
-        if not self.event_count and not sums.was_loaded:
-            raise RefusedError(
-                f"{self.label}: no stance is found and no foot is loaded: check that the shoes were worn, and the"
-                " columns' units"
-            )
+        require_steps(sums, self.label)
         is_cut = self.stride_count > len(self._listed)
         forces = sums.forces(self.body_weight_n)
+        of_all = trial_flags(forces, self.coverage.share, self.body_weight_n, sums.strides[False], sums.strides[True])
         return DayResult(
             activity=sums.activity(),
             events=tuple(self._listed_events),
             strides=tuple(self._listed),
-            summary=sums.summary(),
+            figures=sums.summary(),
             indices=sums.indices(),
             forces=forces,
-            flags=(*flags, *sums.flags(forces, self.body_weight_n)),
-            feet=sums.last_courses,
-            total_time_s=np.zeros(0),
-            total_n=None,
+            flags=(*flags, *self.flags.flags(sums), *of_all),
             coverage=self.coverage.share,
             covering=self.coverage,
-            standing_s=(),
-            duration_s=sums.duration_s,
-            recorded_s=sums.recorded_s,
+            duration_s=self.flags.duration_s,
+            recorded_s=self.flags.recorded_s,
             event_count=self.event_count,
             stride_count=self.stride_count,
             listed_s=self._listed[-1].end_s if is_cut else None,
@@ -289,16 +257,3 @@ class _Day:
 def _channels_of(foot: Foot, head: Recording) -> tuple[Channel, ...] | None:
     found = [head.channels.get(u.name) or head.channels.get(u.name.split("_", 1)[-1]) for u in foot.units]
     return tuple(c for c in found if c is not None) if all(c is not None for c in found) else None
-
-
-def _events(foot: str, contacts: Contacts) -> list[Event]:
-    return [
-        Event(float(at), foot, name)
-        for name, times in (
-            ("heel_strike", contacts.strike_s),
-            ("foot_flat", contacts.foot_flat_s),
-            ("heel_off", contacts.heel_off_s),
-            ("toe_off", contacts.toe_off_s),
-        )
-        for at in times[np.isfinite(times)]
-    ]

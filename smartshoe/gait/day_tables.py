@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from smartshoe.files.atomic import replacing
-from smartshoe.gait.result import Event
+from smartshoe.gait.events import Event
 from smartshoe.gait.strides import Stride
 
 DIGITS = 9  # of a number, as in the tables of a short trial

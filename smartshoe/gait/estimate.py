@@ -5,8 +5,8 @@ Behind `estimate` stands the calibration's own compensator, or an estimator of `
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from smartshoe.signals.masks import bridged, runs_of
 
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
+    from smartshoe.calibration.estimators import ForceEstimate, ForceRun
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,14 +29,37 @@ MOST_TIED = 0.5
 RAIL_STEEP = 4.0  # resolutions, by which a load still rises as it meets the rail
 
 
+class LoadRun:
+    """A unit's readings, in its channel's unit and finite, to its load and the load's error bar, piece after piece.
+
+    ``gain_sd`` is the sd of the calibration's static gain as a share.
+    """
+
+    def __init__(self, to_load: Callable[[Array], Array], run: ForceRun | None = None, gain_sd: float = 0.0) -> None:
+        self._to_load, self._run, self.gain_sd = to_load, run, gain_sd
+
+    def push(self, readings: Array, missing: Mask) -> tuple[Array, Array | None]:
+        """The loads (n,) that the next readings make known; with an estimator also their error bars (n,)."""
+        values = self._to_load(readings)
+        return (values, None) if self._run is None else self._both(self._run.push(values, missing))
+
+    def finish(self) -> tuple[Array, Array | None]:
+        """The loads that the end of the readings makes known."""
+        return (np.zeros(0), None) if self._run is None else self._both(self._run.finish())
+
+    def _both(self, found: ForceEstimate) -> tuple[Array, Array]:
+        return found.force_n, np.hypot(found.sd_n, self.gain_sd * found.force_n)
+
+
 @dataclass(frozen=True, eq=False)
 class UnitLoad:
     """A unit's load (n,): in N where ``is_force``, else in the reading's own unit ``symbol``.
 
     ``missing``, ``saturated`` and ``beyond`` (n,): no sample, a reading on its rail, a load beyond the calibration.
     ``sd_n`` (n,) is the estimator's error bar, None without one. ``gain_sd`` is the sd of the calibration's static gain
-    as a share, 0 where it is not known. ``range_n`` and
-    ``rate_n_per_s`` are the largest load and loading rate that the calibration saw, None where it does not say.
+    as a share, 0 where it is not known. ``range_n`` and ``rate_n_per_s`` are the largest load and loading rate that the
+    calibration saw, None where it does not say. ``begin`` is a fresh run from readings to load, for a stream; what an
+    estimator must know of noise is that of these readings.
     """
 
     name: str
@@ -45,6 +69,7 @@ class UnitLoad:
     missing: Mask
     saturated: Mask
     beyond: Mask
+    begin: Callable[[], LoadRun]
     gain_sd: float = 0.0
     range_n: float | None = None
     rate_n_per_s: float | None = None
@@ -60,35 +85,60 @@ def estimate(
     None the calibration's own compensator. Raises `UnitError` where the calibration is for another quantity.
     """
     present = channel.present
-    missing, at = ~present, np.arange(present.size, dtype=float)
-    saturated = on_the_rail(channel)
-    nothing = np.zeros(channel.values.size, dtype=bool)
-    if channel.unit.quantity == "force":
-        return UnitLoad(name, bridged(at, channel.si, present), True, "N", missing, saturated, nothing)
-    if calibration is None:
-        return UnitLoad(
-            name, bridged(at, channel.values, present), False, channel.unit.symbol, missing, saturated, nothing
-        )
-    if channel.unit != calibration.reading_unit and channel.unit.quantity != calibration.reading_unit.quantity:
-        raise UnitError(
-            f"{name} is in {channel.unit.symbol}, its calibration is for {calibration.reading_unit.symbol}: give the"
-            " calibration of this kind of reading, or the column in its unit"
-        )
-    from smartshoe.calibration.estimators.estimate import gain_sd
-
-    readings = bridged(at, channel.in_unit(calibration.reading_unit), present)
-    sd_n = None
-    if estimator is None:
-        load_n = calibration.compensator(rate_hz).apply(readings)
-    else:
-        from smartshoe.calibration.estimators import estimator as named
-
-        found = named(estimator, calibration, rate_hz).estimate(readings, missing)
-        load_n, sd_n = found.force_n, found.sd_n
+    readings, missing = bridged(np.arange(present.size, dtype=float), channel.values, present), ~present
+    nothing = np.zeros(present.size, dtype=bool)
+    is_force = channel.unit.quantity == "force"
+    begin = _way(name, channel, rate_hz, None if is_force else calibration, estimator, readings)
+    run = begin()
+    (load, sd_n), (rest, rest_sd_n) = run.push(readings, missing), run.finish()
+    if rest.size:
+        load = np.concatenate([load, rest])
+        sd_n = None if sd_n is None or rest_sd_n is None else np.concatenate([sd_n, rest_sd_n])
+    symbol = "N" if is_force or calibration is not None else channel.unit.symbol
+    found = UnitLoad(
+        name, load, symbol == "N", symbol, missing, on_the_rail(channel), nothing, begin, run.gain_sd, sd_n=sd_n
+    )
+    if is_force or calibration is None:
+        return found
     largest = calibration.load_range_n[1] if calibration.load_range_n else None
     rate = calibration.rate_range_n_per_s[1] if calibration.rate_range_n_per_s else None
-    beyond = load_n > BEYOND * largest if largest else nothing
-    return UnitLoad(name, load_n, True, "N", missing, saturated, beyond, gain_sd(calibration), largest, rate, sd_n)
+    return replace(found, beyond=load > BEYOND * largest if largest else nothing, range_n=largest, rate_n_per_s=rate)
+
+
+def _way(
+    name: str,
+    channel: Channel,
+    rate_hz: float,
+    calibration: Calibration | None,
+    estimator: str | None,
+    readings: Array,
+) -> Callable[[], LoadRun]:
+    """How a fresh run from readings to load is begun."""
+    if calibration is None:
+        return lambda: LoadRun(channel.unit.to_si if channel.unit.quantity == "force" else np.asarray)
+    unit = calibration.reading_unit
+    if channel.unit != unit and channel.unit.quantity != unit.quantity:
+        raise UnitError(
+            f"{name} is in {channel.unit.symbol}, its calibration is for {unit.symbol}: give the"
+            " calibration of this kind of reading, or the column in its unit"
+        )
+    from smartshoe.calibration.estimators import estimator as named
+    from smartshoe.calibration.estimators import gain_sd
+
+    gain, missing = gain_sd(calibration), ~channel.present
+
+    def converted(values: Array) -> Array:
+        return channel.unit.convert(values, unit)
+
+    if estimator is not None:
+        chosen = named(estimator, calibration, rate_hz)
+        return lambda: LoadRun(converted, chosen.begin(converted(readings), missing), gain)
+
+    def own() -> LoadRun:
+        push = calibration.compensator(rate_hz).push
+        return LoadRun(lambda values: push(converted(values)), None, gain)
+
+    return own
 
 
 def on_the_rail(channel: Channel) -> Mask:

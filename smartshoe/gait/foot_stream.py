@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.calibration import Calibration
 from smartshoe.gait.contact import LEAST_LOAD_N, ContactDetector, Contacts
-from smartshoe.gait.estimate import BEYOND, UnitLoad, calibration_of, on_the_rail
+from smartshoe.gait.estimate import BEYOND, UnitLoad, on_the_rail
 from smartshoe.gait.trial import Foot
 from smartshoe.recording import Channel
 
@@ -41,22 +40,19 @@ class FootStream:
     """One foot's run of recording.
 
     ``model`` is the foot as a first look at the record has it, ``channels`` its units' channels there (for unit and
-    range); readings without a calibration are loads in a unit of their own.
+    range); readings without a calibration are loads in a unit of their own. A load may be known some time after its
+    reading: an estimator may wait for what comes after.
     """
 
-    def __init__(
-        self, model: Foot, channels: tuple[Channel, ...], calibrations: Mapping[str, Calibration], start_s: float
-    ) -> None:
+    def __init__(self, model: Foot, channels: tuple[Channel, ...], start_s: float) -> None:
         self.model, self._channels = model, channels
         self.start_s, self.rate_hz = start_s, model.rate_hz
         self.detector = Detector(
             model.rate_hz, model.regions, start_s=start_s, least_load=LEAST_LOAD_N if model.is_force else 0.0
         )
         self._turn = -1.0 if model.turned else 1.0
-        self._to_load = [
-            _way(channel, calibration_of(calibrations, unit.name), model.rate_hz)
-            for unit, channel in zip(model.units, channels, strict=True)
-        ]
+        self._runs = [unit.begin() for unit in model.units]
+        self._waiting = [np.zeros(0)] * len(model.units)  # loads that not every unit has come to know
         width = len(model.units)
         self._first = 0  # place of the first sample in hand
         self._readings, self._load = np.zeros((0, width)), np.zeros((0, width))
@@ -67,22 +63,34 @@ class FootStream:
 
     def push(self, readings: Array, missing: Mask) -> Contacts:
         """The contacts that the next readings (n, r), in the channels' units, complete."""
-        load = self._turn * np.column_stack(
-            [way(column) for way, column in zip(self._to_load, readings.T, strict=True)]
-        )
-        self._readings = np.vstack([self._readings, readings])
-        self._top = np.maximum(self._top, np.where(missing, -np.inf, readings).max(axis=0, initial=-np.inf))
-        self._load, self._missing = np.vstack([self._load, load]), np.vstack([self._missing, missing])
-        return self._kept(self.detector.push(load))
+        new = [
+            run.push(np.ascontiguousarray(column), gone)[0]
+            for run, column, gone in zip(self._runs, readings.T, missing.T, strict=True)
+        ]
+        self._readings, self._missing = np.vstack([self._readings, readings]), np.vstack([self._missing, missing])
+        return self._joined(self.detector.push(self._known(new)))
+
+    def _known(self, new: Sequence[Array]) -> Array:
+        """The loads (n, r) that every unit has come to know with its ``new`` ones."""
+        loads = [np.concatenate(pair) for pair in zip(self._waiting, new, strict=True)]
+        count = min(load.size for load in loads)
+        self._waiting = [load[count:] for load in loads]
+        known = self._turn * np.column_stack([load[:count] for load in loads])
+        rows = slice(len(self._load), len(self._load) + count)
+        readings = np.where(self._missing[rows], -np.inf, self._readings[rows])
+        self._top = np.maximum(self._top, readings.max(axis=0, initial=-np.inf))
+        self._load = np.vstack([self._load, known])
+        return known
 
     def finish(self) -> Contacts:
         """The contacts that the end of the run completes."""
         self._is_over = True
-        return self._kept(self.detector.finish())
+        last = self.detector.push(self._known([run.finish()[0] for run in self._runs]))
+        return self._joined(Contacts.joined([last, self.detector.finish()]))
 
-    def _kept(self, told: Contacts) -> Contacts:
-        self._contacts = Contacts.joined([self._contacts, told])
-        return told
+    def _joined(self, new: Contacts) -> Contacts:
+        self._contacts = Contacts.joined([self._contacts, new])
+        return new
 
     @property
     def end_s(self) -> float:
@@ -156,13 +164,3 @@ def _chosen(contacts: Contacts, which: Mask, floors: slice) -> Contacts:
         contacts.regions, contacts.strike_s[which], contacts.toe_off_s[which], contacts.onset_s[which],
         contacts.release_s[which], contacts.floor_time_s[floors], contacts.floor[floors],
     )  # fmt: skip
-
-
-def _way(channel: Channel, calibration: Calibration | None, rate_hz: float) -> Callable[[Array], Array]:
-    """How a unit's readings become its load, piece after piece: the seam of `smartshoe.gait.estimate` as a stream."""
-    if channel.unit.quantity == "force":
-        return channel.unit.to_si
-    if calibration is None:
-        return lambda readings: readings
-    push, unit = calibration.compensator(rate_hz).push, calibration.reading_unit
-    return lambda readings: np.asarray(push(channel.unit.convert(readings, unit)))

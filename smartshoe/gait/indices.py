@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -28,24 +28,20 @@ def overlaid(strides: Sequence[Stride], time_s: Array, loads: Array) -> Array:
     return np.stack(columns, axis=1).reshape(len(strides), POINTS, loads.shape[1])
 
 
-def pattern(strides: Sequence[Stride], time_s: Array, loads: Array) -> Array | None:
-    """A foot's mean stride (`POINTS`, r), divided by the largest mean whole load; None without a stride."""
-    if not strides:
-        return None
-    mean = overlaid(strides, time_s, loads).mean(axis=0)
+def pattern(mean: Array) -> Array | None:
+    """A foot's mean stride (`POINTS`, r), divided by the largest whole load of it; None where it bears none."""
     largest = float(mean.sum(axis=1).max())
     return np.asarray(mean / largest) if largest > 0 else None
 
 
-def deviations(strides: Sequence[Stride], time_s: Array, loads: Array, reference: Array) -> Array:
-    """Distance (m,) of each stride from a reference pattern (`POINTS`, r): rms, in percent of the reference's peak.
+def deviations(each: Array, reference: Array) -> Array:
+    """Distance (m,) of strides (m, `POINTS`, r) from a pattern (`POINTS`, r): rms, in percent of the pattern's peak.
 
     Each stride is divided by the foot's mean peak, so that body weight does not matter and a light step does.
     """
-    each = overlaid(strides, time_s, loads)
     largest = float(each.mean(axis=0).sum(axis=1).max())
     if not largest > 0:
-        return np.zeros(len(strides))
+        return np.zeros(len(each))
     return np.asarray(100.0 * np.sqrt(np.mean((each / largest - reference[None]) ** 2, axis=(1, 2))))
 
 
@@ -65,35 +61,3 @@ def sequence_errors(contacts: Contacts, strides: Sequence[Stride]) -> tuple[int,
         times = (stride.start_s, flat_s[k], heel_off_s[k], stride.toe_off_s)
         wrong += not all(np.isfinite(times)) or any(b <= a for a, b in pairwise(times))
     return wrong, len(strides)
-
-
-def indices_of(
-    contacts: Mapping[str, Contacts],
-    strides: Sequence[Stride],
-    time_s: Mapping[str, Array],
-    loads: Mapping[str, Array],
-    abnormality: Mapping[str, Array],
-    reference: Mapping[str, Array] | None,
-) -> dict[str, dict[str, float | None]]:
-    """Each foot's indices in percent: sequence errors, deviation from the reference pattern, abnormality.
-
-    The reference is each foot's own mean stride where none is given.
-    """
-    found: dict[str, dict[str, float | None]] = {}
-    for foot, own in contacts.items():
-        walked = [stride for stride in strides if stride.foot == foot and not stride.gap]
-        wrong, count = sequence_errors(own, walked)
-        wanted = reference.get(foot) if reference else pattern(walked, time_s[foot], loads[foot])
-        deviation = None
-        if walked and wanted is not None and wanted.shape[1] == loads[foot].shape[1]:
-            deviation = float(np.mean(deviations(walked, time_s[foot], loads[foot], wanted)))
-        inside = np.zeros(time_s[foot].size, dtype=bool)
-        for stride in walked:
-            first, last = np.searchsorted(time_s[foot], [stride.start_s, stride.end_s])
-            inside[first:last] = True
-        found[foot] = {
-            "sequence_error_percent": 100.0 * wrong / count if count else None,
-            "deviation_percent": deviation,
-            "abnormality_percent": float(100.0 * abnormality[foot][inside].mean()) if inside.any() else None,
-        }
-    return found

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from smartshoe.gait.flag import Flag
 from smartshoe.gait.indices import sequence_errors
-from smartshoe.gait.result import FootCourse
+from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.trial import FEET, Foot
 from smartshoe.recording import REGIONS
@@ -35,7 +35,7 @@ SURE_S = 0.01
 DRIFT_S, DRIFT_SDS = 0.02, 6.0
 
 
-def label_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], strides: Sequence[Stride]) -> list[Flag]:
+def label_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], strides: Sequence[Stride]) -> list[Flag]:
     """Metatarsals, columns or shoes that seem exchanged."""
     flags: list[Flag] = []
     for name, foot in feet.items():
@@ -49,10 +49,10 @@ def label_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], str
                     foot=name,
                 )
             )
-    # Without all units a foot's course has holes of its own, and nothing follows from its order.
-    whole = all(len(course.regions) == len(REGIONS) for course in courses.values())
-    in_order = all(_is_in_order(course, strides) for course in courses.values())
-    region = _exchanged_sides(feet, courses) if whole and not in_order else None
+    # Without all units a foot's load has holes of its own, and nothing follows from its order.
+    whole = all(len(one.regions) == len(REGIONS) for one in series.values())
+    in_order = all(_is_in_order(one, strides) for one in series.values())
+    region = _exchanged_sides(feet, series) if whole and not in_order else None
     if region is not None:
         flags.append(
             Flag(
@@ -62,8 +62,8 @@ def label_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], str
             )
         )
     else:
-        flags += [flag for course in courses.values() if (flag := _out_of_order(course, strides)) is not None]
-    inside_out = [name for name, course in courses.items() if _is_inside_out(course)]
+        flags += [flag for one in series.values() if (flag := _out_of_order(one, strides)) is not None]
+    inside_out = [name for name, one in series.items() if _is_inside_out(one)]
     if len(inside_out) == 2:
         flags.append(
             Flag(
@@ -84,19 +84,19 @@ def label_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], str
     return flags
 
 
-def _is_in_order(course: FootCourse, strides: Sequence[Stride]) -> bool:
-    wrong, count = sequence_errors(course.contacts, [stride for stride in strides if stride.foot == course.name])
+def _is_in_order(series: FootSeries, strides: Sequence[Stride]) -> bool:
+    wrong, count = sequence_errors(series.contacts, [stride for stride in strides if stride.foot == series.name])
     return count >= FEWEST and wrong < MOSTLY_WRONG * count
 
 
-def _exchanged_sides(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse]) -> str | None:
+def _exchanged_sides(feet: Mapping[str, Foot], series: Mapping[str, FootSeries]) -> str | None:
     """The region whose left and right columns, exchanged back, would let both feet swing; None where none would.
 
     A foot that carries a column of the other one is loaded while it should swing.
     """
     if len(feet) < 2 or feet["left"].regions != feet["right"].regions:
         return None
-    peaks = [float(course.usual_peak.sum()) for course in courses.values()]
+    peaks = [float(one.usual_peak.sum()) for one in series.values()]
     if min(peaks) < ALIKE * max(peaks) or feet["left"].time_s[-1] - feet["left"].time_s[0] < LEAST_LOOKED_S:
         return None
     first = feet["left"].load
@@ -118,18 +118,18 @@ def _quiet(whole: Array) -> float:
     return float(np.mean(whole < low + 0.1 * (high - low))) if high > low else 0.0
 
 
-def _out_of_order(course: FootCourse, strides: Sequence[Stride]) -> Flag | None:
+def _out_of_order(series: FootSeries, strides: Sequence[Stride]) -> Flag | None:
     """Said of a foot whose stances mostly break the order heel, flat, heel off; None where they do not."""
-    own = [stride for stride in strides if stride.foot == course.name]
-    wrong, count = sequence_errors(course.contacts, own)
+    own = [stride for stride in strides if stride.foot == series.name]
+    wrong, count = sequence_errors(series.contacts, own)
     if count < FEWEST or wrong < MOSTLY_WRONG * count:
         return None
-    heel, toe = course.contacts.of_region("heel"), course.contacts.of_region("toe")
-    if heel is None or len(course.regions) < len(REGIONS):
+    heel, toe = series.contacts.of_region("heel"), series.contacts.of_region("toe")
+    if heel is None or len(series.regions) < len(REGIONS):
         return None
     cause = "the person walks on the forefoot, or columns are exchanged"
     if toe is not None:
-        onset = course.contacts.onset_s
+        onset = series.contacts.onset_s
         with np.errstate(invalid="ignore"):
             last = float(np.mean(onset[:, heel] >= np.nanmax(np.where(np.isnan(onset), -np.inf, onset), axis=1)))
             first = float(np.mean(onset[:, toe] <= np.nanmin(np.where(np.isnan(onset), np.inf, onset), axis=1)))
@@ -141,23 +141,23 @@ def _out_of_order(course: FootCourse, strides: Sequence[Stride]) -> Flag | None:
             )
     return Flag(
         "sequence_broken",
-        f"{100 * wrong / count:.0f} % of the {course.name} foot's strides do not go heel strike, foot flat, heel off,"
+        f"{100 * wrong / count:.0f} % of the {series.name} foot's strides do not go heel strike, foot flat, heel off,"
         f" toe off: {cause}",
-        foot=course.name,
+        foot=series.name,
     )
 
 
-def _is_inside_out(course: FootCourse) -> bool:
-    contacts = course.contacts
+def _is_inside_out(series: FootSeries) -> bool:
+    contacts = series.contacts
     meta4, meta1 = contacts.of_region("meta4"), contacts.of_region("meta1")
-    if meta4 is None or meta1 is None or not course.usual_peak[meta1] > course.usual_peak[meta4]:
+    if meta4 is None or meta1 is None or not series.usual_peak[meta1] > series.usual_peak[meta4]:
         return False
     onset4, onset1 = contacts.onset_s[:, meta4], contacts.onset_s[:, meta1]
     both = np.isfinite(onset4) & np.isfinite(onset1)
     return int(both.sum()) >= FEWEST and float(np.mean(onset4[both] < onset1[both])) < SELDOM
 
 
-def clock_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], strides: Sequence[Stride]) -> list[Flag]:
+def clock_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], strides: Sequence[Stride]) -> list[Flag]:
     """Whether the right shoe's clock is apart from the left's, by the two double supports (or flights) of a stride.
 
     A clock that is late by d makes one longer by d and the other shorter by d. So does a limp; only where walking
@@ -165,7 +165,7 @@ def clock_flags(feet: Mapping[str, Foot], courses: Mapping[str, FootCourse], str
     """
     if len(feet) < 2 or not strides or feet["left"].regions != feet["right"].regions:
         return []
-    left, right = courses["left"].contacts, courses["right"].contacts
+    left, right = series["left"].contacts, series["right"].contacts
     first_s, at_s = _overlaps(left.strike_s, right.strike_s, right.toe_off_s)
     second_s, other_s = _overlaps(right.strike_s, left.strike_s, left.toe_off_s)
     if first_s.size < FEWEST or second_s.size < FEWEST:

@@ -4,102 +4,68 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.display import Shown, SummaryTable, panels, significant
 from smartshoe.errors import UsageError
-from smartshoe.gait.contact import Contacts
 from smartshoe.gait.coverage import Coverage
+from smartshoe.gait.events import Event
 from smartshoe.gait.flag import Flag
+from smartshoe.gait.force_sums import Forces
 from smartshoe.gait.phases import PHASES as STATES
+from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import Activity
-from smartshoe.gait.total import BodyWeight
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Table = Literal["strides", "events", "forces"]
 
 SCHEMA = "smartshoe.gait/1"
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
-    """A gait event of one foot: heel_strike, foot_flat, heel_off or toe_off."""
+class Figures(dict[str, Any]):
+    """Figures by name; called, the table of them for a person, as the other results' ``summary()``."""
 
-    time_s: float
-    foot: str
-    event: str
+    def __init__(self, figures: Mapping[str, Any], table: SummaryTable) -> None:
+        super().__init__(figures)
+        self._table = table
 
-
-@dataclass(frozen=True, eq=False)
-class FootCourse:
-    """One foot against time: everything (n,) or (n, r) on ``time_s`` (n,).
-
-    ``load`` (n, r) of its units above their floors, in N where ``is_force``; ``force_n`` (n,) the whole foot's,
-    coverage allowed for, None where the loads are no forces; ``sd_n`` (n,) its error bar by the estimator, None
-    without one (it knows nothing of what passes beside the units); ``centre`` (n, 2) of pressure, along and medial as
-    shares of the insole's length, NaN in swing; ``state`` (n,) an index into `smartshoe.gait.phases.PHASES`;
-    ``membership`` (n, 6) in `smartshoe.gait.membership.PHASES`, ``abnormality`` (n,).
-    """
-
-    name: str
-    time_s: Array
-    rate_hz: float
-    regions: tuple[str, ...]
-    symbol: str
-    is_force: bool
-    load: Array
-    force_n: Array | None
-    sd_n: Array | None
-    centre: Array
-    state: NDArray[np.int8]
-    membership: Array
-    abnormality: Array
-    missing: Mask
-    contacts: Contacts
-    usual_peak: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Forces of the whole body in N; None where they cannot be known."""
-
-    body_weight: BodyWeight | None
-    mean_total_n: float | None
-    standing_total_n: float | None
-    rmse_estimate_n: float | None
+    def __call__(self) -> str:
+        """The table for a person, as text of several lines."""
+        return self._table.to_text()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GaitResult(Shown):
-    """A trial: ``events`` in order of time, ``strides`` in order of their start, ``summary`` and ``indices`` by name.
+class TrialResult(Shown):
+    """What is known of any trial: ``events`` in order of time, ``strides`` in that of their start, ``indices`` by foot.
 
-    ``feet`` holds each foot against time, ``total_time_s`` and ``total_n`` (n,) both feet's force, None where it is
-    not known. ``coverage`` is the share that the units bear, ``covering`` how it was allowed for. `to_dict` is the
-    object of ``smartshoe gait --json``.
+    ``figures`` are what `summary` shows. ``coverage`` is the share that the units bear, ``covering`` how it was allowed
+    for. `to_dict` is the object of ``smartshoe gait --json``.
     """
 
     activity: Activity
     events: tuple[Event, ...]
     strides: tuple[Stride, ...]
-    summary: Mapping[str, Any]
+    figures: Mapping[str, Any]
     indices: Mapping[str, Mapping[str, float | None]]
     forces: Forces
     flags: tuple[Flag, ...]
-    feet: Mapping[str, FootCourse]
-    total_time_s: Array
-    total_n: Array | None
     coverage: float
     covering: Coverage
-    standing_s: Sequence[tuple[float, float]]
+
+    _tables: ClassVar[tuple[str, ...]] = ("strides", "events")
+
+    @property
+    def summary(self) -> Figures:
+        """Figures by name, ``summary["cadence_steps_per_min"]``; ``summary()`` is their table as text."""
+        return Figures(self.figures, self._summary_table())
 
     def to_dict(self) -> dict[str, Any]:
         """Schema smartshoe.gait/1; no NaN, no infinity."""
@@ -109,7 +75,7 @@ class GaitResult(Shown):
             "activity": self.activity,
             "events": [{"time_s": e.time_s, "foot": e.foot, "event": e.event} for e in self.events],
             "strides": [stride.to_dict() for stride in self.strides],
-            "summary": dict(self.summary),
+            "summary": dict(self.figures),
             "indices": {foot: dict(values) for foot, values in self.indices.items()},
             "forces": {
                 "body_weight_n": None if weight is None else {"value": weight.value, "sd": weight.sd},
@@ -123,7 +89,7 @@ class GaitResult(Shown):
         }
 
     def to_frame(self, table: Table = "strides") -> pd.DataFrame:
-        """A pandas DataFrame: ``strides`` (one row each), ``events``, or ``forces`` (one row a sample)."""
+        """A pandas DataFrame: ``strides`` (one row each) or ``events``; raises `UsageError` for another table."""
         import pandas as pd
 
         if table == "strides":
@@ -131,16 +97,53 @@ class GaitResult(Shown):
             return pd.DataFrame([stride.to_dict() for stride in self.strides], columns=columns)
         if table == "events":
             return pd.DataFrame([(e.time_s, e.foot, e.event) for e in self.events], columns=["time_s", "foot", "event"])
-        if table == "forces":
-            forces = self.columns()
-            for name in self.feet:
-                forces[f"{name}_phase"] = pd.Categorical.from_codes(forces[f"{name}_phase"], pd.Index(STATES))
-            return pd.DataFrame(forces)
-        raise UsageError(f"table {table!r} is not known: use strides, events or forces")
+        known = ", ".join(self._tables)
+        raise UsageError(f"table {table!r} is not known of a {type(self).__name__}: use one of {known}")
+
+    def _summary_table(self) -> SummaryTable:
+        weight = self.forces.body_weight
+        rows = [
+            [name.replace("_", " "), significant(value) if isinstance(value, (int, float)) else str(value)]
+            for name, value in self.figures.items()
+            if value is not None and not isinstance(value, Mapping)
+        ]
+        said = "" if weight is None else f", body weight {significant(weight.value)} N ({weight.source})"
+        return SummaryTable(
+            f"{self.activity}: {len(self.strides)} strides, {len(self.events)} events{said}",
+            ["figure", "value"],
+            rows,
+            [flag.says for flag in self.flags],
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GaitResult(TrialResult):
+    """A trial with its signals: ``feet`` holds each foot against time.
+
+    ``total_time_s`` and ``total_n`` (n,) are both feet's force, None where it is not known; ``standing_s`` are begin
+    and end of each spell of standing.
+    """
+
+    feet: Mapping[str, FootSeries]
+    total_time_s: Array
+    total_n: Array | None
+    standing_s: Sequence[tuple[float, float]]
+
+    _tables = ("strides", "events", "forces")
+
+    def to_frame(self, table: Table = "strides") -> pd.DataFrame:
+        """A pandas DataFrame: ``strides`` (one row each), ``events``, or ``forces`` (one row a sample)."""
+        if table != "forces":
+            return super().to_frame(table)
+        import pandas as pd
+
+        forces = self.columns()
+        for name in self.feet:
+            forces[f"{name}_phase"] = pd.Categorical.from_codes(forces[f"{name}_phase"], pd.Index(STATES))
+        return pd.DataFrame(forces)
 
     def plot(self) -> Figure:
         """A figure: by foot, its force over time (its units' readings where no force is known), and the events."""
-        self.columns()  # a streamed trial, which keeps none, says so
         figure, axes = panels(len(self.feet))
         for axis, (name, foot) in zip(axes, self.feet.items(), strict=True):
             if foot.force_n is not None:
@@ -154,21 +157,6 @@ class GaitResult(Shown):
             axis.set(title=name, xlabel="time (s)", ylabel=f"{'force' if foot.is_force else 'reading'} ({unit})")
             axis.legend(loc="upper right")
         return figure
-
-    def _summary_table(self) -> SummaryTable:
-        weight = self.forces.body_weight
-        rows = [
-            [name.replace("_", " "), significant(value) if isinstance(value, (int, float)) else str(value)]
-            for name, value in self.summary.items()
-            if value is not None and not isinstance(value, Mapping)
-        ]
-        said = "" if weight is None else f", body weight {significant(weight.value)} N ({weight.source})"
-        return SummaryTable(
-            f"{self.activity}: {len(self.strides)} strides, {len(self.events)} events{said}",
-            ["figure", "value"],
-            rows,
-            [flag.says for flag in self.flags],
-        )
 
     def columns(self) -> dict[str, Any]:
         """The table of forces by column: units, feet, total, centre of pressure (% of the insole), phase.
@@ -196,7 +184,46 @@ class GaitResult(Shown):
         return found
 
 
-def _on(base: Array, foot: FootCourse, values: Array) -> Array:
+def _on(base: Array, foot: FootSeries, values: Array) -> Array:
     if base is foot.time_s:
         return values
     return np.asarray(np.interp(base, foot.time_s, values, left=np.nan, right=np.nan))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DayResult(TrialResult):
+    """A long trial: numbers and flags of the whole, and no signal against time.
+
+    ``events`` and ``strides`` are the first ones, up to ``listed_s``, of ``event_count`` and ``stride_count``.
+    """
+
+    duration_s: float
+    recorded_s: float
+    event_count: int
+    stride_count: int
+    listed_s: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema smartshoe.gait/1 with an object ``stream`` beside it."""
+        return super().to_dict() | {
+            "stream": {
+                "duration_s": self.duration_s,
+                "recorded_s": self.recorded_s,
+                "events": self.event_count,
+                "strides": self.stride_count,
+                "listed_to_s": self.listed_s,
+            }
+        }
+
+    def plot(self) -> Figure:
+        """A figure: by foot, how long each listed stride lasts, and the share of it that the foot is down."""
+        figure, (times, shares) = panels(2)
+        for name in self.indices:
+            own = [stride for stride in self.strides if stride.foot == name]
+            start_s = [stride.start_s for stride in own]
+            times.plot(start_s, [stride.time_s for stride in own], ".", markersize=3, label=name)
+            shares.plot(start_s, [stride.stance_percent for stride in own], ".", markersize=3, label=name)
+        times.set(ylabel="stride time (s)")
+        shares.set(xlabel="time (s)", ylabel="stance (% of stride)")
+        times.legend(loc="upper right")
+        return figure

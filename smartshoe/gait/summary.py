@@ -19,14 +19,6 @@ LONGEST_STEP_S = 2.0
 ROUNDING = 1e-9  # of a stride
 
 
-def activity_of(strides: Sequence[Stride], standing_s: float) -> Activity:
-    """What most of the trial is, by time: walking, running (the foot is down for less than half a stride), standing."""
-    feet = {stride.foot for stride in strides}
-    running_s = float(sum(s.time_s for s in strides if s.runs)) / max(len(feet), 1)
-    walking_s = float(sum(s.time_s for s in strides if not s.runs)) / max(len(feet), 1)
-    return activity_by_time({"walking": walking_s, "running": running_s, "standing": standing_s})
-
-
 def activity_by_time(spent: Mapping[Activity, float]) -> Activity:
     """The activity that most of the time in s is spent on, "mixed" where none is."""
     whole = sum(spent.values())

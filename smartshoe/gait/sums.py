@@ -1,4 +1,4 @@
-"""What a trial comes to, by running sums: of a trial at once, or of a day stretch by stretch."""
+"""What a trial comes to, by running sums: of a trial at once, or of a day window by window."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Moments:
     squares: float = 0.0
 
     def add(self, values: ArrayLike) -> None:
-        """More of them."""
+        """Take in more values (n,)."""
         values = np.asarray(values, dtype=float)
         if values.size == 0:
             return

@@ -13,7 +13,7 @@ import pytest
 import smartshoe
 from simulators.people import Person, Run, Stand, Walk, trial
 from smartshoe.calibration import Calibration
-from smartshoe.calibration.estimators import NAMES, estimator
+from smartshoe.calibration.estimators import estimator, estimator_names
 from smartshoe.protocol import dynamic_protocol, static_protocol
 from smartshoe.recording import REGIONS
 
@@ -51,7 +51,9 @@ def calibrations(options: dict[str, Any], seed: int) -> tuple[dict[str, Calibrat
 
 @pytest.mark.bank
 def test_which_estimator_is_best() -> None:
-    print("\n| units | trial | " + " | ".join(NAMES) + " |\n| --- | --- |" + " --- |" * len(NAMES))
+    print(
+        "\n| units | trial | " + " | ".join(estimator_names()) + " |\n| --- | --- |" + " --- |" * len(estimator_names())
+    )
     best: dict[tuple[str, str], str] = {}
     for kind, options in UNITS.items():
         plain, extended = calibrations(options, seed=100)
@@ -62,7 +64,7 @@ def test_which_estimator_is_best() -> None:
             )  # fmt: skip
             cells = []
             scores: dict[str, float] = {}
-            for name in NAMES:
+            for name in estimator_names():
                 chosen = extended if name == "inverse" else plain
                 if not chosen:
                     cells.append("")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import cache
+from importlib.metadata import EntryPoint
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,17 +16,26 @@ from scipy.signal import lfilter
 import smartshoe
 from simulators.people import Person, Walk, trial
 from smartshoe.calibration import Calibration
-from smartshoe.calibration.estimators import NAMES, estimator
+from smartshoe.calibration.estimators import (
+    Estimator,
+    ForceEstimate,
+    ForceRun,
+    estimator,
+    estimator_names,
+    methods,
+)
 from smartshoe.calibration.estimators.kalman import filter_of
+from smartshoe.calibration.estimators.methods.imm import InteractingModels
 from smartshoe.calibration.estimators.reading_noise import reading_noise_sd
 from smartshoe.calibration.estimators.state_space import contact_model, likely_density
 from smartshoe.errors import InputError, UsageError
 from smartshoe.models import StandardLinearSolid
 from smartshoe.protocol import dynamic_protocol, static_protocol
+from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
 RATE_HZ = 200.0
-LINEAR = tuple(name for name in NAMES if name != "inverse")
+LINEAR = tuple(name for name in estimator_names() if name != "inverse")
 
 
 @cache
@@ -130,11 +141,11 @@ def test_on_a_walk_the_error_bars_hold_and_the_smoother_is_best(unit: str) -> No
 
 
 def test_the_probability_of_contact_follows_the_foot() -> None:
-    from smartshoe.calibration.estimators.imm import InteractingModels
-
     c, made = calibrated("left_heel"), walked()
-    mixed = InteractingModels(c, RATE_HZ)
-    mixed.estimate(made.recording.channels["left_heel"].values)
+    readings = made.recording.channels["left_heel"].values
+    there = np.zeros(readings.size, dtype=bool)
+    mixed = InteractingModels(c, RATE_HZ).begin(readings, there)
+    mixed.push(readings, there)
     load_n = made.unit_n["left_heel"]
     assert np.median(mixed.contact[load_n > 100.0]) > 0.99
     assert np.median(mixed.contact[(load_n == 0.0) & (np.arange(load_n.size) > 400)]) < 0.2
@@ -170,7 +181,7 @@ def test_the_steady_filter_is_what_filterpy_settles_to() -> None:
     rng = np.random.default_rng(2)
     values = 20.0 + np.cumsum(rng.standard_normal(1500))
     innovation, variance = _steady_innovations(model, values)
-    found = filter_of(model, c, values)
+    found = filter_of(model, c, values[0], float(np.max(np.abs(values))))
     seen = []
     for k, value in enumerate(values):
         if k:
@@ -193,7 +204,7 @@ def test_at_one_step_a_second_the_papers_filter_is_nearly_a_pure_gain(k1: float,
 
 
 REFUSED = [
-    (lambda: estimator("median", plain()), UsageError, "static, lead"),
+    (lambda: estimator("median", plain()), UsageError, "lead, smoother, static"),
     (lambda: estimator("inverse", plain()), UsageError, "no extended model"),
     (lambda: estimator("kalman", plain(), 0.0), UsageError, "rate above 0"),
     (lambda: estimator("kalman", plain(b0=-1.0), 100.0).estimate(np.ones(9)), InputError, "b0 and b1"),
@@ -208,3 +219,54 @@ REFUSED = [
 def test_what_cannot_be_estimated_is_refused(call: Any, error: type[Exception], says: str) -> None:
     with pytest.raises(error, match=says):
         call()
+
+
+@pytest.mark.parametrize("name", LINEAR)
+@settings(max_examples=6)
+@given(cuts=st.lists(st.integers(0, 700), max_size=4), seed=st.integers(0, 99))
+def test_a_stream_gives_the_forces_of_the_whole_whatever_its_blocks(name: str, cuts: list[int], seed: int) -> None:
+    c, rng = plain(), np.random.default_rng(seed)
+    readings = reading_of(200.0 * np.sin(np.linspace(0.0, 25.0, 700)) ** 2, c) + 0.1 * rng.standard_normal(700)
+    missing = np.zeros(700, dtype=bool)
+    missing[300:305] = True
+    chosen = estimator(name, c, RATE_HZ, noise_sd=0.1)
+    whole, run = chosen.estimate(readings, missing), chosen.begin(readings, missing)
+    blocks = [slice(a, b) for a, b in pairwise([0, *sorted(cuts), 700])]
+    found = np.concatenate([*(run.push(readings[k], missing[k]).force_n for k in blocks), run.finish().force_n])
+    # A smoother's stream waits two seconds for what comes after a reading; the others are the same to the bit.
+    assert found == pytest.approx(whole.force_n, abs=1e-4 if name == "smoother" else 0.0)
+
+
+class Halved(Estimator):
+    """What another package may offer: half the reading, known one block later."""
+
+    def begin(self, readings: np.ndarray, missing: np.ndarray) -> ForceRun:
+        return HalvedRun()
+
+
+class HalvedRun(ForceRun):
+    def __init__(self) -> None:
+        self._last = np.zeros(0)
+
+    def push(self, readings: np.ndarray, missing: np.ndarray) -> ForceEstimate:
+        self._last, now = 0.5 * readings, self._last
+        return ForceEstimate(now, np.ones(now.size))
+
+    def finish(self) -> ForceEstimate:
+        return ForceEstimate(self._last, np.ones(self._last.size))
+
+
+def test_another_package_offers_an_estimator_by_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    offered = {"halved": f"{__name__}:Halved", "broken": f"{__name__}:nothing", "wrong": f"{__name__}:MILLIBAR"}
+    entries = [EntryPoint(name, value, methods.GROUP) for name, value in offered.items()]
+    monkeypatch.setattr(methods, "entry_points", lambda group: entries if group == methods.GROUP else [])
+    assert {"halved", "smoother"} <= set(estimator_names())
+    assert estimator("halved", plain(), RATE_HZ).estimate([2.0, 4.0]).force_n.tolist() == [1.0, 2.0]
+    readings = 400.0 * np.sin(np.arange(2000) / 30.0) ** 2
+    walk = Recording.from_arrays(time_s=np.arange(2000) / RATE_HZ, left_heel_mbar=readings)
+    found = smartshoe.gait.analyse(walk, [plain(unit="left_heel")], estimator="halved")
+    assert found.feet["left"].load.max() == pytest.approx(200.0, abs=5.0)
+    with pytest.raises(UsageError, match=r"broken .* cannot be loaded"):
+        estimator("broken", plain())
+    with pytest.raises(UsageError, match=r"wrong .* is no class"):
+        estimator("wrong", plain())

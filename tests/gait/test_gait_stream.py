@@ -18,11 +18,11 @@ from trials import recorded, walked
 
 from simulators.people import Person, Run, Stand, Walk, trial
 from smartshoe.calibration import Calibration
-from smartshoe.errors import InputError, RefusedError, UnitError
+from smartshoe.errors import InputError, RefusedError, UnitError, UsageError
 from smartshoe.files.atomic import json_text
 from smartshoe.gait import Coverage, GaitResult, analyse, day
 from smartshoe.gait.day import DayResult, analyse_stream
-from smartshoe.gait.result import Event
+from smartshoe.gait.events import Event
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.sums import Moments
 from smartshoe.recording import Recording
@@ -87,6 +87,34 @@ def test_readings_in_mbar_go_through_the_same_filters() -> None:
     filters = [Calibration(a1=0.2, b0=2.0, b1=0.5, reading_unit=MILLIBAR, unit=name) for name in various().channels]
     found = analyse_stream(in_blocks(pressed, 3000), filters, coverage=0.8)
     assert_same_trial(found, analyse(pressed, filters, coverage=0.8))
+
+
+@pytest.mark.parametrize("name", ["static", "lead", "kalman", "smoother"])
+def test_an_estimator_gives_a_stream_the_forces_of_the_whole(name: str) -> None:
+    columns = {name.replace("_n", "_mbar"): 0.2 * values for name, values in columns_of(walked(40.0).recording).items()}
+    columns["left_heel_mbar"][2000:2003] = np.nan
+    pressed = recorded(walked(40.0).time_s, {n: v for n, v in columns.items() if n.endswith(("heel_mbar", "toe_mbar"))})
+    units = [Calibration(a1=0.2, b0=5.2, b1=1.0, reading_unit=MILLIBAR, unit=name) for name in pressed.channels]
+    found = analyse_stream(in_blocks(pressed, 1500), units, estimator=name)
+    whole = analyse(pressed, units, estimator=name)
+    # The record is shorter than the first look, so noise and density are the same; the smoother waits two seconds,
+    # and what it has not seen by then moves a load by less than this.
+    assert len(found.strides) == len(whole.strides) > 20
+    for own, other in zip(found.strides, whole.strides, strict=True):
+        assert_same_numbers(own.to_dict(), other.to_dict(), rel=1e-7)
+    assert_same_numbers(found.to_dict()["forces"], whole.to_dict()["forces"], rel=1e-7)
+
+
+def test_a_day_shows_itself_and_has_no_table_of_forces() -> None:
+    found = analyse_stream(in_blocks(various(), 30_000), coverage=0.8)
+    assert "body weight" in repr(found)
+    assert "\n" not in repr(found)
+    assert found.summary().splitlines()[0] in repr(found)
+    assert found.summary["stride_time_s"]["left"]["mean"] > 0.5
+    assert all(axis.lines for axis in found.plot().axes)
+    with pytest.raises(UsageError, match="'forces' is not known of a DayResult: use one of strides, events"):
+        found.to_frame("forces")
+    assert len(found.to_frame()) == found.stride_count
 
 
 def test_a_course_of_coverage_is_the_same_over_each_stance() -> None:

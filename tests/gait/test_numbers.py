@@ -22,7 +22,6 @@ from smartshoe.gait.insole import PLACES
 from smartshoe.gait.membership import PHASES
 from smartshoe.gait.strides import loading_rate, strides_of
 from smartshoe.gait.summary import asymmetry
-from smartshoe.gait.total import standing_mean
 from smartshoe.recording import REGIONS
 
 
@@ -249,8 +248,8 @@ def test_the_sd_of_a_standing_weight_is_that_of_the_mean_of_its_blocks() -> None
     # Half a second is left out at either end; 20 blocks of 2 s are 10 N above and below 700 N in turn.
     block = np.floor((time_s - 0.5 + 1e-6) / 2.0)
     total_n = 700.0 + np.where(block % 2 == 0, 10.0, -10.0)
-    found = standing_mean(time_s, total_n, np.zeros(time_s.size, dtype=bool), [(0.0, 41.0)])
+    found = analyse(recorded(time_s, {"left_heel_n": 0.4 * total_n, "right_heel_n": 0.6 * total_n})).forces.body_weight
     assert found is not None
-    assert found.mean_n == pytest.approx(700.0, abs=0.05)
-    assert found.length_s == pytest.approx(40.0, abs=0.02)
-    assert found.sd_n == pytest.approx(10.0 / np.sqrt(19.0), rel=0.01)
+    assert found.source == "standing"
+    assert found.value == pytest.approx(700.0, abs=0.05)
+    assert found.sd == pytest.approx(10.0 / np.sqrt(19.0), rel=0.01)

@@ -30,14 +30,27 @@ class ForceEstimate:
     sd_n: Array
 
 
+class ForceRun(ABC):
+    """An estimator under way: readings (n,) in, block after block, forces out, those of the last ones maybe later."""
+
+    @abstractmethod
+    def push(self, readings: Array, missing: Mask) -> ForceEstimate:
+        """The forces that the next readings make known; by the reading's noise alone their error bars."""
+
+    def finish(self) -> ForceEstimate:
+        """The forces that the end of the readings makes known: none, where none wait."""
+        return ForceEstimate(np.zeros(0), np.zeros(0))
+
+
 class Estimator(ABC):
-    """Readings of one unit, evenly sampled, to force with an error bar. Missing readings are a mask, never NaN."""
+    """Readings of one unit, evenly sampled, to force with an error bar. Missing readings are a mask, never NaN.
 
-    name: str
+    A kind of estimator writes `begin` and the run that it gives; a whole signal and a stream are the same run.
+    ``noise_sd`` in the reading's unit is found from the readings where it is None.
+    """
 
-    def __init__(self, calibration: Calibration) -> None:
-        self.calibration = calibration
-        self._gain_sd = gain_sd(calibration)
+    def __init__(self, calibration: Calibration, sample_rate_hz: float, *, noise_sd: float | None = None) -> None:
+        self.calibration, self.sample_rate_hz, self.noise_sd = calibration, sample_rate_hz, noise_sd
 
     def estimate(self, readings: ArrayLike, missing: Mask | None = None) -> ForceEstimate:
         """Force of the whole signal ``readings`` (n,) in the calibration's reading unit; ``missing`` (n,) is bool.
@@ -56,12 +69,15 @@ class Estimator(ABC):
             raise InputError(f"reading {at} is not finite: mask it as missing")
         if absent.all():
             raise InputError("every reading is missing: there is no force to estimate")
-        force_n, sd_n = self._estimate(values, absent)
-        return ForceEstimate(force_n, np.hypot(sd_n, self._gain_sd * force_n))
+        run = self.begin(values, absent)
+        found = (run.push(values, absent), run.finish())
+        force_n = np.concatenate([one.force_n for one in found])
+        sd_n = np.concatenate([one.sd_n for one in found])
+        return ForceEstimate(force_n, np.hypot(sd_n, gain_sd(self.calibration) * force_n))
 
     @abstractmethod
-    def _estimate(self, readings: Array, missing: Mask) -> tuple[Array, Array]:
-        """Force (n,) and its standard deviation (n,) by the reading's noise alone, in N."""
+    def begin(self, readings: Array, missing: Mask) -> ForceRun:
+        """A run from a fresh start; what it must know of noise and load is found from these readings (n,)."""
 
 
 def gain_sd(calibration: Calibration) -> float:

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from smartshoe.gait.indices import POINTS, overlaid
 from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
-from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.gait.result import GaitResult
+from smartshoe.gait.series import FootSeries
 from smartshoe.gait.summary import of_main_activity
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.gait.strides import main_strides, whole_of
@@ -23,19 +24,19 @@ PHASE_COLOURS = ("line", "heel", "corrected", "meta1")
 MEMBER_COLOURS = ("heel", "left", "corrected", "meta1", "toe", "soft")
 
 
-def _label(foot: FootCourse) -> str:
+def _label(foot: FootSeries) -> str:
     return "vertical force (N)" if foot.force_n is not None else f"sum of readings ({foot.symbol})"
 
 
-def _walked(found: GaitResult) -> list[FootCourse]:
+def _walked(found: GaitResult) -> list[FootSeries]:
     return [foot for foot in found.feet.values() if main_strides(found, foot.name)]
 
 
-def _each(found: GaitResult, foot: FootCourse) -> Array:
+def _each(found: GaitResult, foot: FootSeries) -> Array:
     return overlaid(main_strides(found, foot.name), foot.time_s, whole_of(foot))
 
 
-def _toe_off(found: GaitResult, foot: FootCourse) -> float:
+def _toe_off(found: GaitResult, foot: FootSeries) -> float:
     return float(np.mean([stride.stance_percent for stride in main_strides(found, foot.name)]))
 
 

@@ -7,7 +7,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from smartshoe.gait.insole import OUTLINE, PLACES
-from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.gait.result import GaitResult
+from smartshoe.gait.series import FootSeries
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain
 
@@ -25,7 +26,7 @@ def placed(foot: str, centre: Array) -> Array:
     return np.column_stack([MIDDLE[foot] + INWARDS[foot] * centre[:, 1], centre[:, 0]])
 
 
-def paths_of(found: GaitResult, foot: FootCourse) -> tuple[list[Array], Array]:
+def paths_of(found: GaitResult, foot: FootSeries) -> tuple[list[Array], Array]:
     """Each stance's path, and the mean one (`PATH_POINTS`, 2), at 2 to 98 % of stance."""
     share = np.linspace(0.02, 0.98, PATH_POINTS)
     paths = []
@@ -54,7 +55,7 @@ def _outline(foot: str) -> str:
     return "".join(pieces) + "Z"
 
 
-def _foot(found: GaitResult, foot: FootCourse) -> Markup:
+def _foot(found: GaitResult, foot: FootSeries) -> Markup:
     drawn = [Markup('<path class="sole" d="{}"/>').format(_outline(foot.name))]
     peaks = foot.usual_peak
     share = peaks / max(float(peaks.max()), 1e-12)

@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.gait.result import TrialResult
+from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
 
 Array = NDArray[np.float64]
 
 
-def whole_of(foot: FootCourse) -> Array:
+def whole_of(foot: FootSeries) -> Array:
     """The foot's whole force (n,) in N, or the sum of its readings where there is no force."""
     return foot.force_n if foot.force_n is not None else np.asarray(foot.load.sum(axis=1))
 
 
-def main_strides(found: GaitResult, foot: str) -> list[Stride]:
+def main_strides(found: TrialResult, foot: str) -> list[Stride]:
     """The foot's strides that the summary counts."""
     return [stride for stride in of_main_activity(found.strides) if stride.foot == foot]

@@ -13,7 +13,8 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from smartshoe.gait.insole import OUTLINE, PLACES
-from smartshoe.gait.result import FootCourse, GaitResult
+from smartshoe.gait.result import GaitResult
+from smartshoe.gait.series import FootSeries
 from smartshoe.report.gait.shapes import INWARDS, MIDDLE, paths_of, placed
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.paper.drawing import FOOT_COLOURS, REGION_COLOURS, STYLE, TOTAL
@@ -38,7 +39,7 @@ def outline(foot: str) -> Path:
     return Path(vertices, codes)
 
 
-def _draw_sole(axis: Any, foot: FootCourse) -> None:
+def _draw_sole(axis: Any, foot: FootSeries) -> None:
     axis.add_patch(PathPatch(outline(foot.name), facecolor="#f9fafb", edgecolor="#9ca3af", lw=1.2, zorder=0))
     usual = foot.usual_peak / max(float(foot.usual_peak.max()), 1e-12)
     for region, peak in zip(foot.regions, usual, strict=True):

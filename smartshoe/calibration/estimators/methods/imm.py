@@ -1,0 +1,67 @@
+"""Interacting multiple models: a unit under load and a unit in the air, mixed by how likely each is (filterpy)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from smartshoe.calibration.estimators.estimate import Array, ForceEstimate, ForceRun, Mask
+from smartshoe.calibration.estimators.kalman import KalmanEstimator, ahead, filter_of, straight
+from smartshoe.calibration.estimators.state_space import contact_model, swing_model
+
+STANCE_S, SWING_S = 0.6, 0.4  # how long either lasts on average, at a walk
+FALL_S = 0.02  # within which a load is gone that the foot takes off
+RESIDUAL = 0.002  # of the largest load: what a lace and a sock press in the air
+LEAST_CHANCE = 1e-12  # of a model: below it neither would come back
+
+
+class InteractingModels(KalmanEstimator):
+    """Two Kalman filters, contact and swing, whose probabilities the readings tell (Bar-Shalom 2001, section 11.6)."""
+
+    def _run(self, density: float, noise_sd: float, largest: float) -> InteractingRun:
+        return InteractingRun(self, density, noise_sd, largest)
+
+
+class InteractingRun(ForceRun):
+    """The two under way; ``contact`` (n,) is the probability of contact at each sample of the last block."""
+
+    def __init__(self, kind: InteractingModels, density: float, noise_sd: float, largest: float) -> None:
+        c, rate_hz = kind.calibration, kind.sample_rate_hz
+        self._calibration, self._rate_hz, self._largest = c, rate_hz, largest
+        self._models = (
+            contact_model(c, rate_hz, density, noise_sd),
+            swing_model(c, rate_hz, RESIDUAL * (c.b1 / c.a1 * largest), FALL_S, noise_sd),
+        )
+        self._mixed: Any = None
+        self.contact: Array = np.zeros(0)
+
+    def _begun(self, first: float) -> Any:
+        from filterpy.kalman import IMMEstimator
+
+        filters = [filter_of(model, self._calibration, first, self._largest) for model in self._models]
+        leave, land = 1.0 / (STANCE_S * self._rate_hz), 1.0 / (SWING_S * self._rate_hz)
+        return IMMEstimator(filters, [0.5, 0.5], np.array([[1.0 - leave, leave], [land, 1.0 - land]]))
+
+    def push(self, readings: Array, missing: Mask) -> ForceEstimate:
+        """The forces of the next readings."""
+        values = straight(readings, missing) - self._calibration.offset
+        look = ahead(self._calibration)
+        force_n, sd_n, self.contact = np.empty(values.size), np.empty(values.size), np.empty(values.size)
+        for k, value in enumerate(values):
+            if self._mixed is None:
+                self._mixed = self._begun(value)
+            else:
+                self._mixed.predict()
+            mixed = self._mixed
+            if not missing[k]:
+                mixed.update(value)
+                # A model that is ruled out to the last bit has no likelihood left to come back with.
+                mixed.mu = np.maximum(mixed.mu, LEAST_CHANCE)
+                mixed.mu /= mixed.mu.sum()
+            force_n[k], sd_n[k] = look @ mixed.x[:, 0], np.sqrt(max(look @ mixed.P @ look, 0.0))
+            self.contact[k] = mixed.mu[0]
+        return ForceEstimate(force_n, sd_n)
+
+
+ESTIMATOR = InteractingModels

@@ -1,0 +1,17 @@
+"""The Kalman filter: force from the past, with an error bar that follows the load."""
+
+from __future__ import annotations
+
+from smartshoe.calibration.estimators.kalman import KalmanEstimator, KalmanRun
+from smartshoe.calibration.estimators.state_space import contact_model
+
+
+class Kalman(KalmanEstimator):
+    """A load that wanders, seen through the solid."""
+
+    def _run(self, density: float, noise_sd: float, largest: float) -> KalmanRun:
+        model = contact_model(self.calibration, self.sample_rate_hz, density, noise_sd)
+        return KalmanRun(model, self.calibration, largest)
+
+
+ESTIMATOR = Kalman

@@ -1,0 +1,5 @@
+"""The paper's phase lead: Chinimilli 2016, (13)."""
+
+from smartshoe.calibration.estimators.filtered import Filtered
+
+ESTIMATOR = Filtered

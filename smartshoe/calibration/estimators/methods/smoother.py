@@ -1,0 +1,19 @@
+"""The Rauch-Tung-Striebel smoother: force from past and future."""
+
+from __future__ import annotations
+
+from smartshoe.calibration.estimators.kalman import KalmanEstimator, KalmanRun
+from smartshoe.calibration.estimators.state_space import contact_model
+
+LAG_S = 2.0  # a stream waits so long: what comes later says nothing of a load any more
+
+
+class Smoother(KalmanEstimator):
+    """The Kalman filter's states, corrected by what came after them."""
+
+    def _run(self, density: float, noise_sd: float, largest: float) -> KalmanRun:
+        model = contact_model(self.calibration, self.sample_rate_hz, density, noise_sd)
+        return KalmanRun(model, self.calibration, largest, round(LAG_S * self.sample_rate_hz))
+
+
+ESTIMATOR = Smoother
