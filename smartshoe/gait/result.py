@@ -43,7 +43,7 @@ class Figures(dict[str, Any]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrialResult(Shown):
+class GaitFindings(Shown):
     """What is known of any trial: ``events`` in order of time, ``strides`` in that of their start, ``indices`` by foot.
 
     ``figures`` are what `summary` shows. ``coverage`` is the share that the units bear, ``covering`` how it was allowed
@@ -117,7 +117,7 @@ class TrialResult(Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GaitResult(TrialResult):
+class GaitResult(GaitFindings):
     """A trial with its signals: ``feet`` holds each foot against time.
 
     ``total_time_s`` and ``total_n`` (n,) are both feet's force, None where it is not known; ``standing_s`` are begin
@@ -191,7 +191,7 @@ def _on(base: Array, foot: FootSeries, values: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DayResult(TrialResult):
+class DayResult(GaitFindings):
     """A long trial: numbers and flags of the whole, and no signal against time.
 
     ``events`` and ``strides`` are the first ones, up to ``listed_s``, of ``event_count`` and ``stride_count``.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.gait.result import TrialResult
+from smartshoe.gait.result import GaitFindings
 from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
@@ -18,6 +18,6 @@ def whole_of(foot: FootSeries) -> Array:
     return foot.force_n if foot.force_n is not None else np.asarray(foot.load.sum(axis=1))
 
 
-def main_strides(found: TrialResult, foot: str) -> list[Stride]:
+def main_strides(found: GaitFindings, foot: str) -> list[Stride]:
     """The foot's strides that the summary counts."""
     return [stride for stride in of_main_activity(found.strides) if stride.foot == foot]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.gait.result import TrialResult
+from smartshoe.gait.result import GaitFindings
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
@@ -18,12 +18,12 @@ COVERAGE_NOTE = (
 )
 
 
-def depends_on_coverage(found: TrialResult) -> bool:
+def depends_on_coverage(found: GaitFindings) -> bool:
     """Whether forces of feet rest on a coverage that nobody gave."""
     return found.coverage == 1.0 and any(own["mean"] is not None for own in found.figures["peak_n"].values())
 
 
-def _peaks(found: TrialResult, foot: str) -> str:
+def _peaks(found: GaitFindings, foot: str) -> str:
     """The mean peak with its 95 % interval: of the mean over strides, and the estimate's own error."""
     own = [stride.peak_n for stride in main_strides(found, foot) if stride.peak_n is not None]
     if len(own) < 2:
@@ -40,7 +40,7 @@ def _cv(spread: dict[str, Any] | None, digits: int = 3) -> str:
     return plain(spread["mean"], digits) + ("" if cv is None else f" ({cv:.1f} %)")
 
 
-def by_foot(found: TrialResult) -> list[tuple[str, list[str]]]:
+def by_foot(found: GaitFindings) -> list[tuple[str, list[str]]]:
     """Rows of the table: what, and each foot's cell; rows that say nothing are left out."""
     summary = found.figures
     feet = list(found.indices)
@@ -61,7 +61,7 @@ def by_foot(found: TrialResult) -> list[tuple[str, list[str]]]:
     return [(name, cells) for name, cells in rows if any(cell not in ("–", "0") for cell in cells)]
 
 
-def print_gait(found: TrialResult, title: str) -> None:
+def print_gait(found: GaitFindings, title: str) -> None:
     """Times and forces by foot, then what concerns both, then the flags."""
     summary = found.figures
     table = table_of(f"{title}: {found.activity}; mean (variation)", ["", *found.indices])
