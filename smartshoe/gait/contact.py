@@ -24,10 +24,11 @@ APART_S = 0.05
 class Contacts:
     """A foot's contacts in order of time, m of them, and the floors beside them.
 
-    ``strike_s`` and ``toe_off_s`` (m,): from when to when the foot bears more than 2 % of its usual peak, as a plate
-    read at 10 to 20 N says; NaN where the contact began before the record or lasts beyond it. ``onset_s`` and
-    ``release_s`` (m, r): the same of each unit in ``regions``, by the same level; NaN where not seen.
-    ``floor_time_s`` (k,) and ``floor`` (k, r): what each unit reads in swing, in the loads' own unit.
+    ``strike_s`` and ``toe_off_s`` (m,): from when to when the foot bears more than 2 % of what its units tell of body
+    weight (`smartshoe.gait.edges`), as a plate read at 10 to 20 N says; NaN where the contact began before the record
+    or lasts beyond it. ``onset_s`` and ``release_s`` (m, r): the same of each unit in ``regions``, by the same level;
+    NaN where not seen. ``floor_time_s`` (k,) and ``floor`` (k, r): what each unit reads in swing, in the loads' own
+    unit.
     """
 
     regions: tuple[str, ...]
@@ -84,8 +85,8 @@ def _least(values: Array) -> Array:
 class ContactDetector:
     """Contacts of one foot from its units' loads on an even time base, whole signals and streams alike.
 
-    Offset, drift and body weight do not matter: thresholds are shares of the foot's own median peak above its own
-    floor in swing. Loads are looked at ``window_s`` at a time with 3 s on either side, counted from the first sample,
+    Offset, drift and body weight do not matter: thresholds are shares of the foot's own loads above its own floor
+    in swing. Loads are looked at ``window_s`` at a time with 3 s on either side, counted from the first sample,
     so that blocks of any size give the same numbers; a contact is told within ``window_s`` + 3 s of its end.
     ``least_load``, in the loads' unit: what varies less is no step (0 for readings in a unit of their own).
     """

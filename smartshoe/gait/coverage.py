@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from smartshoe.errors import InputError, UsageError
 from smartshoe.files.atomic import write_text
 from smartshoe.gait.contact import Contacts
+from smartshoe.gait.edges import WALKING_STANCE_S  # a runner loads the midfoot otherwise
 
 if TYPE_CHECKING:
     from smartshoe.gait.result import GaitResult
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POINTS = 101  # of a stance, 0 to 100 %
-WALKING_STANCE_S = 0.4  # a runner's is shorter, and loads the midfoot otherwise
 LONGEST_STANCE_S = 2.5  # longer, the foot stands and the share is even
 FEWEST_STANCES = 5
 # Percent of stance, and body weights beside the coils: the published whole force of walking (1.03 at 24 %, 0.68 at

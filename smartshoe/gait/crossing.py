@@ -5,6 +5,9 @@ below, are crossed at t1, t2, t3; a load that rises as (t - t0)^p crosses them i
 2^(1/p), whatever its height. The median of that ratio over strides gives p, and t1 - t0 = (t2 - t1)/(2^(1/p) - 1) is
 how late the lowest level is against zero load. Its running median over neighbouring strides, or what a lower level
 leaves of it, is taken off.
+
+A sample is long against an onset: of two samples the first is still on the floor, the next far above it, and a straight
+line between them is early. There the same power law through the next two samples says when the level is crossed.
 """
 
 from __future__ import annotations
@@ -82,3 +85,18 @@ def level_places(places: Array, ratio: float, share: Array) -> Array:
     bias = running_median((places[:, 1] - places[:, 0]) / (ratio - 1.0), NEIGHBOURS)
     # (share)^(1/p), and 2^(1/p) is the ratio.
     return np.asarray(places[:, 0] - bias * (1.0 - share ** np.log2(ratio)))
+
+
+def bent_places(loads: Array, level: Array, places: Array, ratio: float) -> Array:
+    """``places`` (m,), where rows (m, w) cross ``level`` (m,) by straight lines, by their `growth` where that is surer.
+
+    It is where the power law through the two samples above the level begins after the sample below it.
+    """
+    row, last = np.arange(places.size), loads.shape[1] - 1
+    below = np.floor(np.nan_to_num(places)).astype(np.intp)
+    first, second = loads[row, np.minimum(below + 1, last)], loads[row, np.minimum(below + 2, last)]
+    grows = (second > first) & (first > level) & (level > 0)
+    first, second = np.where(grows, first, 1.0), np.where(grows, second, 2.0)
+    since_onset = 1.0 / ((second / first) ** np.log2(ratio) - 1.0)  # of the first sample above, in samples
+    bent = below + 1 - since_onset * (1.0 - (np.maximum(level, 0.0) / first) ** np.log2(ratio))
+    return np.where(grows & (since_onset < 1.0), bent, places)

@@ -7,16 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smartshoe.gait.crossing import USUAL_POWER, growth, level_places, rise_places, running_median
+from smartshoe.gait.crossing import USUAL_POWER, bent_places, growth, level_places, rise_places, running_median
 from smartshoe.gait.swing import Cut
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-BEARS = 0.02  # of the foot's median peak: a foot, or a unit, bears from there on, as plates are read at 10 to 20 N
-LEVEL, UNIT_LEVEL = 0.04, 0.06  # lowest level, of the foot's and of the unit's own median peak
-MOST_LEVEL = 0.12
+BEARS = 0.02  # of body weight: a foot, or a unit, bears from there on, as plates are read at 10 to 20 N
+UNIT_LEVEL = 0.06  # a unit's lowest level, of its own median peak
+MOST_LEVEL = 0.12  # the lowest level at most, of the median peak
+LONGEST_SWING_S = 1.0  # longer, the foot rests, and its mean load tells no body weight
+WALKING_STANCE_S = 0.4  # a runner's is shorter
+RUNNING_PEAK = 2.5  # body weights; Munro et al. 1987 (J. Biomech. 20, 147-155): 2.5 at 3 m/s, 2.8 at 5 m/s
 TOP = 5.0  # times the lowest level: where a load has come for certain
 NOISES = 5.0
 BEFORE_S, AFTER_S = 0.15, 0.15
@@ -108,10 +111,13 @@ def find_edges(loads: Array, found: Cut, floors: tuple[Floors, Floors], rate_hz:
     whole_peaks = np.maximum.reduceat(whole, bounds)[::2] - floor.sum(axis=1)
     usual_whole = running_median(np.where(has_rise | has_fall, whole_peaks, np.nan), PEAKS)
     usual = np.column_stack([running_median(column, PEAKS) for column in peaks.T]) if peaks.size else peaks
+    impulses = np.add.reduceat(whole, bounds)[::2] - (ends - begins) * floor.sum(axis=1)
+    bears = BEARS * _body_weights(begins, ends, np.where(has_rise & has_fall, impulses, np.nan), usual_whole, rate_hz)
     parts = []
     for side, (has, at, base) in enumerate(((has_rise, begins, before), (has_fall, ends, after))):
         index = np.flatnonzero(has)
-        ends_here = _Ends(at[index], (ends - begins)[index], base[index], usual_whole[index], usual[index])
+        lengths = (ends - begins)[index]
+        ends_here = _Ends(at[index], lengths, base[index], bears[index], usual_whole[index], usual[index])
         parts.append(_located(loads, ends_here, found.noise, rate_hz, shapes, side))
     coarse = np.concatenate([part[0] for part in parts])
     rises = np.concatenate([np.ones(parts[0][0].size, bool), np.zeros(parts[1][0].size, bool)])
@@ -128,21 +134,38 @@ class _Ends:
     """One end of k contacts.
 
     Its coarse place ``at`` and the contact's ``length`` (k,) in samples, the floor ``base`` (k, r) of the swing beside
-    it, and the usual peak of the foot (k,) and of its units (k, r).
+    it, what the foot ``bears`` (k,) from there on, and the usual peak of the foot (k,) and of its units (k, r).
     """
 
     at: Index
     length: Index
     base: Array
+    bears: Array
     usual_whole: Array
     usual: Array
+
+
+def _body_weights(begins: Index, ends: Index, impulses: Array, peaks: Array, rate_hz: float) -> Array:
+    """Body weight (k,) in the loads' unit, from the foot's own loads, about each contact [``begins``, ``ends``).
+
+    Over whole strides a foot carries half of it: twice the impulse (k,), NaN of a contact that is cut off, over the
+    time from contact to contact. A contact between rests has no stride: there it is the usual peak (k,) of a foot that
+    walks, and less by `RUNNING_PEAK` of one that runs. (A share of the peak alone would be met later by the runner.)
+    """
+    swings = np.where(begins[1:] - ends[:-1] <= LONGEST_SWING_S * rate_hz, begins[1:] - ends[:-1], np.inf)
+    swings = np.minimum(np.append(swings, np.inf), np.append(np.inf, swings))
+    lengths = ends - begins
+    means = np.where(np.isfinite(swings), 2.0 * impulses / (lengths + swings), np.nan)
+    means = running_median(means, PEAKS)
+    otherwise = np.where(lengths < WALKING_STANCE_S * rate_hz, peaks / RUNNING_PEAK, peaks)
+    return np.where(np.isfinite(means), means, otherwise)
 
 
 def _located(
     loads: Array, ends: _Ends, noise: float, rate_hz: float, shapes: Shapes, side: int
 ) -> tuple[Index, Array, Array]:
     """Rises (``side`` 0) or falls (1): coarse places (k,), exact places (k,), units' places (k, r)."""
-    at, base, usual_whole = ends.at, ends.base, ends.usual_whole
+    at, base, bears = ends.at, ends.base, ends.bears
     count, regions = at.size, loads.shape[1]
     units = np.full((count, regions), np.nan)
     if count == 0:
@@ -152,11 +175,14 @@ def _located(
     first = at - turn * round(BEFORE_S * rate_hz) - (0 if side == 0 else 1)
     width = round((BEFORE_S + AFTER_S) * rate_hz) + 1
     rows = _rows(loads.sum(axis=1), first, turn, width) - base.sum(axis=1)[:, None]
-    levels, top = _levels(LEVEL, usual_whole, noise)
+    # The level itself where noise allows: the way down to it from a higher one is then no guess.
+    levels, top = _levels(bears, ends.usual_whole, noise)
     places = rise_places(rows, levels, top)
-    shapes.foot[side] = growth(places, shapes.foot[side])
-    bears = level_places(places, shapes.foot[side], BEARS * usual_whole / levels[:, 0])
-    place = np.where(np.isfinite(bears), first + turn * bears, at.astype(float))
+    shapes.foot[side] = growth(_resolved(rows, places[:, 0], bears, ends.usual_whole, noise), shapes.foot[side])
+    ratio = shapes.foot[side]
+    lowest = bent_places(rows, levels[:, 0], places[:, 0], ratio)
+    met = lowest - places[:, 0] + level_places(places, ratio, bears / np.maximum(levels[:, 0], 1e-12))
+    place = np.where(np.isfinite(met), first + turn * met, at.astype(float))
     # A unit comes and goes while the foot is down; beyond the contact's other end it is another stance's.
     first = at - turn * round(UNIT_BEFORE_S * rate_hz) - (0 if side == 0 else 1)
     margin = round(UNIT_BEFORE_S * rate_hz)
@@ -166,17 +192,25 @@ def _located(
     for region in range(regions):
         rows = _rows(loads[:, region], first, turn, width) - base[:, region, None]
         rows[outside] = -np.inf
-        levels, top = _levels(UNIT_LEVEL, ends.usual[:, region], unit_noise)
+        usual = ends.usual[:, region]
+        levels, top = _levels(UNIT_LEVEL * usual, usual, unit_noise)
         places = rise_places(rows, levels, top)
         shapes.units[side][region] = growth(places, shapes.units[side][region])
-        share = BEARS * usual_whole / np.maximum(levels[:, 0], 1e-12)
+        share = bears / np.maximum(levels[:, 0], 1e-12)
         units[:, region] = first + turn * level_places(places, shapes.units[side][region], share)
     return at, place, units
 
 
-def _levels(share: float, usual: Array, noise: float) -> tuple[Array, Array]:
-    """Three doubling levels (k, 3) and the top (k,)."""
-    lowest = np.clip(NOISES * noise, share * usual, np.maximum(MOST_LEVEL * usual, share * usual))
+def _resolved(rows: Array, lowest: Array, bears: Array, usual: Array, noise: float) -> Array:
+    """Where (k, 3) rows cross doubling levels that lie samples apart, so that their ratio tells the growth."""
+    next_place = np.minimum(np.floor(np.nan_to_num(lowest)).astype(np.intp) + 1, rows.shape[1] - 1)
+    step = float(np.median(rows[np.arange(len(rows)), next_place]))
+    return rise_places(rows, *_levels(np.maximum(bears, np.minimum(step, MOST_LEVEL * usual)), usual, noise))
+
+
+def _levels(least: Array, usual: Array, noise: float) -> tuple[Array, Array]:
+    """Three doubling levels (k, 3), the lowest ``least`` (k,) or above the noise, and the top (k,)."""
+    lowest = np.clip(NOISES * noise, least, np.maximum(MOST_LEVEL * usual, least))
     return lowest[:, None] * np.array([1.0, 2.0, 4.0]), TOP * lowest
 
 

@@ -17,7 +17,7 @@ from smartshoe.errors import UsageError
 from smartshoe.files.atomic import json_text
 from smartshoe.gait import analyse, centre_of_pressure, memberships
 from smartshoe.gait.contact import Contacts
-from smartshoe.gait.crossing import growth, level_places, rise_places, running_median
+from smartshoe.gait.crossing import bent_places, growth, level_places, rise_places, running_median
 from smartshoe.gait.insole import PLACES
 from smartshoe.gait.membership import PHASES
 from smartshoe.gait.strides import loading_rate, strides_of
@@ -38,6 +38,25 @@ def test_the_way_down_a_power_law_is_exact(power: float, place: float, height: f
     assert ratio == pytest.approx(2.0 ** (1.0 / power), rel=1e-3)
     wanted = place + (bears * lowest[0] / height) ** (1.0 / power)
     assert 0.01 * level_places(crossed, ratio, np.full(4, bears)) == pytest.approx(wanted, abs=0.05)
+
+
+@settings(max_examples=25)
+@given(power=st.floats(1.0, 2.4), onset=st.floats(8.05, 8.95), height=st.floats(0.5, 50.0), share=st.floats(0.0, 0.99))
+def test_an_onset_between_two_samples_is_found_by_its_law(
+    power: float, onset: float, height: float, share: float
+) -> None:
+    load = height * np.maximum(np.arange(30) - onset, 0.0)[None] ** power
+    level = share * load[:, 9]
+    straight = rise_places(load, level[:, None], np.array([load.max()]))[:, 0]
+    bent = bent_places(load, level, straight, 2.0 ** (1.0 / power))
+    if level > 0:
+        assert bent == pytest.approx(onset + (level / height) ** (1.0 / power), abs=1e-6)
+        assert straight <= bent + 1e-6
+
+
+def test_a_load_that_was_there_before_keeps_its_straight_line() -> None:
+    load = np.array([[0.0, 1.0, 2.0, 3.0, 4.0]])  # the law through 2 and 3 begins at 0, before the sample of 1
+    assert bent_places(load, np.array([1.5]), np.array([1.5]), 2.0) == pytest.approx(1.5)
 
 
 def test_a_load_that_never_comes_has_no_onset() -> None:
