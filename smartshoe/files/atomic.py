@@ -16,7 +16,7 @@ from typing import Any
 
 from smartshoe.errors import SmartShoeError, UsageError
 
-_LONGEST_STEM = 40  # of the temporary file's name, in letters: a name has 255 bytes
+_LONGEST_STEM, _LONGEST_ENDING = 40, 12  # of the temporary file's name, in letters: a name has 255 bytes
 _MOST_LINKS = 40  # as Linux
 # By any of these names the process's own open files: what stands behind them is another's to replace.
 _STREAMS = {"/dev/stdout": 1, "/dev/stderr": 2}
@@ -39,7 +39,7 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
         folder = Path(tempfile.gettempdir()) if streamed else named.parent
         # The ending stays: some writers tell the format by it.
         handle, name = tempfile.mkstemp(
-            dir=folder, prefix=f".{named.stem[:_LONGEST_STEM]}.", suffix=f".partial{named.suffix[:_LONGEST_STEM]}"
+            dir=folder, prefix=f".{named.stem[:_LONGEST_STEM]}.", suffix=f".partial{named.suffix[:_LONGEST_ENDING]}"
         )
     except (OSError, RuntimeError, ValueError) as error:
         raise _unwritable(path, error) from error
@@ -74,15 +74,14 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
 def _unwritable(path: Path | str, error: Exception) -> UsageError:
     if isinstance(error, SmartShoeError):
         return error if isinstance(error, UsageError) else UsageError(str(error))
-    number = error.errno if isinstance(error, OSError) else None
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    reason = getattr(error, "strerror", None) or str(error)
     mend = {
         errno.ENOSPC: "free some space",
         errno.EDQUOT: "free some space",
         errno.EFBIG: "choose another disk",
         errno.ENAMETOOLONG: "choose a shorter name",
         errno.ENXIO: "start the program that reads the pipe first",
-    }.get(number or 0, "choose a folder that exists and is writable")
+    }.get(getattr(error, "errno", None), "choose a folder that exists and is writable")
     return UsageError(f"{path} cannot be written ({reason}): {mend}; nothing half-written is left")
 
 
@@ -144,7 +143,10 @@ def sync_folder(folder: Path) -> None:
     """A new file's name is on disk only once its folder is."""
     if os.name == "nt":  # a folder cannot be opened there
         return
-    handle = os.open(folder, os.O_RDONLY)
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # one that may be written to and not listed
+        return
     try:
         os.fsync(handle)
     except OSError as error:
@@ -168,10 +170,16 @@ def json_text(result: Mapping[str, Any]) -> str:
 
 
 def make_folder(path: Path | str) -> Path:
-    """Create the folder ``path`` (and parents) where it is missing, checking that it can be written to."""
+    """Create the folder ``path`` (and parents) where it is missing, checking that it can be written to.
+
+    The names of new folders are on disk when this returns: a file in a folder that is lost is lost with it.
+    """
     folder = Path(path)
     try:
+        missing = [place for place in (folder, *folder.parents) if not place.exists()]
         folder.mkdir(parents=True, exist_ok=True)
+        for place in reversed(missing):
+            sync_folder(place.parent)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise UsageError(f"{folder} cannot be made a folder ({reason}): choose another --out") from error

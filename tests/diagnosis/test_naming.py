@@ -64,6 +64,21 @@ def test_the_farther_the_rival_the_surer_the_law(fall: float, margin: float, fur
     assert set(probability_of_law(far, STANDARD)[1]) <= set(probability_of_law(near, STANDARD)[1])
 
 
+def test_a_rival_that_leaves_as_much_as_laws_usually_depart_is_one_standard_deviation_away() -> None:
+    fall = 1e9  # so that noise counts for nothing beside departures
+    rival = member(fall=fall, laws=(("orifice_leak", STANDARD.departure**2 * fall),))
+    assert probability_of_law(rival, STANDARD)[0] == pytest.approx(1.0 / (1.0 + math.exp(-0.5)), rel=1e-6)
+
+
+@given(st.floats(0.0, 1e4))
+def test_a_names_confidence_is_that_of_its_kind_shared_with_its_rivals(margin: float) -> None:
+    one = member(size=0.1, laws=(("orifice_leak", margin),))
+    name = only(names_of([one], 0.0, STANDARD))
+    assert name.kind == probability_of_kind(one, 0.0, STANDARD)
+    assert name.confidence == pytest.approx(name.kind * probability_of_law(one, STANDARD)[0])
+    assert name.kind / 2.0 <= name.confidence <= name.kind
+
+
 def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
     assert probability_of_law(member("rate_gain"), STANDARD) == (1.0, ())
 

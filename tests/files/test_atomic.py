@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import errno
+import json
+import math
 import os
 import stat
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from smartshoe.errors import UsageError
-from smartshoe.files.atomic import make_folder, replacing, write_text
+from smartshoe.files.atomic import json_text, make_folder, replacing, write_text
+from smartshoe.files.journal import AppendedFile
 
 
 def test_a_failure_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
@@ -113,6 +121,76 @@ def test_a_name_is_written_or_refused_in_one_sentence(name: str, tmp_path: Path)
     with pytest.raises(UsageError, match="cannot be written"):
         write_text(tmp_path / name, "x")
     assert list(tmp_path.iterdir()) == []
+
+
+@settings(max_examples=30)
+@given(
+    st.text(st.sampled_from("a.é脚👣"), min_size=1, max_size=60),
+    st.text(st.sampled_from("a.é脚👣"), min_size=1, max_size=60),
+)
+def test_whatever_name_a_disk_takes_is_written(stem: str, ending: str) -> None:
+    name = f"x{stem}.{ending}"
+    while len(name.encode()) > 255:
+        name = name[1:]
+    with tempfile.TemporaryDirectory() as folder:
+        write_text(Path(folder) / name, "whole")
+        assert (Path(folder) / name).read_text() == "whole"
+        assert len(list(Path(folder).iterdir())) == 1
+
+
+def test_json_is_a_line_of_text_that_reads_back_and_holds_no_nan() -> None:
+    result = {"unit": "linke Ferse", "value": 0.1 + 0.2}
+    assert json.loads(json_text(result)) == result
+    assert json_text(result).endswith("}\n")
+    assert "\n" in json_text(result).strip()  # a person may read it
+    with pytest.raises(ValueError, match="nan"):
+        json_text({"value": math.nan})
+
+
+@contextmanager
+def _as_nobody() -> Iterator[None]:
+    """Root may write anywhere: within the block it is nobody. What is reached by an open folder stays in reach."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.setresuid(65534, 65534, 0)
+    try:
+        yield
+    finally:
+        os.setresuid(0, 0, 0)
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """A folder that everybody may reach: pytest's own are the user's alone."""
+    with tempfile.TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+@pytest.mark.skipif(not hasattr(os, "setresuid"), reason="needs the rights of Linux")
+def test_a_folder_that_may_not_be_written_to_is_refused_and_keeps_its_files(open_folder: Path) -> None:
+    shut, unlisted = open_folder / "shut", open_folder / "unlisted"
+    for folder, rights in ((shut, 0o555), (unlisted, 0o333)):
+        folder.mkdir()
+        (folder / "result.json").write_text("old")
+        folder.chmod(rights)
+    with _as_nobody():
+        with pytest.raises(UsageError, match="shut is not writable"):
+            make_folder(shut)
+        with pytest.raises(UsageError, match="cannot be made a folder"):
+            make_folder(shut / "new")
+        with pytest.raises(UsageError, match="exists and is writable"):
+            write_text(shut / "result.json", "new")
+        with pytest.raises(UsageError, match="exists and is writable"):
+            AppendedFile(shut / "walk.csv", new=True)
+        write_text(make_folder(unlisted / "new") / "result.json", "new")
+        write_text(unlisted / "result.json", "new")
+    for folder in (shut, unlisted):
+        folder.chmod(0o755)
+    assert (shut / "result.json").read_text() == "old"
+    assert (unlisted / "result.json").read_text() == (unlisted / "new" / "result.json").read_text() == "new"
+    assert [path.name for path in shut.iterdir()] == ["result.json"]
 
 
 def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:

@@ -134,3 +134,12 @@ def test_interpolation_slopes_are_the_difference_quotients(fraction: float) -> N
 def test_an_unstable_filter_is_refused(a1: float) -> None:
     with pytest.raises(UsageError, match="a1"):
         discretise(a1, 1.0, 1.0, 100.0)
+
+
+def test_steps_are_even_up_to_a_thousandth_of_one() -> None:
+    time_s = np.arange(500) * 0.01
+    jitter_s = 0.01 * np.random.default_rng(4).uniform(-1.0, 1.0, time_s.size)
+    assert steps(np.round(time_s + 1e-7, 6)) == pytest.approx(0.01)  # stamps of a logger that counts microseconds
+    assert steps(time_s + 4e-4 * jitter_s) == pytest.approx(0.01, rel=1e-5)
+    uneven = time_s + 2e-3 * jitter_s
+    assert np.array_equal(steps(uneven), np.diff(uneven))

@@ -32,7 +32,7 @@ class AppendedFile:
                 f"{self.path} cannot be written ({error.strerror}): choose a folder that exists and is writable"
             ) from error
         self.size = os.fstat(self._handle).st_size
-        if new:
+        if self.size == 0:  # made just now, or by a writer that a pulled plug may have kept from syncing its name
             sync_folder(self.path.parent)
 
     def append(self, piece: bytes, *, synced: bool = True) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.errors import FormatError, InputError, UsageError
+from smartshoe.files.atomic import write_text
 from smartshoe.files.journal import AppendedFile, Journal, read_journal
 
 RECORDS = st.lists(st.tuples(st.integers(0, 255), st.binary(max_size=60)), min_size=1, max_size=8)
@@ -80,6 +82,16 @@ def test_what_follows_damage_is_not_cut_off_when_the_journal_is_opened_again(tmp
     assert [payload for _, payload in _content(path)] == [b"first", b"third", b"fourth"]
 
 
+def test_a_journal_that_begins_anew_remembers_nothing(tmp_path: Path) -> None:
+    _written(tmp_path / "journal", [(1, b"of another session")])
+    with Journal(tmp_path / "journal") as journal:
+        journal.clear()
+        assert journal.recovered.records == ()
+        assert journal.recovered.notes == ()
+        journal.append(2, b"new")
+    assert _content(tmp_path / "journal") == [(2, b"new")]
+
+
 def test_a_second_writer_is_kept_out(tmp_path: Path) -> None:
     with Journal(tmp_path / "journal") as journal:
         journal.append(1, b"kept")
@@ -101,6 +113,18 @@ def test_an_appended_file_does_not_overwrite(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is there already"):
         AppendedFile(tmp_path / "walk.csv", new=True)
     assert (tmp_path / "walk.csv").read_text() == "kept"
+
+
+def test_a_new_files_rights_are_those_that_the_umask_leaves(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        AppendedFile(tmp_path / "walk.csv", new=True).close()
+        write_text(tmp_path / "result.json", "{}")
+        umask = os.umask(0o027)
+    finally:
+        os.umask(before)
+    assert umask == 0o027  # left as it was
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o640}
 
 
 FILL = """
