@@ -75,13 +75,14 @@ def _unwritable(path: Path | str, error: Exception) -> UsageError:
     if isinstance(error, SmartShoeError):
         return error if isinstance(error, UsageError) else UsageError(str(error))
     reason = getattr(error, "strerror", None) or str(error)
-    mend = {
+    mends: dict[int | None, str] = {
         errno.ENOSPC: "free some space",
         errno.EDQUOT: "free some space",
         errno.EFBIG: "choose another disk",
         errno.ENAMETOOLONG: "choose a shorter name",
         errno.ENXIO: "start the program that reads the pipe first",
-    }.get(getattr(error, "errno", None), "choose a folder that exists and is writable")
+    }
+    mend = mends.get(getattr(error, "errno", None), "choose a folder that exists and is writable")
     return UsageError(f"{path} cannot be written ({reason}): {mend}; nothing half-written is left")
 
 
