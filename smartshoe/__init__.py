@@ -32,6 +32,7 @@ _HOME = {
     "CalibrationStore": "smartshoe.calibration.store",
     "Compensator": "smartshoe.calibration",
     "compensate": "smartshoe.calibration",
+    "load_calibrations": "smartshoe.calibration.folder",
     "stack": "smartshoe.calibration",
     "validate": "smartshoe.calibration.validation",
     "Validation": "smartshoe.calibration.validation",
@@ -46,6 +47,7 @@ _HOME = {
 
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration, Compensator, compensate, stack
+    from smartshoe.calibration.folder import load_calibrations
     from smartshoe.calibration.store import CalibrationStore
     from smartshoe.calibration.validation import Validation, validate
     from smartshoe.devices import open_machine, open_shoe
@@ -90,6 +92,7 @@ __all__ = [
     "identify_transfer_function",
     "lack_of_fit",
     "leave_one_rate_out",
+    "load_calibrations",
     "open_machine",
     "open_shoe",
     "read",

@@ -124,9 +124,22 @@ def static_protocol(
     hold_s: float = 5.0,
     rest_s: float = 5.0,
 ) -> Protocol:
-    """The paper's static protocol: ramp to ``approach_n`` below the load, the rest slowly, hold, unload, rest.
+    """The paper's static protocol: for each load a ramp to just below it, the rest slowly, a hold, unloading, a rest.
 
-    Source: Chinimilli 2016, Section III and Fig. 4(a).
+    Parameters
+    ----------
+    loads_n
+        The loads that are held, in N.
+    rate_n_per_s
+        Of the ramps, in N/s.
+    approach_n, approach_s
+        The last newtons of a load are put on slowly, within so many seconds.
+    hold_s, rest_s
+        How long a load is held, and the rest after it, in s.
+
+    Notes
+    -----
+    Chinimilli 2016, Section III and Fig. 4(a).
     """
     rate = _positive("rate_n_per_s", rate_n_per_s)
     segments: list[Segment] = []
@@ -153,8 +166,26 @@ def dynamic_protocol(
 ) -> Protocol:
     """The paper's dynamic protocol: triangles 0 -> peak -> 0 at each rate, with a rest before and after each.
 
-    Source: Chinimilli 2016, Section III and Fig. 4(b). The paper gives no rest between triangles; ``rest_s`` = 0
-    leaves it out.
+    Parameters
+    ----------
+    rates_n_per_s
+        Loading and unloading rate of each triangle, in N/s.
+    peak_n
+        Where it turns, in N.
+    repeats
+        How often all of them come.
+    rest_s
+        Before and after each, in s. The paper gives no rest between triangles; 0 leaves it out.
+
+    Notes
+    -----
+    Chinimilli 2016, Section III and Fig. 4(b).
+
+    Examples
+    --------
+    >>> import smartshoe
+    >>> smartshoe.dynamic_protocol((100.0, 800.0), peak_n=800.0, rest_s=5.0).duration_s  # 5 + 16 + 5 + 2 + 5
+    33.0
     """
     peak = _positive("peak_n", peak_n)
     if repeats < 1:

@@ -130,6 +130,28 @@ def _column(item: ForceFilter) -> list[float]:
 
 
 def stack(filters: Sequence[ForceFilter]) -> CompensatorBank:
-    """A bank that runs ``filters`` (all of one rate, plain or extended) side by side, each from a fresh start."""
+    """A bank of filters, one a unit, that run side by side, each from a fresh start.
+
+    Parameters
+    ----------
+    filters
+        Plain or extended compensators, all of one rate.
+
+    Raises
+    ------
+    UsageError
+        Where there is none, or their rates differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import smartshoe
+    >>> filters = [smartshoe.Compensator(0.2, 5.0, b1, sample_rate_hz=100.0) for b1 in (1.0, 1.1)]
+    >>> bank = smartshoe.stack(filters)
+    >>> bank.push(np.array([10.0, 20.0])).round(6).tolist()  # one tick: a reading of each unit, in N
+    [50.0, 110.0]
+    >>> bank.push(np.full((3, 2), 10.0)).shape  # a block of three
+    (3, 2)
+    """
     plain = all(isinstance(item, Compensator) for item in filters)
     return CompensatorBank(filters) if plain else MixedBank(filters)

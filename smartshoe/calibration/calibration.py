@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,7 @@ from smartshoe.calibration.compensator import Compensator
 from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.calibration.filter import Array, ForceFilter
 from smartshoe.calibration.reader import Reader, parsed
-from smartshoe.errors import InputError, MissingChannelError, UnitError
+from smartshoe.errors import InputError, MissingChannelError, UnitError, UsageError
 from smartshoe.files.atomic import json_text, write_text
 from smartshoe.files.logs.accepted import RecordingLike, recording_of
 from smartshoe.models.effects import effect
@@ -200,22 +201,58 @@ def _sensor_for(recording: Recording, calibration: Calibration) -> Channel:
     return named[0]
 
 
-def compensate(recording: RecordingLike, calibration: Calibration) -> Array:
-    """Force (n,) in N of a recording, a file or a DataFrame by ``calibration``, finite at every sample.
+def calibration_from(given: Any, argument: str = "calibration") -> Calibration:
+    """``given`` as a calibration: it is one, or the path of one's file; raises `UsageError` for anything else."""
+    if isinstance(given, Calibration):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        return Calibration.load(Path(given))
+    raise UsageError(f"{argument} is of type {type(given).__name__}: give a Calibration, or the path of one's file")
 
-    The numbers are those of `compensated`, which keeps them beside the other channels, and so are the errors raised.
+
+def compensate(recording: RecordingLike, calibration: Calibration | str | os.PathLike[str]) -> Array:
+    """Force of a unit from its reading: ``smartshoe compensate`` as a function.
+
+    Parameters
+    ----------
+    recording
+        A `Recording`, the path of a readable file, or a DataFrame with a plain table's columns.
+    calibration
+        The unit's, or the path of its file.
+
+    Returns
+    -------
+    numpy.ndarray
+        (n,) force in N, compression positive, finite at every sample: the numbers of `compensated`, which keeps them
+        beside the other channels.
+
+    Raises
+    ------
+    MissingChannelError
+        Where the recording has no reading of the unit.
+    UnitError
+        Where the reading is of another quantity than the calibration's.
+
+    Examples
+    --------
+    >>> import smartshoe
+    >>> from smartshoe.units import MILLIBAR
+    >>> toe = smartshoe.Calibration(a1=0.2, b0=5.0, b1=1.1, reading_unit=MILLIBAR, unit="left_toe")
+    >>> still = smartshoe.Recording.from_arrays(time_s=[0.0, 0.01, 0.02], pressure_mbar=[20.0, 20.0, 20.0])
+    >>> smartshoe.compensate(still, toe).round(6).tolist()  # a load that lasts: b1/a1 times its reading
+    [110.0, 110.0, 110.0]
     """
     return compensated(recording, calibration)[ESTIMATE_NAME].si
 
 
-def compensated(recording: RecordingLike, calibration: Calibration) -> Recording:
+def compensated(recording: RecordingLike, calibration: Calibration | str | os.PathLike[str]) -> Recording:
     """``recording`` with the channel ``force_estimate`` in N (column ``force_estimate_n``), finite at every sample.
 
     An even time base runs the bilinear filter at its own rate, an uneven one the exact response for straight lines
     between samples. Missing readings hold the last one; ``notes`` count them. Raises `MissingChannelError` without a
     reading of the unit, `UnitError` where its quantity is not the calibration's.
     """
-    recording = recording_of(recording)
+    recording, calibration = recording_of(recording), calibration_from(calibration)
     channel = _sensor_for(recording, calibration)
     if channel.unit != calibration.reading_unit and channel.unit.quantity != calibration.reading_unit.quantity:
         raise UnitError(

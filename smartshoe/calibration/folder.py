@@ -1,19 +1,55 @@
-"""A folder of calibration files, as ``identify``, ``diagnose`` and ``run`` write them."""
+"""Calibrations as users have them: objects, the files that ``identify``, ``diagnose`` and ``run`` write, folders."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TypeAlias, Union
 
-from smartshoe.calibration.calibration import Calibration
+from smartshoe.calibration.calibration import Calibration, calibration_from
 from smartshoe.errors import InputError
 
+CalibrationsLike: TypeAlias = Union[Calibration, str, "os.PathLike[str]"]
 
-def load_folder(folder: Path | str) -> list[Calibration]:
-    """The calibrations in a folder; a unit's extended one stands for its plain one.
 
-    Raises `InputError` for a folder that holds none.
+def load_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> list[Calibration]:
+    """The calibrations in files and folders; in a folder a unit's extended one stands for its plain one.
+
+    Parameters
+    ----------
+    given
+        The path of a calibration file or of a folder of them, a `Calibration`, or several of these.
+
+    Raises
+    ------
+    InputError
+        For a file that is no calibration, and a folder that holds none.
+    UsageError
+        For anything else, naming its type.
+
+    Examples
+    --------
+    >>> import smartshoe
+    >>> from smartshoe.units import MILLIBAR
+    >>> heel = smartshoe.Calibration(a1=0.2, b0=5.2, b1=1.0, reading_unit=MILLIBAR, unit="left_heel")
+    >>> heel.save("left_heel.json")
+    >>> [calibration.unit for calibration in smartshoe.load_calibrations(".")]
+    ['left_heel']
     """
-    inside = [Calibration.load(file) for file in sorted(Path(folder).glob("*.json"))]
+    if isinstance(given, (Calibration, str, os.PathLike)) or not isinstance(given, Iterable):
+        given = [given]
+    found: list[Calibration] = []
+    for one in given:
+        if isinstance(one, (str, os.PathLike)) and Path(one).is_dir():
+            found += _of_folder(Path(one))
+        else:
+            found.append(calibration_from(one, "calibrations"))
+    return found
+
+
+def _of_folder(folder: Path) -> list[Calibration]:
+    inside = [Calibration.load(file) for file in sorted(folder.glob("*.json"))]
     if not inside:
         raise InputError(f"{folder} holds no calibration: give a folder with .json files that identify wrote")
     extended = {each.unit for each in inside if each.extended is not None}

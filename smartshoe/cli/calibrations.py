@@ -70,42 +70,21 @@ def list_command(unit: str | None, date: str | None, store_folder: str | None, j
     from smartshoe.report.tables import new_console, table_of
 
     store, at = _opened(store_folder), moment(date or _today(), "--date")
-    entries, events = store.entries(), store.events()
-    if unit is not None:
-        serial = _serial(store, unit, date or _today())
-        entries = tuple(entry for entry in entries if entry.serial_number == serial)
-        events = tuple(event for event in events if event.serial_number == serial)
-    serials = sorted({item.serial_number for item in entries} | {item.serial_number for item in events})
-    places = {serial: store.position_of(serial, at) for serial in serials}
+    result = store.to_dict(at, unit)
     _show_faults(store)
-    result = {
-        "schema": "smartshoe.calibrations/1",
-        "store": str(store),
-        "date": iso(at),
-        "units": [
-            {
-                "serial_number": serial,
-                "position": places[serial],
-                "calibrations": [
-                    {**entry.to_dict(), "is_expired": entry.is_expired(at)}
-                    for entry in entries
-                    if entry.serial_number == serial
-                ],
-                "events": [event.to_dict() for event in events if event.serial_number == serial],
-            }
-            for serial in serials
-        ],
-    }
     if emit_json(result, json_path):
         return
-    if not serials:
+    places = {of_unit["serial_number"]: of_unit["position"] for of_unit in result["units"]}
+    entries = [entry for entry in store.entries() if entry.serial_number in places]
+    events = [event for event in store.events() if event.serial_number in places]
+    if not places:
         click.echo(f"{store} holds no calibration yet: smartshoe calibrations add FILE --serial-number S")
         return
     table = table_of(
-        f"{store}: {len(entries)} calibrations of {len(serials)} units, as of {iso(at)}",
+        f"{store}: {len(entries)} calibrations of {len(places)} units, as of {iso(at)}",
         ["unit", "sits at", "date", "age (days)", "calibrated at", "holds until", "name or note"],
     )
-    for serial in serials:
+    for serial, place in places.items():
         rows = []
         for entry in (entry for entry in entries if entry.serial_number == serial):
             until = "–" if entry.expires is None else iso(entry.expires) + (" EXPIRED" if entry.is_expired(at) else "")
@@ -113,7 +92,7 @@ def list_command(unit: str | None, date: str | None, store_folder: str | None, j
         for event in (event for event in events if event.serial_number == serial):
             rows.append((event.date, event.happened, "", event.note))
         for number, (when, what, until, called) in enumerate(sorted(rows, key=lambda row: row[0])):
-            name = (serial, places[serial] or "–") if number == 0 else ("", "")
+            name = (serial, place or "–") if number == 0 else ("", "")
             table.add_row(*name, iso(when), f"{days_between(when, at):.0f}", what, until, called)
     new_console().print(table)
 

@@ -46,7 +46,8 @@ def command(
     Each FILE is a trial of one or two shoes; two FILES of one shoe each are weighed together. A rest of two seconds
     before the first step lets the zero be checked.
     """
-    from smartshoe.cli.inputs import load_calibrations, read_all
+    from smartshoe.calibration.folder import load_calibrations
+    from smartshoe.cli.inputs import read_all
     from smartshoe.cli.output import emit_json
     from smartshoe.errors import RefusedError
     from smartshoe.gait.field.examination import examine_trial

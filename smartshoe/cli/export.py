@@ -33,7 +33,7 @@ def command(
 ) -> None:
     """Write the compensators of calibrations (files, or folders of them) for firmware or other tools."""
     from smartshoe.calibration.export import export_shoe, export_twins, write_files
-    from smartshoe.cli.inputs import load_calibrations
+    from smartshoe.calibration.folder import load_calibrations
 
     calibrations = load_calibrations(calibration_paths)
     if twin and target != "fmu":

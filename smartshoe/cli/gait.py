@@ -122,7 +122,7 @@ def command(
     say_what_strikes(recordings)
     calibrations = []
     if calibration_paths:
-        from smartshoe.cli.inputs import load_calibrations
+        from smartshoe.calibration.folder import load_calibrations
 
         calibrations = load_calibrations(calibration_paths)
     if course_path == "midfoot":

@@ -142,19 +142,3 @@ def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibrati
                 " the rest is extrapolated",
                 err=True,
             )
-
-
-def load_calibrations(paths: Sequence[str]) -> list[Calibration]:
-    """The calibrations in files and folders; in a folder a unit's extended one stands for its plain one.
-
-    Raises `InputError` for a folder that holds none.
-    """
-    from pathlib import Path
-
-    from smartshoe.calibration import Calibration
-    from smartshoe.calibration.folder import load_folder
-
-    found: list[Calibration] = []
-    for path in paths:
-        found += load_folder(path) if Path(path).is_dir() else [Calibration.load(path)]
-    return found

@@ -47,7 +47,7 @@ def command(
         raise UsageError(
             f"smartshoe live needs {error.name}, which is not installed: pip install 'smartshoe[live]'"
         ) from error
-    from smartshoe.cli.inputs import load_calibrations
+    from smartshoe.calibration.folder import load_calibrations
     from smartshoe.devices import open_shoe
     from smartshoe.live.session import LiveSession
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @click.option("--out", metavar="FILE", help="Write every sample to a new plain table.")
 def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, out: str | None) -> None:
     """Live readings and forces from a shoe: each second's least and most, every sample to FILE; Ctrl-C ends it."""
-    from smartshoe.cli.inputs import load_calibrations
+    from smartshoe.calibration.folder import load_calibrations
     from smartshoe.devices import open_shoe
     from smartshoe.errors import UsageError
     from smartshoe.runs.session.streaming import StreamedForces

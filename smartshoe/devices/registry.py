@@ -59,15 +59,58 @@ def _open(url: str, what: str, options: Mapping[str, Any]) -> Any:
 
 
 def open_machine(url: str, /, **options: Any) -> TestMachine:
-    """The testing machine at ``url``, to be used in a with block; ``seed`` (default 0) is its random root.
+    """The testing machine at ``url``, to be used in a with block.
 
-    Raises `UsageError` for an unknown scheme or target, `OptionError` for an option that the device refuses.
+    Parameters
+    ----------
+    url
+        ``SCHEME:TARGET?option=value``: "sim:instron", "log:Specimen_RawData_1.csv", or another package's.
+    **options
+        The device's, as in the URL; ``seed`` (default 0) is the random root of one that is simulated.
+
+    Raises
+    ------
+    UsageError
+        For an unknown scheme or target.
+    OptionError
+        For an option that the device refuses.
+
+    Examples
+    --------
+    >>> import smartshoe
+    >>> with smartshoe.open_machine("sim:instron", unit="left_toe", seed=1) as machine:
+    ...     pressed = machine.run(smartshoe.dynamic_protocol((400.0,)))
+    >>> pressed.unit, float(pressed.force_n.max().round(-1))
+    ('left_toe', 800.0)
     """
     machine: TestMachine = _open(url, "machine", options)
     return machine
 
 
 def open_shoe(url: str, /, **options: Any) -> Shoe:
-    """The shoe at ``url``, to be used in a with block; raises as `open_machine` does."""
+    """The shoe at ``url``, to be used in a with block: ``for block in shoe.blocks()``.
+
+    Parameters
+    ----------
+    url
+        "serial:///dev/rfcomm0", "sim:walk", "sim:stand", "replay:FILE", or another package's.
+    **options
+        The device's, as in the URL; ``seed`` (default 0) is the random root of one that is simulated.
+
+    Raises
+    ------
+    UsageError
+        For an unknown scheme or target.
+    OptionError
+        For an option that the device refuses.
+
+    Examples
+    --------
+    >>> import smartshoe
+    >>> with smartshoe.open_shoe("sim:stand", seed=1) as shoe:
+    ...     standing = shoe.record(0.5)
+    >>> sorted(standing.channels)[:2]
+    ['left_heel', 'left_meta1']
+    """
     shoe: Shoe = _open(url, "shoe", options)
     return shoe

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,34 +24,63 @@ from smartshoe.gait.window import analyse_window, is_loaded
 
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
+    from smartshoe.calibration.folder import CalibrationsLike
 
 Array = NDArray[np.float64]
 
 
 def analyse(
     recordings: RecordingLike | Sequence[RecordingLike],
-    calibrations: Calibration | Sequence[Calibration] = (),
+    calibrations: CalibrationsLike | Iterable[CalibrationsLike] = (),
     body_weight_n: float | None = None,
     coverage: float | Coverage = 1.0,
     reference: GaitResult | None = None,
     estimator: str | None = None,
 ) -> GaitResult:
-    """The trial in ``recordings``: one that holds both shoes, or one for each shoe.
+    """Events, phases, strides and forces of a trial: ``smartshoe gait`` as a function.
 
-    Columns are those of a plain table: ``left_heel_n`` is a force already, ``left_heel_mbar`` becomes one by the
-    calibration of that unit; without any calibration events and times are told, and no force. ``body_weight_n`` in N
-    is estimated where it is not given. ``coverage`` is the share of the load that passes through the units, by which
-    forces of feet are divided, or a `Coverage` with its course over a stance. ``reference`` is a trial whose mean
-    strides are the pattern that strides are compared with. ``estimator`` is a name of
-    `smartshoe.calibration.estimators` that gives forces with error bars; None is the calibrations' own filter.
+    Parameters
+    ----------
+    recordings
+        One recording that holds both shoes, or one for each shoe; or their paths or DataFrames. Columns are those of a
+        plain table: ``left_heel_n`` is a force already, ``left_heel_mbar`` becomes one by the calibration of that unit;
+        without any calibration there are events and times, and no force.
+    calibrations
+        Of the units: calibrations, the paths of their files, or a folder of them.
+    body_weight_n
+        In N; estimated where it is not given.
+    coverage
+        The share of the load that passes through the units, by which forces of feet are divided, or a `Coverage` with
+        its course over a stance.
+    reference
+        A trial whose mean strides are the pattern that strides are compared with; each foot's own without.
+    estimator
+        A name of `smartshoe.calibration.estimators.estimator_names`, for forces with error bars; None is the
+        calibrations' own filter.
 
-    Raises `InputError` and its kin for recordings that are no trial, `UsageError` for arguments out of range,
-    `RefusedError` where neither a stance nor a standing load is found.
+    Raises
+    ------
+    InputError
+        For recordings that are no trial (`MissingChannelError`, `UnitError`).
+    UsageError
+        For arguments out of range.
+    RefusedError
+        Where neither a stance nor a standing load is found.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import smartshoe
+    >>> time_s = np.arange(0.0, 20.0, 0.01)
+    >>> down = np.clip(np.sin(2.0 * np.pi * time_s) + 0.3, 0.0, None)  # 60 % of each second
+    >>> walk = smartshoe.Recording.from_arrays(time_s=time_s, left_heel_n=600.0 * down**0.3)
+    >>> found = smartshoe.gait.analyse(walk)
+    >>> found.activity, round(found.summary["stride_time_s"]["left"]["mean"], 3)
+    ('walking', 1.0)
     """
     covered = checked(body_weight_n, coverage, estimator)
     given = recordings_of(recordings)
-    calibrations = list(calibrations) if isinstance(calibrations, Sequence) else [calibrations]
-    feet, flags = feet_of(given, calibrations, estimator)
+    feet, flags = feet_of(given, given_calibrations(calibrations), estimator)
     contacts = {name: _detector(foot, LEAST_LOAD_N).apply(foot.load) for name, foot in feet.items()}
     if not any(len(own) for own in contacts.values()) and not any(is_loaded(f, f.load, None) for f in feet.values()):
         # Nothing of a person's weight: perhaps another unit, in which steps are steps all the same.
@@ -92,6 +121,15 @@ def checked(body_weight_n: float | None, coverage: float | Coverage, estimator: 
 
         require_known(estimator)
     return coverage if isinstance(coverage, Coverage) else Coverage(coverage)
+
+
+def given_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> list[Calibration]:
+    """All of ``given``; the room of calibrations is imported where there are any."""
+    if isinstance(given, Sequence) and not given:
+        return []
+    from smartshoe.calibration.folder import load_calibrations
+
+    return load_calibrations(given)
 
 
 def require_steps(sums: TrialSums, label: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.errors import InputError, UsageError
-from smartshoe.gait.analysis import checked, require_steps
+from smartshoe.gait.analysis import checked, given_calibrations, require_steps
 from smartshoe.gait.arriving import Piece, joined_head, pieces
 from smartshoe.gait.checks import trial_flags
 from smartshoe.gait.contact import Contacts
@@ -33,7 +33,7 @@ from smartshoe.gait.window import analyse_window
 from smartshoe.recording import Channel, Recording
 
 if TYPE_CHECKING:
-    from smartshoe.calibration import Calibration
+    from smartshoe.calibration.folder import CalibrationsLike
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ Report = Callable[[Sequence[Event], Sequence[Stride]], None]
 
 def analyse_stream(
     blocks: Iterable[Recording] | Sequence[Iterable[Recording]],
-    calibrations: Calibration | Sequence[Calibration] = (),
+    calibrations: CalibrationsLike | Iterable[CalibrationsLike] = (),
     body_weight_n: float | None = None,
     coverage: float | Coverage = 1.0,
     told: Report | None = None,
@@ -61,9 +61,8 @@ def analyse_stream(
     change is that of the first minute. Raises what `analyse` raises.
     """
     covered = checked(body_weight_n, coverage, estimator)
-    given = list(calibrations) if isinstance(calibrations, Sequence) else [calibrations]
     sources = _sources(_several(blocks))
-    feet, flags = feet_of([head for head, _ in sources], given, estimator)
+    feet, flags = feet_of([head for head, _ in sources], given_calibrations(calibrations), estimator)
     day = _Day(feet, sources, covered, body_weight_n, told)
     day.run()
     return day.result(flags)

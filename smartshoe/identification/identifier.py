@@ -49,26 +49,63 @@ def identify(  # noqa: PLR0913 - a public verb
 ) -> Identification:
     """Identify force / reading = (b0 s + b1)/(s + a1) of one unit (Chinimilli 2016, Section V).
 
-    ``direction`` says which signal's error is minimised: "inverse" the load's, as in the paper, "forward" the
-    reading's; the parameters are those of equation (13) either way. ``method``: "srivc" alone, or from it "gn",
-    "lm", "trf", which share one residual and gradient. ``structure``: "free" fits a1, b0, b1; "grey_box" k1 and k2,
-    with c = 1 and x_over_nrt as the paper has them unless ``fixed`` names others; ``bounds`` limits the free ones.
+    Parameters
+    ----------
+    recordings
+        Experiments of the unit: recordings, paths or DataFrames.
+    direction : {"inverse", "forward"}
+        Whose error is minimised: the load's, as in the paper, or the reading's. The parameters are those of equation
+        (13) either way.
+    method : {"trf", "gn", "lm", "srivc"}
+        SRIVC alone, or from it one of the others, which share one residual and gradient.
+    structure : {"free", "grey_box"}
+        "free" fits a1, b0, b1; "grey_box" k1 and k2, with c = 1 and x_over_nrt as the paper has them unless ``fixed``
+        names others.
+    estimator : {"auto", "output_error", "errors_in_variables", "command", "cycles"}
+        "output_error" takes the input for exact; "errors_in_variables" knows noise on both; "command" and "cycles"
+        take their instruments from the commanded load or from the mean of the other repeats; "auto" fits the first and
+        goes on to another where the input's noise would move the result by a tenth of its error bar, and says so.
+    offset, delay, initial_state
+        Reading at no load (one a recording), s by which the reading is later than the load, and what was before:
+        estimated, or fixed.
+    load_offset_n
+        The load cell's zero in N: one constant cannot be told from the other, so that one of the two is fixed.
+    fixed, bounds
+        Parameters of the structure that are known, and limits of those that are free, by name.
+    reading_noise, load_noise_n
+        Standard deviations of white noise, in the reading's unit and in N: known, or estimated.
+    prefilter_rad_s
+        SRIVC's first lambda.
+    scale
+        N per reading unit of the paper's force: by default the recordings' ``effective_area_m2``, else 1; "estimate"
+        fits it (grey box only).
+    counted
+        By recording name the samples (n,) whose error counts.
+    tolerance, max_iterations
+        The relative change that ends the iteration, and the steps it may take.
+    strict
+        Whether an iteration that did not settle is an error.
 
-    ``estimator``: "output_error" takes the input for exact; "errors_in_variables" knows noise on both (standard
-    deviations ``reading_noise`` in the reading's unit and ``load_noise_n``, or estimated); "command" and "cycles"
-    take their instruments from the commanded load or from the mean of the other repeats; "auto" fits the first and
-    goes on to another where the input's noise would move the result by a tenth of its error bar, and says so.
+    Raises
+    ------
+    NotIdentifiableError
+        Where the data cannot hold the answer.
+    NotConvergedError
+        Where the iteration did not settle, unless ``strict`` is False.
+    RefusedError
+        Where an estimator lacks what it needs.
+    InputError, UsageError
+        For wrong input.
 
-    ``offset`` (reading at no load, one a recording), ``delay`` (s, reading later than load is positive) and
-    ``initial_state`` are estimated, or fixed. ``load_offset_n`` is the load cell's zero: one constant cannot be told
-    from the other, so that one of the two is fixed. ``prefilter_rad_s`` is SRIVC's first lambda. ``scale`` is N per
-    reading unit of the paper's force: by default the recordings' ``effective_area_m2``, else 1; "estimate" fits it
-    (grey box only). ``counted`` gives by recording name the samples (n,) whose error counts. ``tolerance`` is the
-    relative change that ends the iteration.
-
-    Raises `NotIdentifiableError` where the data cannot hold the answer, `NotConvergedError` where the iteration did
-    not settle (unless ``strict`` is False), `RefusedError` where an estimator lacks what it needs, `InputError` and
-    `UsageError` for wrong input.
+    Examples
+    --------
+    >>> import smartshoe
+    >>> with smartshoe.open_machine("sim:instron", unit="left_toe", seed=1) as machine:
+    ...     pressed = machine.run(smartshoe.dynamic_protocol((100.0, 400.0)))
+    >>> found = smartshoe.identify(pressed)
+    >>> round(found.parameters["a1"].value, 2)  # 1/s
+    0.21
+    >>> toe = found.calibration(unit="left_toe")
     """
     several = recordings_of(recordings)
     _check_choices(direction, method, structure, initial_state, estimator)

@@ -51,7 +51,19 @@ def lack_of_fit(
 ) -> LackOfFitTest:
     """The F test of a fit's residual over repeated cycles of the ``recordings`` that it was made from, in their order.
 
-    ``skip_first`` cycles of each recording are left out. Raises `NotIdentifiableError` where nothing repeats.
+    Parameters
+    ----------
+    found
+        The fit.
+    recordings
+        Recordings, paths or DataFrames.
+    skip_first
+        So many cycles of each recording are left out.
+
+    Raises
+    ------
+    NotIdentifiableError
+        Where nothing repeats.
     """
     several = recordings_of(recordings)
     return lack_of_fit_of(found.residuals, several, unknowns=found.fit.problem.size, skip_first=skip_first)

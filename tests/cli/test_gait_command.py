@@ -202,7 +202,7 @@ def test_a_fault_is_one_sentence_and_leaves_no_file(
 
 def test_a_folder_of_calibrations_serves_with_the_extended_ones_before_the_plain(tmp_path: Path) -> None:
     from smartshoe.calibration import Calibration
-    from smartshoe.cli.inputs import load_calibrations
+    from smartshoe.calibration.folder import load_calibrations
     from smartshoe.errors import InputError
     from smartshoe.units import MILLIBAR
 

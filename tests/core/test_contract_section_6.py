@@ -128,9 +128,27 @@ def test_a_path_and_a_frame_are_taken_for_the_recording_they_hold(
     assert smartshoe.validate([str(path)], calibration).traces[0].name == "triangles"
 
 
+def test_a_calibration_is_taken_by_its_path_and_several_from_a_folder(
+    recording: Recording, found: Identification, tmp_path: Path
+) -> None:
+    calibration = found.calibration(unit="left_toe")
+    calibration.save(tmp_path / "left_toe.json")
+    expected = smartshoe.compensate(recording, calibration)
+    assert np.array_equal(smartshoe.compensate(recording, tmp_path / "left_toe.json"), expected)
+    assert smartshoe.validate(recording, str(tmp_path / "left_toe.json")).unit == "left_toe"
+    for given in (tmp_path, str(tmp_path / "left_toe.json"), [tmp_path], calibration, [calibration]):
+        assert [one.a1 for one in smartshoe.load_calibrations(given)] == [calibration.a1]
+    store = smartshoe.CalibrationStore(tmp_path / "store")
+    store.add(calibration, serial_number="S1", date="2026-03-31", valid_for_days=30.0)
+    listed = store.to_dict("2026-06-01")
+    assert listed["schema"] == "smartshoe.calibrations/1"
+    assert [entry["is_expired"] for unit in listed["units"] for entry in unit["calibrations"]] == [True]
+
+
 @pytest.mark.parametrize(
     ("verb", "says"),
     [
+        (lambda: smartshoe.load_calibrations(3), "calibrations is of type int: give a Calibration"),
         (lambda: smartshoe.identify([3.0]), r"recordings\[0\] is of type float"),
         (lambda: smartshoe.identify({"a": 1}), "recordings is of type dict"),
         (lambda: smartshoe.validate(None, None), "recordings is of type NoneType"),

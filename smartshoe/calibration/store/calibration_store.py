@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
 
 VARIABLE = "SMARTSHOE_STORE"
+SCHEMA = "smartshoe.calibrations/1"
 When = str | date | datetime
 
 
@@ -181,6 +182,36 @@ class CalibrationStore:
         """Every unit of which there is a calibration or an event."""
         entries, events = self._read()
         return tuple(sorted({e.serial_number for e in entries} | {e.serial_number for e in events}))
+
+    def to_dict(self, date: When, unit: str | None = None) -> dict[str, Any]:
+        """What ``smartshoe calibrations list --json`` writes, schema smartshoe.calibrations/1.
+
+        Places and expiry are those of ``date``; ``unit``, a serial number or a place, leaves out the others.
+        """
+        at = moment(date, "--date")
+        entries, events = self._read()
+        serials: Sequence[str] = sorted({e.serial_number for e in entries} | {e.serial_number for e in events})
+        if unit is not None:
+            wanted = unit if unit in serials else self.unit_at(unit, at)
+            serials = [serial for serial in serials if serial == wanted]
+        return {
+            "schema": SCHEMA,
+            "store": str(self),
+            "date": iso(at),
+            "units": [
+                {
+                    "serial_number": serial,
+                    "position": self.position_of(serial, at),
+                    "calibrations": [
+                        {**entry.to_dict(), "is_expired": entry.is_expired(at)}
+                        for entry in entries
+                        if entry.serial_number == serial
+                    ],
+                    "events": [event.to_dict() for event in events if event.serial_number == serial],
+                }
+                for serial in serials
+            ],
+        }
 
     def history(self, serial_number: str) -> tuple[Entry, ...]:
         """The calibrations of a unit by date, () where there is none; two of one date as they were added."""

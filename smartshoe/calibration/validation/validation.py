@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.calibration import Calibration, compensate
+from smartshoe.calibration.calibration import calibration_from
 from smartshoe.calibration.validation import metrics
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import InputError
@@ -125,14 +127,31 @@ class Validation(Summarised):
 
 
 @on_one_thread
-def validate(recordings: RecordingLike | Sequence[RecordingLike], calibration: Calibration) -> Validation:
-    """Judge ``calibration`` on recordings with a reference load and one sensor each.
+def validate(
+    recordings: RecordingLike | Sequence[RecordingLike], calibration: Calibration | str | os.PathLike[str]
+) -> Validation:
+    """Judge a calibration on recordings that have a reference load and one sensor each.
 
-    The best static gain and offset is one pair fitted on these very recordings: the calibration has to beat a line
-    that was allowed to see the data. Raises `InputError` (`MissingChannelError`, `UnitError`) for recordings that
-    cannot be judged.
+    Parameters
+    ----------
+    recordings
+        One or several: recordings, paths or DataFrames.
+    calibration
+        The unit's, or the path of its file.
+
+    Returns
+    -------
+    Validation
+        Errors of the raw reading, after the best static line, and compensated, in N, over all and by loading rate. The
+        best static gain and offset is one pair fitted on these very recordings: the calibration has to beat a line
+        that was allowed to see the data.
+
+    Raises
+    ------
+    InputError
+        For recordings that cannot be judged (`MissingChannelError`, `UnitError`).
     """
-    given = recordings_of(recordings)
+    given, calibration = recordings_of(recordings), calibration_from(calibration)
     if not given:
         raise InputError("there is no recording to validate on: give one at least")
     unit = calibration.reading_unit

@@ -71,12 +71,31 @@ def read(
 ) -> Recording:
     """Any readable file as a `Recording`.
 
-    ``time``, ``force`` and ``sensors`` choose columns where names and units do not tell: ``NAME``, ``NAME[unit]``
-    or, by 1-based number, ``3`` and ``3[bar]``; the time also ``rows[49Hz]``, or ``NAME[49Hz]`` for a column that
-    counts samples at that rate. A reference that is a pressure is taken for the force on 1 cm². Where the file is
-    ``partly`` what the choices are of (one of two logs), those that name no column of it are passed over. ``unit``
-    names the sensing unit (``left_toe``) and ``name`` the recording in place of what the file says. Raises
-    `InputError` and its kin, naming file and line.
+    Parameters
+    ----------
+    path
+        The file, in any of the formats; its content says which, before its suffix does.
+    time, force, sensors
+        Columns, where names and units do not tell: ``NAME``, ``NAME[unit]`` or, by 1-based number, ``3`` and
+        ``3[bar]``; the time also ``rows[49Hz]``, or ``NAME[49Hz]`` for a column that counts samples at that rate. A
+        reference that is a pressure is taken for the force on 1 cm².
+    unit, name
+        The sensing unit (``left_toe``) and the recording's name, in place of what the file says.
+    partly
+        The file is one of two logs: choices that name no column of it are passed over.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read or holds no usable data, naming file and line.
+
+    Examples
+    --------
+    >>> import smartshoe
+    >>> pressed = smartshoe.Recording.from_arrays(time_s=[0.0, 0.1], force_n=[0.0, 5.0], pressure_mbar=[1.0, 2.5])
+    >>> smartshoe.write(pressed, "pressed.csv")
+    >>> smartshoe.read("pressed.csv")["pressure"].in_unit(smartshoe.units.PASCAL).tolist()
+    [100.0, 250.0]
     """
     from smartshoe.files.logs.columns import recording_from
 
@@ -88,7 +107,17 @@ def read(
 def write(recording: Recording, path: Path | str) -> None:
     """Write ``recording`` in the format that the suffix of ``path`` names, whole or not at all.
 
-    ``.csv`` and ``.txt`` are the plain table. Raises `UsageError` for a suffix that no writable format has.
+    Parameters
+    ----------
+    recording
+        What is written; numbers as they are, with their units in the columns' names.
+    path
+        ``.csv`` and ``.txt`` are the plain table.
+
+    Raises
+    ------
+    UsageError
+        For a suffix that no writable format has.
     """
     path = Path(path)
     writable = [format_ for format_ in formats() if format_.write is not None]

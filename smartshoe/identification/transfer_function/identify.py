@@ -61,19 +61,56 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
 ) -> TransferFunctionEstimate:
     """Identify y = B(s)/A(s) exp(-delay s) u + offset, A monic of degree ``poles``, B of degree ``zeros``.
 
-    ``u`` and ``y`` are (n,) arrays, or lists of them for several experiments, which share A, B and the delay; NaN is a
-    missing sample. Either ``sample_time_s`` or ``time_s`` (n,) (any steps) says when they were taken; ``intersample``
-    whether the input is held ("zoh") or straight ("foh") between samples. ``method``: "srivc", or from it "gn", "lm",
-    "trf", which share one output error and analytic gradient. ``prefilter_rad_s`` is the lambda of SRIVC's first
-    filter, about the bandwidth; by default several are tried. ``delay_s`` is a number or "estimate", from 0 up to
-    ``max_delay_s`` (by default a quarter of the shortest experiment, 500 samples at most). ``initial_state``:
-    "estimate", "rest" (input and output were 0 before), or "steady" (the first input had always been). ``offset`` of
-    the output: "estimate", one for each experiment, or a number in y's unit. The fit ends where the relative change is
-    below ``tolerance`` or far below a standard error; ``strict`` raises where it does not in ``max_iterations``.
+    Parameters
+    ----------
+    u, y
+        Input and output (n,), or lists of them for several experiments, which share A, B and the delay; NaN is a
+        missing sample.
+    poles, zeros
+        Degrees of A and B.
+    sample_time_s, time_s
+        When they were taken: the one, or the other (n,) with any steps.
+    method : {"trf", "gn", "lm", "srivc"}
+        SRIVC alone, or from it one of the others, which share one output error and analytic gradient.
+    intersample : {"zoh", "foh"}
+        Whether the input is held or straight between samples.
+    prefilter_rad_s
+        The lambda of SRIVC's first filter, about the bandwidth; by default several are tried.
+    delay_s, max_delay_s
+        A number or "estimate", from 0 up to ``max_delay_s`` (by default a quarter of the shortest experiment, 500
+        samples at most).
+    initial_state : {"estimate", "rest", "steady"}
+        "rest": input and output were 0 before; "steady": the first input had always been.
+    offset
+        Of the output, in y's unit: "estimate", one for each experiment, or a number.
+    tolerance, max_iterations, strict
+        The fit ends where the relative change is below ``tolerance`` or far below a standard error; ``strict`` raises
+        where it does not in ``max_iterations``.
 
-    Raises `NotIdentifiableError` on data that cannot hold the answer, `NotConvergedError` where ``strict`` and
-    unsettled, `UsageError` and `InputError` on arguments that do not fit. Sources: Young and Jakeman 1980; Garnier and
-    Wang 2008.
+    Raises
+    ------
+    NotIdentifiableError
+        On data that cannot hold the answer.
+    NotConvergedError
+        Where ``strict`` and unsettled.
+    UsageError, InputError
+        On arguments that do not fit.
+
+    Notes
+    -----
+    Young and Jakeman 1980; Garnier and Wang 2008.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import smartshoe
+    >>> u = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 60), 20)
+    >>> y = np.zeros(u.size)  # y' = -1.5 y + 3 u, u held for steps of 0.05 s
+    >>> for k in range(1, y.size):
+    ...     y[k] = np.exp(-0.075) * y[k - 1] + 2.0 * (1.0 - np.exp(-0.075)) * u[k - 1]
+    >>> found = smartshoe.identify_transfer_function(u, y, sample_time_s=0.05, poles=1, zeros=0)
+    >>> found.denominator.round(6).tolist(), found.numerator.round(6).tolist()
+    ([1.0, 1.5], [3.0])
     """
     fixed = None if offset == "estimate" else offset
     structure = Structure(poles, zeros, intersample, initial_state, fixed)

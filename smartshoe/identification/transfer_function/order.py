@@ -66,10 +66,27 @@ def select_order(
 ) -> OrderSelection:
     """Fit each of ``poles`` with each of ``zeros`` (by default all below) and order them by ``criterion``.
 
-    Data and ``options`` are those of `identify_transfer_function`. Several experiments are left out one at a time; of
-    a single one, its last ``held_out_share``. What is left out keeps its own offset and initial state, as every
-    experiment does, and its error counts the freedom that they take. A structure that the data cannot hold is listed
-    with the reason. Raises `NotIdentifiableError` where none can be fitted.
+    Parameters
+    ----------
+    u, y, sample_time_s, time_s, **options
+        As in `identify_transfer_function`.
+    poles, zeros
+        The degrees to try.
+    criterion
+        By which structures are ordered.
+    held_out_share
+        Several experiments are left out one at a time; of a single one, this share at its end. What is left out keeps
+        its own offset and initial state, as every experiment does, and its error counts the freedom that they take.
+
+    Returns
+    -------
+    OrderSelection
+        A structure that the data cannot hold is listed with the reason.
+
+    Raises
+    ------
+    NotIdentifiableError
+        Where none can be fitted.
     """
     if criterion not in get_args(Criterion):
         raise UsageError(f"criterion is {criterion!r}: give one of {', '.join(get_args(Criterion))}")

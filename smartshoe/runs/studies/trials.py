@@ -96,9 +96,9 @@ def calibrations_for(recording: Recording, place: Path | None, entry: TrialEntry
     if place is None:
         return []
     if any(place.glob("*.json")) or not place.is_dir():
-        from smartshoe.calibration.folder import load_folder
+        from smartshoe.calibration.folder import load_calibrations
 
-        return load_folder(place)
+        return load_calibrations(place)
     from smartshoe.calibration import Calibration
     from smartshoe.calibration.store import CalibrationStore, find
     from smartshoe.errors import InputError
