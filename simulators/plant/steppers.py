@@ -1,4 +1,4 @@
-"""Between a bladder's parameters and the compiled time stepping: packing, memory, and what acts on the load first."""
+"""Between a bladder's parameters and the compiled time stepping: its memory, and what acts on the load first."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from simulators.effects.contact import ContactState, through_contact
 from simulators.effects.outside import fresh, strike
-from simulators.plant.bladder_parameters import AMBIENT_K, AMBIENT_PA, HEAT_RATIO, BladderParameters
+from simulators.plant.bladder_parameters import BladderParameters
+from simulators.plant.kernel_constants import per_newton, plain_constants, wall_constants
 from simulators.plant.preisach import MEMORY, loop_shape
 
 Array = NDArray[np.float64]
@@ -21,30 +22,7 @@ class PlainStepper:
         friction = p.hysteresis
         self._shape, loop = loop_shape(friction.half_width_n, friction.spread, p.full_scale_n)
         loop_n = friction.strength * p.full_scale_n / loop if friction.strength else 0.0
-        # In the order in which `simulators.plant.stepping.advance` unpacks them.
-        self._constants = np.array([
-            p.k1 * p.x_over_nrt,
-            p.k2 * p.x_over_nrt,
-            p.k2 / p.c,
-            1.0 / (p.effective_area_m2 * AMBIENT_PA),
-            p.full_scale_n,
-            p.full_scale_deformation,
-            1.0 if p.gas == "boyle" else 0.0,
-            p.static_exponent,
-            p.wall_hardening,
-            loop_n,
-            p.leak.linear_per_s,
-            p.leak.orifice_per_s,
-            p.gas_heat.fraction * (HEAT_RATIO - 1.0),
-            1.0 / p.gas_heat.time_constant_s,
-            p.temperature.drift_k_per_s / AMBIENT_K,
-            p.temperature.warming_k / AMBIENT_K,
-            1.0 / p.temperature.warming_time_constant_s,
-            p.softening.strength,
-            p.softening.width,
-            p.conditioning.gain,
-            1.0 / p.conditioning.cycles,
-        ])  # fmt: skip
+        self._constants = plain_constants(p, loop_n)
 
     @staticmethod
     def suffices(p: BladderParameters) -> bool:
@@ -80,42 +58,11 @@ class WallStepper:
     def __init__(self, parameters: BladderParameters) -> None:
         self.parameters = p = parameters
         self._front = PlainFront(p)
-        per_newton = 1.0 / (p.effective_area_m2 * AMBIENT_PA)
-        full_stress, full_e = p.full_scale_n * per_newton, p.full_scale_deformation
-        self._per_newton = per_newton
+        self._constants = constants = wall_constants(p)
         creep, creep_rate = p.power_law_creep.arms()
         self._arms = np.concatenate([[p.k2], creep]) * p.x_over_nrt, np.concatenate([[p.k2 / p.c], creep_rate])
         self._heat = p.gas_heat.spread() if p.gas_heat.fraction > 0 else (np.zeros(0), np.zeros(0))
-        self._sliders = p.stick_slip.elements(full_stress, full_e)
-        second = p.second_relaxation
-        # In the order in which `simulators.plant.wall_stepping.advance_wall` unpacks them.
-        self._constants = np.array([
-            p.k1 * p.x_over_nrt,
-            full_e,
-            1.0 if p.gas == "boyle" else 0.0,
-            p.wall_hardening,
-            p.wall_stiffening,
-            p.softening.strength,
-            p.softening.width,
-            p.leak.linear_per_s,
-            p.leak.orifice_per_s,
-            p.leak.capillary_per_s,
-            p.leak.nozzle_per_s,
-            p.gas_heat.fraction * (HEAT_RATIO - 1.0),
-            p.temperature.drift_k_per_s / AMBIENT_K,
-            p.temperature.warming_k / AMBIENT_K,
-            1.0 / p.temperature.warming_time_constant_s,
-            second.k3 * p.x_over_nrt,
-            1.0 / second.time_constant_s,
-            second.eyring_width * full_e,
-            p.bouc_wen.strength * full_stress,
-            1.0 / (p.bouc_wen.width * full_e),
-            p.bouc_wen.exponent,
-            p.bouc_wen.gamma,
-            p.permanent_set.rate_per_s,
-            p.permanent_set.exponent,
-            full_stress,
-        ])  # fmt: skip
+        self._sliders = p.stick_slip.elements(constants.full_stress, constants.full_e)
 
     def reset(self, session: int) -> None:
         """Back to rest."""
@@ -131,7 +78,7 @@ class WallStepper:
         from simulators.plant.wall_stepping import advance_wall
 
         fine_n = upsampled(load_n, self._load_n, finer)
-        stress = self._front.acting(fine_n) * self._per_newton
+        stress = self._front.acting(fine_n) * per_newton(self.parameters)
         pressure, deformation = np.empty(fine_n.size), np.empty(fine_n.size)
         advance_wall(
             stress, step_s, self._constants, *self._arms, *self._heat, *self._sliders,

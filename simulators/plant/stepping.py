@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from simulators.plant.kernel_constants import PlainConstants
 from simulators.plant.preisach import mean_curve, relays_up
 
 Array = NDArray[np.float64]
@@ -49,26 +50,27 @@ def cycle_at(load_n: float, full_n: float, in_cycle: bool) -> tuple[bool, bool]:
 
 @njit(cache=True)
 def advance(
-    load_n: Array, finer: int, step_s: float, constants: Array, shape: Array,
+    load_n: Array, finer: int, step_s: float, constants: PlainConstants, shape: Array,
     state: Array, turning: Array, partial: Array, pressure: Array, deformation: Array,
 ) -> None:  # fmt: skip
     """Carry the state through ``load_n`` (n,), ``finer`` steps of ``step_s`` a sample; fill pressure and deformation.
 
     ``state``, ``turning`` and ``partial`` are changed in place.
     """
-    K1, K2, relaxation, per_newton, full_n, full_e, boyle = constants[:7]
-    exponent, hardening, loop_n, linear_leak, orifice_leak, heat, heat_rate = constants[7:14]
-    drift, warming, warming_rate, softening, width, conditioning, per_cycle = constants[14:21]
+    c = constants
+    K1, K2, full_n, full_e = c.stiffness, c.arm_stiffness, c.full_n, c.full_e
+    heat, softening, width = c.heat, c.softening, c.softening_width
+    boyle = c.boyle != 0.0
     e, e_before, q, theta, w, flow_before, e_max, time_s, cycles, load, places = state
     count = max(int(abs(places)), 1)
     in_cycle = places < 0.0
 
     # Exact weights for a deformation that is linear within the step.
-    z = relaxation * step_s
+    z = c.arm_rate_per_s * step_s
     keep = math.exp(-z)
     mean = -math.expm1(-z) / z
-    heat_keep = math.exp(-heat_rate * step_s)
-    heat_mean = -math.expm1(-heat_rate * step_s) / (heat_rate * step_s)
+    heat_keep = math.exp(-c.heat_rate_per_s * step_s)
+    heat_mean = -math.expm1(-c.heat_rate_per_s * step_s) / (c.heat_rate_per_s * step_s)
 
     flow = 0.0
     p = 0.0
@@ -78,25 +80,25 @@ def advance(
             load = load_n[i] if j == finer - 1 else load + load_step
             time_s += step_s
             acting = load
-            if loop_n != 0.0:
+            if c.loop_n != 0.0:
                 up, count = relays_up(load, turning, partial, count, shape)
-                acting += loop_n * (up - mean_curve(load, shape))
-            if exponent != 1.0 and acting > 0.0:
-                acting = full_n * (acting / full_n) ** exponent
-            if conditioning != 0.0:
+                acting += c.loop_n * (up - mean_curve(load, shape))
+            if c.static_exponent != 1.0 and acting > 0.0:
+                acting = full_n * (acting / full_n) ** c.static_exponent
+            if c.conditioning != 0.0:
                 in_cycle, ended = cycle_at(load, full_n, in_cycle)
                 cycles += 1.0 if ended else 0.0
-                acting *= 1.0 + conditioning * -math.expm1(-cycles * per_cycle)
-            stress = acting * per_newton
-            warm = drift * time_s - warming * math.expm1(-warming_rate * time_s)
+                acting *= 1.0 + c.conditioning * -math.expm1(-cycles * c.per_cycle)
+            stress = acting * c.per_newton
+            warm = c.drift_per_s * time_s - c.warming * math.expm1(-c.warming_rate_per_s * time_s)
 
             q_fixed = keep * q + (mean - keep) * e
             theta_fixed = heat_keep * theta
             # Newton on the balance; it rises with e, so a bracket from the iterates themselves is safe.
-            low, high = -1e9, 0.999 if boyle != 0.0 else 1e9
-            new = min(2.0 * e - e_before, 0.99) if boyle != 0.0 else 2.0 * e - e_before
+            low, high = -1e9, 0.999 if boyle else 1e9
+            new = min(2.0 * e - e_before, 0.99) if boyle else 2.0 * e - e_before
             for _ in range(60):
-                if boyle != 0.0:
+                if boyle:
                     theta_new = theta_fixed + heat * heat_mean * math.log((1.0 - e) / (1.0 - new))
                     hot = (1.0 - w) / (1.0 - new)
                     p = hot * (1.0 + theta_new + warm) - 1.0
@@ -106,8 +108,8 @@ def advance(
                     p = new - w + theta_new + warm
                     slope = 1.0 + heat * heat_mean
                 ratio = new / full_e
-                stiffness = K1 * (1.0 + hardening * ratio * ratio)
-                tangent = K1 * (1.0 + 3.0 * hardening * ratio * ratio)
+                stiffness = K1 * (1.0 + c.hardening * ratio * ratio)
+                tangent = K1 * (1.0 + 3.0 * c.hardening * ratio * ratio)
                 if softening != 0.0 and new < e_max:
                     bend = math.tanh((e_max * e_max - new * new) / (width * full_e * full_e))
                     left = 1.0 - softening * bend
@@ -120,7 +122,7 @@ def advance(
                     break
             # The last correction is below rounding: bring the rest of the state to the same deformation.
             q = q_fixed + (1.0 - mean) * new
-            if boyle != 0.0:
+            if boyle:
                 theta = theta_fixed + heat * heat_mean * math.log((1.0 - e) / (1.0 - new))
                 p = (1.0 - w) / (1.0 - new) * (1.0 + theta + warm) - 1.0
             else:
@@ -129,8 +131,8 @@ def advance(
             e_before = e
             e = new
             e_max = max(e_max, e)
-            if linear_leak != 0.0 or orifice_leak != 0.0:
-                flow = linear_leak * p + orifice_leak * p / math.sqrt(abs(p) + ORIFICE_SMOOTHING)
+            if c.linear_leak_per_s != 0.0 or c.orifice_leak_per_s != 0.0:
+                flow = c.linear_leak_per_s * p + c.orifice_leak_per_s * p / math.sqrt(abs(p) + ORIFICE_SMOOTHING)
                 w += step_s * (1.5 * flow - 0.5 * flow_before)
                 flow_before = flow
         pressure[i] = p

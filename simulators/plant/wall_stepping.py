@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from simulators.plant.kernel_constants import WallConstants
 from simulators.plant.stepping import ORIFICE_SMOOTHING, newton
 
 Array = NDArray[np.float64]
@@ -72,7 +73,7 @@ def slide(z: float, way: float, power: float, gamma: float) -> float:
 
 @njit(cache=True)
 def advance_wall(
-    stress: Array, step_s: float, constants: Array, arm_stiffness: Array, arm_rate: Array, heat_share: Array,
+    stress: Array, step_s: float, constants: WallConstants, arm_stiffness: Array, arm_rate: Array, heat_share: Array,
     heat_rate: Array, slider_spring: Array, slider_most: Array,
     state: Array, arms: Array, heats: Array, sliders: Array, pressure: Array, deformation: Array,
 ) -> None:  # fmt: skip
@@ -80,39 +81,41 @@ def advance_wall(
 
     ``state`` (SCALARS,), ``arms``, ``heats`` and ``sliders`` are changed in place.
     """
-    K1, full_e, boyle, hardening, stiffening, softening, width = constants[:7]
-    linear_leak, orifice_leak, capillary, nozzle, heat = constants[7:12]
-    drift, warming, warming_rate, K3, thin_rate, thin_width = constants[12:18]
-    bristles, bristle_spring, bristle_power, gamma, set_rate, set_exponent, full_stress = constants[18:25]
+    c = constants
+    K1, K3, full_e, heat = c.stiffness, c.second_stiffness, c.full_e, c.heat
+    power, gamma = c.bristle_exponent, c.bristle_gamma
+    boyle = c.boyle != 0.0
     e, e_before, w, flow_before, e_max, time_s, thin, thin_flow_before, bristle, rest, rest_flow_before, last = state
     arm_keep, arm_mean = np.exp(-arm_rate * step_s), -np.expm1(-arm_rate * step_s) / (arm_rate * step_s)
     heat_keep, heat_mean = np.exp(-heat_rate * step_s), -np.expm1(-heat_rate * step_s) / (heat_rate * step_s)
     arm_tangent = np.sum(arm_stiffness * arm_mean)
     heat_gain = heat * np.sum(heat_share * heat_mean)
-    leaks = linear_leak != 0.0 or orifice_leak != 0.0 or capillary != 0.0 or nozzle != 0.0
-    bent = max(stiffening, 1e-6)
+    leaks = (
+        c.linear_leak_per_s != 0.0 or c.orifice_leak_per_s != 0.0 or c.capillary_per_s != 0.0 or c.nozzle_per_s != 0.0
+    )
+    bent = max(c.stiffening, 1e-6)
     p = 0.0
     for i in range(stress.size):
         time_s += step_s
-        warm = drift * time_s - warming * math.expm1(-warming_rate * time_s)
+        warm = c.drift_per_s * time_s - c.warming * math.expm1(-c.warming_rate_per_s * time_s)
         arm_pull = 0.0
         for j in range(arms.size):
             arms[j] = arm_keep[j] * arms[j] + (arm_mean[j] - arm_keep[j]) * e
             arm_pull += arm_stiffness[j] * arms[j]
         theta_fixed = faded(heats, heat_keep)
         if K3 != 0.0:
-            thin_flow = thin_rate * thin_width * math.sinh((e - thin) / thin_width)
+            thin_flow = c.second_rate_per_s * c.second_width * math.sinh((e - thin) / c.second_width)
             thin += step_s * (1.5 * thin_flow - 0.5 * thin_flow_before)
             thin_flow_before = thin_flow
-        if set_rate != 0.0:
-            rest_flow = set_rate * full_e * (max(last, 0.0) / full_stress) ** set_exponent
+        if c.set_rate_per_s != 0.0:
+            rest_flow = c.set_rate_per_s * full_e * (max(last, 0.0) / c.full_stress) ** c.set_exponent
             rest += step_s * (1.5 * rest_flow - 0.5 * rest_flow_before)
             rest_flow_before = rest_flow
-        low, high = -1e9, 0.999 if boyle != 0.0 else 1e9
-        new = min(2.0 * e - e_before, 0.99) if boyle != 0.0 else 2.0 * e - e_before
+        low, high = -1e9, 0.999 if boyle else 1e9
+        new = min(2.0 * e - e_before, 0.99) if boyle else 2.0 * e - e_before
         bristle_new = bristle
         for _ in range(60):
-            if boyle != 0.0:
+            if boyle:
                 hot = (1.0 - w) / (1.0 - new)
                 p = hot * (1.0 + theta_fixed + heat_gain * math.log((1.0 - e) / (1.0 - new)) + warm) - 1.0
                 slope = (p + 1.0) / (1.0 - new) + hot * heat_gain / (1.0 - new)
@@ -121,33 +124,33 @@ def advance_wall(
                 slope = 1.0 + heat_gain
             x = (new - rest) / full_e
             square = x * x
-            wall = K1 * full_e * (math.sinh(bent * x) / bent + hardening * square * x)
-            tangent = K1 * (math.cosh(bent * x) + 3.0 * hardening * square)
-            if softening != 0.0 and new < e_max:
-                wall, tangent = softened(wall, tangent, softening, new, e_max, width * full_e * full_e)
+            wall = K1 * full_e * (math.sinh(bent * x) / bent + c.hardening * square * x)
+            tangent = K1 * (math.cosh(bent * x) + 3.0 * c.hardening * square)
+            if c.softening != 0.0 and new < e_max:
+                wall, tangent = softened(wall, tangent, c.softening, new, e_max, c.softening_width * full_e * full_e)
             wall += arm_tangent * new - arm_pull + K3 * (new - thin)
             tangent += arm_tangent + K3
             for j in range(sliders.size):
                 held, stiffness = slider_at(sliders[j] + slider_spring[j] * (new - e), slider_spring[j], slider_most[j])
                 wall += held
                 tangent += stiffness
-            if bristles != 0.0:
-                way = bristle_spring * (new - e)
-                first = slide(bristle, way, bristle_power, gamma)
-                bristle_new = bristle + 0.5 * way * (first + slide(bristle + way * first, way, bristle_power, gamma))
-                wall += bristles * bristle_new
-                tangent += bristles * bristle_spring * first
+            if c.bristles != 0.0:
+                way = c.bristle_spring * (new - e)
+                first = slide(bristle, way, power, gamma)
+                bristle_new = bristle + 0.5 * way * (first + slide(bristle + way * first, way, power, gamma))
+                wall += c.bristles * bristle_new
+                tangent += c.bristles * c.bristle_spring * first
             off = p + wall - stress[i]
             new, move, low, high = newton(new, off, slope + tangent, low, high)
             if abs(move) <= 1e-13:
                 break
         # The last correction is below rounding: bring the rest of the state to the same deformation.
-        grow = math.log((1.0 - e) / (1.0 - new)) if boyle != 0.0 else new - e
+        grow = math.log((1.0 - e) / (1.0 - new)) if boyle else new - e
         theta = 0.0
         for j in range(heats.size):
             heats[j] += heat * heat_share[j] * heat_mean[j] * grow
             theta += heats[j]
-        p = (1.0 - w) / (1.0 - new) * (1.0 + theta + warm) - 1.0 if boyle != 0.0 else new - w + theta + warm
+        p = (1.0 - w) / (1.0 - new) * (1.0 + theta + warm) - 1.0 if boyle else new - w + theta + warm
         for j in range(arms.size):
             arms[j] += (1.0 - arm_mean[j]) * new
         for j in range(sliders.size):
@@ -158,8 +161,8 @@ def advance_wall(
         e_max = max(e_max, e)
         last = stress[i]
         if leaks:
-            flow = linear_leak * p + orifice_leak * p / math.sqrt(abs(p) + ORIFICE_SMOOTHING)
-            flow += capillary * p * (1.0 + 0.5 * p) + nozzle * nozzle_flow(p)
+            flow = c.linear_leak_per_s * p + c.orifice_leak_per_s * p / math.sqrt(abs(p) + ORIFICE_SMOOTHING)
+            flow += c.capillary_per_s * p * (1.0 + 0.5 * p) + c.nozzle_per_s * nozzle_flow(p)
             w += step_s * (1.5 * flow - 0.5 * flow_before)
             flow_before = flow
         pressure[i] = p
