@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from simulators.paper import AMBIENT_PA, DIAMETER_M, GAS_CONSTANT, MOLES, PEAK_N, TABLE_1, TABLE_2, TEMPERATURE_K
+from smartshoe.arrays import Array
 from smartshoe.kernels.blas import on_one_thread
 
-Array = NDArray[np.float64]
 RATE_HZ = 100.0
 TRIANGLE_RMS = PEAK_N / math.sqrt(3.0)  # of a triangle 0-800-0 about zero
 TRIANGLE_SD = PEAK_N / math.sqrt(12.0)  # about its mean: what MATLAB's fit % divides by

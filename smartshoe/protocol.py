@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import LimitError
 from smartshoe.files.gate import limits
-
-Array = NDArray[np.float64]
 
 STATIC_LOADS_N = tuple(float(load) for load in range(50, 801, 50))
 DYNAMIC_RATES_N_PER_S = (50.0, 100.0, 200.0, 400.0, 600.0, 800.0)

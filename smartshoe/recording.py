@@ -13,8 +13,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
@@ -22,8 +23,6 @@ from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Role = Literal["load", "sensor", "command", "auxiliary"]
 
 REGIONS = ("toe", "meta1", "meta4", "heel")
@@ -89,7 +88,7 @@ class Channel:
             return self.values
         return np.where(self.missing, np.nan, self.values)
 
-    def taken(self, index: slice | NDArray[np.intp] | Mask) -> Channel:
+    def taken(self, index: slice | Index | Mask) -> Channel:
         """The channel at the samples ``index``."""
         values = self.values[index]
         values.flags.writeable = False
@@ -327,7 +326,7 @@ class Recording(Summarised):
         """This recording without the named channels."""
         return replace(self, channels={n: c for n, c in self.channels.items() if n not in names})
 
-    def taken(self, index: slice | NDArray[np.intp] | Mask) -> Recording:
+    def taken(self, index: slice | Index | Mask) -> Recording:
         """This recording at the samples ``index`` (a slice, a mask or increasing indices)."""
         return replace(
             self,

@@ -6,11 +6,10 @@ import unicodedata
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UnitError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

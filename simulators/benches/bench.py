@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.instruments.sensing_unit import SensingUnit
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Block
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.units import MILLIBAR
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from simulators.benches.instron import Truth
     from simulators.benches.shoe import SimulatedShoe
 
-Array = NDArray[np.float64]
 
 LARGEST_SKEW_PPM = 100.0  # of two free crystals
 LARGEST_OFFSET_S = 5.0

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.effects.room import NeighbourUnit, Room
 from simulators.instruments.daq import MyRioParameters, SimulatedMyRio, sampled
 from simulators.instruments.sensing_unit import SensingUnit
 from simulators.plant.bladder_parameters import TUBE_DIAMETER_M
+from smartshoe.arrays import Array
 from smartshoe.devices.base import ChannelDescription, Shoe, TestMachine
 from smartshoe.errors import LimitError
 from smartshoe.files.gate import limits
@@ -26,7 +26,6 @@ from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
 if TYPE_CHECKING:
     from simulators.benches.bench import Bench
 
-Array = NDArray[np.float64]
 
 LOAD_LIMIT_N = 2000.0  # Instron 5944
 MILLIMETRE, CELSIUS = unit("mm"), unit("°C")

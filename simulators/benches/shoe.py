@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.instruments.sensing_unit import SensingUnit
 from simulators.people.events import TrueEvent, events_of
@@ -19,6 +18,7 @@ from simulators.people.plan import FEET
 from simulators.people.profiles import PROFILES, Gait
 from simulators.people.sensing import Sampler
 from simulators.people.shape import COLUMNS
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Block, ChannelDescription, Shoe
 from smartshoe.errors import UsageError
 from smartshoe.units import MILLIBAR
@@ -26,7 +26,6 @@ from smartshoe.units import MILLIBAR
 if TYPE_CHECKING:
     from simulators.benches.bench import Bench
 
-Array = NDArray[np.float64]
 
 FINEST_STEP_HZ = 1000.0
 CHUNK_S = 10.0

@@ -13,12 +13,10 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, NotNegative, Positive
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 FAST_N_PER_S = 800.0  # the paper's fastest triangle
 RATE_EXPONENT = 0.9

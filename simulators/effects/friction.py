@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 ELEMENTS = 24
 

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive, Share
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +76,7 @@ class ReadingChannel:
         return v
 
 
-def runs(size: int, share: float, mean_run: float, rng: np.random.Generator) -> NDArray[np.bool_]:
+def runs(size: int, share: float, mean_run: float, rng: np.random.Generator) -> Mask:
     """True (n,) in runs of geometric length, ``share`` of the samples in the mean.
 
     The uniform numbers behind a run's place do not depend on ``share``: a larger one adds runs and moves none.

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive, Share
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array, Index
 
 CYCLE_BEGINS = 0.02  # of full scale
 
@@ -153,7 +151,7 @@ class SensorOddities:
         return zero
 
 
-def moments(time_s: Array, mean_s: float, rng: np.random.Generator) -> tuple[NDArray[np.intp], Array, Array]:
+def moments(time_s: Array, mean_s: float, rng: np.random.Generator) -> tuple[Index, Array, Array]:
     """Random moments (Poisson, ``mean_s`` apart).
 
     Returns how many have passed at each time, the time since the last, and for each a size of either sign, 0.5 to 1.5.

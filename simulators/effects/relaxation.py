@@ -13,12 +13,10 @@ from math import gamma, log
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, NotNegative, Positive
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 ARMS = 48
 SHORTEST_S, LONGEST_S = 5e-3, 1e5

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 DIE_SHARE, DIE_FASTER = 0.35, 4.0  # of the warm-up: the die's part, and how much sooner it settles
 

@@ -9,13 +9,11 @@ gas is no relaxation.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
+from smartshoe.arrays import Array
 from smartshoe.kernels.blas import on_one_thread
-
-Array = NDArray[np.float64]
 
 SLOWEST, FASTEST = 0.005, 30.0  # 1/s, the poles that are tried
 GRID = 14

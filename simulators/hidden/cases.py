@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden import protocols
 from simulators.hidden.baseline import lagged, left_over
@@ -18,10 +17,9 @@ from simulators.hidden.machine import Chain, Departed, Given, lawful_machine, lo
 from simulators.hidden.plans import ALL, Plan, plan, seeded
 from simulators.hidden.recordings import drawn_subject, noise_options, small_effects
 from simulators.hidden.scaling import SILENT, HiddenEffect, clipped_at_an_end, search
+from smartshoe.arrays import Array
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
-
-Array = NDArray[np.float64]
 
 BEFORE_S = 60.0  # under the first load, before a record that starts loaded
 NUISANCES = (2, 4)  # from, below

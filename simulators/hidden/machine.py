@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.benches.instron import SimulatedInstron
 from simulators.hidden.effects import Draws, Law, Options, Subject, Surroundings, Warp, merged
@@ -27,12 +26,11 @@ from simulators.instruments.sensor import SimulatedHdiSensor
 from simulators.plant.bladder import LOWEST_STEP_HZ, SimulatedBladder
 from simulators.plant.bladder_parameters import AMBIENT_PA, X_OVER_NRT
 from simulators.provider import provider
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Bladder, ChannelDescription, Sensor
 from smartshoe.errors import SmartShoeError
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Channel, Recording
-
-Array = NDArray[np.float64]
 
 LAW_STEP_S = 2e-3
 MOST_ITERATIONS = 200

@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.effects.logging import ReadingChannel
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 LARGEST_ERROR_V = 0.05  # absolute error of the 0-5 V inputs, myRIO-1900 specifications
 

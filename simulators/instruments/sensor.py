@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.effects.outside import SensorOddities
 from simulators.effects.sensing import Curve, Limit, Noise, OutputDrift
+from smartshoe.arrays import Array
 from smartshoe.devices.base import ChannelDescription, Sensor
 from smartshoe.units import VOLT
-
-Array = NDArray[np.float64]
 
 LOW_V, SPAN_V = 0.5, 4.0
 

@@ -11,14 +11,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration
 from smartshoe.devices.base import Bladder
 from smartshoe.errors import InputError, UsageError
 from smartshoe.models.twin import TwinBladder
-
-Array = NDArray[np.float64]
 
 AMBIENT_PA = 101_325.0
 

@@ -14,11 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.shape import COLUMNS
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array, Mask
 
 THRESHOLD = 0.02  # of body weight
 EVENTS = ("heel_strike", "foot_flat", "heel_off", "toe_off")
@@ -34,7 +32,7 @@ class TrueEvent:
     event: str
 
 
-def crossings(time_s: Array, signal: Array, level: float) -> tuple[Array, NDArray[np.bool_]]:
+def crossings(time_s: Array, signal: Array, level: float) -> tuple[Array, Mask]:
     """When (m,) the signal (n,) crosses the level, linear between samples, and whether upwards."""
     above = signal > level
     at = np.flatnonzero(above[1:] != above[:-1])
@@ -54,7 +52,7 @@ def events_of(foot: str, time_s: Array, loads_n: Array, body_weight_n: float) ->
     def add(event: str, times_s: Array) -> None:
         found.extend(TrueEvent(float(when), foot, event) for when in times_s)
 
-    def bears(times_s: Array, signal: Array) -> NDArray[np.bool_]:
+    def bears(times_s: Array, signal: Array) -> Mask:
         return np.asarray(np.interp(times_s, time_s, signal) > level)
 
     times_s, up = crossings(time_s, whole, level)

@@ -13,15 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.person import Move, Person, Run
 from simulators.people.shape import COLUMNS, Outside, table
 from simulators.people.stances import LARGEST_WARP, Stances, mean_heights, mean_load
+from smartshoe.arrays import Array, Index
 from smartshoe.recording import REGIONS
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 PHASE_SD = {"walk": 0.020, "run": 0.030}  # of the shift of a region's course, as a share of stance
 STANCE_OF_STRIDE_CV = 0.3  # what a stance varies beside its stride, over the stride time's own variation

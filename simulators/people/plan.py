@@ -14,16 +14,14 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.moving import contacts, steps
 from simulators.people.person import Activity, Move, Part, Person, Stand, Tiptoe
 from simulators.people.shape import COLUMNS, COVERAGE, Outside
 from simulators.people.stances import Stances
 from simulators.people.standing import Lift, StandingStay, Sway
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
-
-Array = NDArray[np.float64]
 
 FEET = ("left", "right")
 STEP_ON_S = 0.5

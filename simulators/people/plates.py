@@ -14,17 +14,15 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.person import Person
 from simulators.people.plan import FEET
 from simulators.people.shape import COLUMNS, COVERAGE, PHASES, Outside, table
 from simulators.people.standing import FLAT
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError
 from smartshoe.recording import REGIONS
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
 
 LEVEL_N = 10.0  # a plate bears
 LONGEST_STANCE_S = 1.3  # longer, the foot stands

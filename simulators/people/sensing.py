@@ -8,13 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.instruments.daq import MyRioParameters, SimulatedMyRio
 from simulators.instruments.sensing_unit import SensingUnit
+from smartshoe.arrays import Array
 from smartshoe.units import MILLIBAR
-
-Array = NDArray[np.float64]
 
 
 class Sampler:

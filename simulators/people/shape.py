@@ -14,13 +14,12 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people import speed
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.recording import REGIONS
 
-Array = NDArray[np.float64]
 Outside = Literal["midfoot", "even"]
 
 COLUMNS = (*REGIONS, "outside")

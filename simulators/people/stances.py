@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.shape import COLUMNS, PHASES
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from smartshoe.arrays import Array, Index
 
 LARGEST_WARP = 0.12
 WARPS = np.linspace(-LARGEST_WARP, LARGEST_WARP, 49)

@@ -12,14 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.person import Person
 from simulators.people.shape import COLUMNS
 from simulators.people.stances import smooth_step
+from smartshoe.arrays import Array
 from smartshoe.recording import REGIONS
-
-Array = NDArray[np.float64]
 
 FLAT = {"heel": 0.60, "meta4": 0.16, "meta1": 0.16, "toe": 0.08}
 RAISED = {"heel": 0.0, "meta4": 0.34, "meta1": 0.41, "toe": 0.25}

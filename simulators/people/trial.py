@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.people.events import TrueEvent, events_of
 from simulators.people.person import Activity, Part, Person, Walk
 from simulators.people.plan import FEET, GaitPlan, plan
 from simulators.people.plates import Measured
 from simulators.people.shape import COVERAGE, Outside
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.recording import REGIONS, Recording
-
-Array = NDArray[np.float64]
 
 SAMPLE_RATE_HZ = 200.0  # Chinimilli 2016, Section II
 BLOCK_S = 300.0

@@ -6,15 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.instruments.options import UnitOptions, with_preset
 from simulators.instruments.sensing_unit import SensingUnit
 from simulators.instruments.sensor import SimulatedHdiSensor
 from simulators.plant.bladder import SimulatedBladder
 from smartshoe.recording import REGIONS
-
-Array = NDArray[np.float64]
 
 
 def sensing_units(

@@ -27,13 +27,11 @@ from __future__ import annotations
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.plant.bladder_parameters import AMBIENT_PA, BladderParameters
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Bladder
 from smartshoe.errors import UsageError
-
-Array = NDArray[np.float64]
 
 LOWEST_STEP_HZ = 1000.0
 

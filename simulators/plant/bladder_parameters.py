@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from simulators.effects.bounds import STRICT_KEYS, Finite, NotNegative, Positive
@@ -15,8 +14,7 @@ from simulators.effects.damage import PermanentSetParameters
 from simulators.effects.friction import BoucWenParameters, StickSlipParameters
 from simulators.effects.outside import Odd
 from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 AMBIENT_PA = 101_325.0
 AMBIENT_K = 300.0

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from simulators.plant.preisach import mean_curve, relays_up
 from simulators.plant.stepping import cycle_at
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 @njit(cache=True)

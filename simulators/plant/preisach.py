@@ -16,9 +16,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 MEMORY = 256  # turning points kept; beyond it the two innermost are forgotten (a loop smaller than all others)
 

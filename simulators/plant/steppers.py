@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.effects.contact import ContactState, through_contact
 from simulators.effects.outside import fresh, strike
 from simulators.plant.bladder_parameters import BladderParameters
 from simulators.plant.kernel_constants import per_newton, plain_constants, wall_constants
 from simulators.plant.preisach import MEMORY, loop_shape
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 class PlainStepper:

@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from simulators.plant.kernel_constants import PlainConstants
 from simulators.plant.preisach import mean_curve, relays_up
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 STATE_SIZE = 11
 ORIFICE_SMOOTHING = 1e-4  # of ambient: the square root's infinite slope at zero pressure is laminar in truth

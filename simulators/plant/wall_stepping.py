@@ -10,12 +10,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from simulators.plant.kernel_constants import WallConstants
 from simulators.plant.stepping import ORIFICE_SMOOTHING, newton
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 SCALARS = 12
 LAMINAR = 3e-4  # of ambient: below this difference a nozzle's flow is viscous

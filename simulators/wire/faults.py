@@ -14,13 +14,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from simulators.effects.bounds import Finite, NotNegative
-
-Mask = NDArray[np.bool_]
-Array = NDArray[np.float64]
+from smartshoe.arrays import Mask
 
 Percent = Annotated[float, Field(ge=0, le=100)]
 LATEST_DUPLICATE = 3

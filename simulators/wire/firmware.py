@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Shoe
 from smartshoe.devices.wire.frames import CommandDecoder, encode_information, encode_samples
 from smartshoe.devices.wire.information import ChannelInformation, Information
 from smartshoe.devices.wire.lines import encode_header, encode_lines
 from smartshoe.recording import Recording
 
-Array = NDArray[np.float64]
 Format = Literal["frames", "lines"]
 
 FULL_SCALE_COUNTS = 65534

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.compensator import Compensator
 from smartshoe.calibration.filter import ForceFilter
 from smartshoe.errors import InputError, UsageError
 
-Array = NDArray[np.float64]
 _FLOAT64 = np.dtype(np.float64)
 _NO_FILTER = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.nan, 0.0]
 

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.compensator import Compensator
 from smartshoe.calibration.extended import ExtendedCompensator
-from smartshoe.calibration.filter import Array, ForceFilter
+from smartshoe.calibration.filter import ForceFilter
 from smartshoe.calibration.reader import Reader, parsed
 from smartshoe.errors import InputError, MissingChannelError, UnitError, UsageError
 from smartshoe.files.atomic import json_text, write_text

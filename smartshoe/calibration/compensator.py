@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.filter import ForceFilter
 from smartshoe.errors import UsageError
 from smartshoe.kernels.linear_filter import linear_filter
 from smartshoe.models import discretise
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
 
 
 class Compensator(ForceFilter):

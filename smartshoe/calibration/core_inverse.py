@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.models.core import Core
 from smartshoe.models.effects.effect import CStep, Inverse
-
-Array = NDArray[np.float64]
 
 RINGING = -0.5
 """An eigenvalue of the inverse below this changes sign at each sample and dies slowly: noise would ring."""

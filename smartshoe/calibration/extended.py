@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.core_inverse import CoreInverse
 from smartshoe.calibration.filter import ForceFilter
 from smartshoe.calibration.noise_limit import MOST, NoiseLimit, noise_gain
@@ -15,8 +15,6 @@ from smartshoe.models.effects.effect import CStep, Inverse
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel, Part
 from smartshoe.units import Unit, declared, find_unit
-
-Array = NDArray[np.float64]
 
 LEAK_CAUTION = (
     "the air that is gone is summed up from the readings, so that an error of their zero grows with time: reset the"

@@ -6,13 +6,12 @@ from abc import ABC, abstractmethod
 from typing import Any, Self, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
 
 
 class ForceFilter(ABC):

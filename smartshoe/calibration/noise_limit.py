@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CStep, Inverse
-
-Array = NDArray[np.float64]
 
 MOST = 3.0
 """Times that a block may raise what alternates from sample to sample. Undoing a lag of T raises it 1 + 2 T/step times:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.devices.events import ShoeEvent
 from smartshoe.errors import DeviceError, LimitError
 from smartshoe.protocol import MachineLimits, Protocol
@@ -22,9 +22,6 @@ from smartshoe.units import Unit
 
 if TYPE_CHECKING:
     from smartshoe.devices.wire.clock import DeviceClock
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,8 @@ part of what a fit of the whole record would, and is unbiased where that is not.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 SLOPE_OVER_S = 0.15
 APART_S = 0.3

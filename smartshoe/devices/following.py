@@ -14,11 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.corners import slope_of
-
-Array = NDArray[np.float64]
 
 TILT_OVER_S = 0.05  # a slope from two samples is mostly noise
 SLOW_S, QUICK_S = 0.5, 0.05

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import ChannelDescription, Sensor
 from smartshoe.units import MILLIBAR, VOLT, unit
-
-Array = NDArray[np.float64]
 
 # First Sensor HDI data sheet: ratiometric, 0.5 to 4.5 V at a supply of 5 V; proof pressure 1 bar.
 LOW_V, HIGH_V = 0.5, 4.5

@@ -11,15 +11,13 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.corners import follow_corners
 from smartshoe.devices.following import follow
 from smartshoe.errors import InputError
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.recording import Channel, Recording, Role
-
-Array = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.8
 SAME_SIGNAL = 0.98

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Bladder, Block, ChannelDescription, Shoe
 from smartshoe.errors import DeviceError, MissingChannelError, UnitError, UsageError
 from smartshoe.files.logs import read
 from smartshoe.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 class ReplayedShoe(Shoe):

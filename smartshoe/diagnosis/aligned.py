@@ -10,14 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.integrity import Integrity
 from smartshoe.models.effects import Effect, effect
 from smartshoe.recording import Recording
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SAME_LAG = 0.25  # of the largest: lags that differ by less are one
 LARGEST_DELAY_S = 2.9

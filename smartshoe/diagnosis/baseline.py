@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.session import Scale, Session
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import ExtendedModel
-
-Array = NDArray[np.float64]
 
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
 POLES_PER_S = np.geomspace(0.01, 20.0, 31)

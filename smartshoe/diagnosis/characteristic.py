@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.recording import Recording
 
-Array = NDArray[np.float64]
 STANDARD = Thresholds()
 
 
@@ -120,5 +119,5 @@ def _explained(values: Array, by: Array) -> float:
     return 1.0 - float(np.var(values - by)) / whole if whole > 0 else 0.0
 
 
-def _slope(place: Array, level: Array, among: NDArray[np.bool_]) -> float:
+def _slope(place: Array, level: Array, among: Mask) -> float:
     return float(np.polyfit(place[among], level[among], 1)[0]) if among.sum() >= 3 else 0.0

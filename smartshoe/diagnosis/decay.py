@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.integrity.scales import SECOND_DIFFERENCE
 from smartshoe.recording import Recording
 
-Array = NDArray[np.float64]
 Course = Literal["exponential", "slower", "faster", "undecided"]
 
 STANDARD = Thresholds()

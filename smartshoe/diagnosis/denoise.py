@@ -9,9 +9,8 @@ short, as far as what a line leaves is noise (after the crossing-lines idea of K
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 HALF_WIDTHS_S = (0.12, 0.06, 0.03)
 FEWEST = 7  # samples a line is drawn through

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.baseline import USUAL
 from smartshoe.diagnosis.sensitivity import Linearised, linearised
 from smartshoe.diagnosis.session import Scale, prepare, thinning
@@ -21,8 +21,6 @@ from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

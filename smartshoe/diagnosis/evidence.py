@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis.sensitivity import (
     MODULATORS,
     Linearised,
@@ -34,7 +34,6 @@ from smartshoe.diagnosis.sensitivity import (
     nuisances,
 )
 
-Array = NDArray[np.float64]
 Members = tuple[int, ...]
 
 OWN_SD = 10.0
@@ -205,7 +204,7 @@ class Evidence:
         shapes = [len(self.given.place(self.given.candidates[m].name)) for m in members]
         return sum(self.odds + 2.0 * math.log(count) for count in shapes)
 
-    def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[NDArray[np.intp], Array]:
+    def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[Index, Array]:
         """Columns that take part, and the standard deviations (p,) of their coefficients."""
         prior = np.full(self._last - 1, self.thresholds.material)
         prior[: self.given.own] = OWN_SD
@@ -262,7 +261,7 @@ class Evidence:
         columns = [self.given.candidates[member].columns for member in members]
         return [float(np.linalg.norm(mean[[c - 1 for c in own]])) for own in columns]
 
-    def _cost(self, index: NDArray[np.intp], sds: Array) -> tuple[Array, float, tuple[Array, bool]]:
+    def _cost(self, index: Index, sds: Array) -> tuple[Array, float, tuple[Array, bool]]:
         a = self.gram[np.ix_(index, index)] * np.outer(sds, sds)
         a[np.diag_indices_from(a)] += 1.0
         g = self.gram[index, 0] * sds

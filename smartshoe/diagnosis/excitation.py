@@ -9,14 +9,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Mask
 from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
 
@@ -115,18 +113,18 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
         yield _Rise(rate, samples, float(load[last]), above)
 
 
-def _held(session: Session, thresholds: Thresholds) -> NDArray[np.bool_]:
+def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
     flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
     return np.asarray(flat & ~session.resting & (session.conditions.load > CYCLE_SHARE))
 
 
-def _runs(mask: NDArray[np.bool_]) -> list[int]:
+def _runs(mask: Mask) -> list[int]:
     first, last = runs_of(mask)
     return [int(n) for n in last - first]
 
 
-def _longest(mask: NDArray[np.bool_]) -> int:
+def _longest(mask: Mask) -> int:
     return max(_runs(mask), default=0)
 
 

@@ -15,13 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis.session import Session
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BLOCK_S = 0.2  # means over it: what forgets within it counts as white
 SLOWEST_S = 5.0  # memory; what seems to remember longer may as well be a drift

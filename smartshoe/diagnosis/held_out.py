@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.diagnosis.sensitivity import nuisances
 from smartshoe.diagnosis.session import Scale, Session
 from smartshoe.models.extended import ExtendedModel
-
-Array = NDArray[np.float64]
 
 RESAMPLED = 400
 

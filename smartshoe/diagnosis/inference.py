@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis.baseline import USUAL
 from smartshoe.diagnosis.evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis.held_out import residual_of
@@ -28,7 +28,6 @@ from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.loading import turning_points
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 ROUNDS = 6
@@ -340,7 +339,7 @@ def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds:
     return None
 
 
-def _spread(signals: Sequence[Array], seen: Sequence[NDArray[np.bool_]]) -> float:
+def _spread(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
     """Rms of ``signals``, (n,) each, where ``seen``, each about its own mean."""
     parts = [signal[mask] - signal[mask].mean() for signal, mask in zip(signals, seen, strict=True) if mask.any()]
     return math.sqrt(sum(float(one @ one) for one in parts) / max(sum(one.size for one in parts), 1))

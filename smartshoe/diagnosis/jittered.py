@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects import Conditions, timing_jitter
-
-Array = NDArray[np.float64]
 
 BLOCK = 12  # samples, over which the slope at which the noise is largest is a mean
 PASSES = 3  # a ramp shorter than the jitter seems steeper than it is read; from the second pass on it settles

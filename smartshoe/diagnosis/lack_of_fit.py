@@ -15,12 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis.session import Session
-
-Array = NDArray[np.float64]
 
 FEWEST_BLOCKS = 8
 COLOUR_S = (0.1, 0.2, 0.35, 0.6, 1.0)  # time constants of the noise's coloured part; slower ones count as structure
@@ -134,7 +132,7 @@ def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float
     )
 
 
-def _quiet(rows: Array) -> NDArray[np.bool_]:
+def _quiet(rows: Array) -> Mask:
     """(blocks,) the nine tenths with the least power: a block with a step in it tells nothing of noise."""
     power = np.sum((rows - rows.mean(axis=1, keepdims=True)) ** 2, axis=1)
     return np.asarray(power <= np.quantile(power, 0.9))

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis.sensitivity import nuisance_precision, nuisances
 from smartshoe.diagnosis.session import Session
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.models.effects import EffectParameter
 from smartshoe.models.extended import ExtendedModel
-
-Array = NDArray[np.float64]
 
 MOST_STEPS = 25
 SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
@@ -115,9 +113,7 @@ def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -
     return Fit(model, cost, _inverse(inner) * np.outer(scale, scale))
 
 
-def _prior(
-    owners: Sequence[tuple[str, EffectParameter]], theta: Array, logarithmic: NDArray[np.bool_]
-) -> tuple[Array, Array]:
+def _prior(owners: Sequence[tuple[str, EffectParameter]], theta: Array, logarithmic: Mask) -> tuple[Array, Array]:
     about, precision = _stepped(theta, logarithmic).copy(), np.zeros(theta.size)
     for k, (owner, parameter) in enumerate(owners):
         weight_sd = getattr(parameter, "prior_sd", None)
@@ -128,7 +124,7 @@ def _prior(
     return about, precision
 
 
-def _stepped(theta: Array, logarithmic: NDArray[np.bool_]) -> Array:
+def _stepped(theta: Array, logarithmic: Mask) -> Array:
     return np.where(logarithmic, np.log(np.where(logarithmic, np.abs(theta) + 1e-300, 1.0)), theta)
 
 
@@ -137,7 +133,7 @@ def _is_logarithmic(parameter: EffectParameter) -> bool:
 
 
 def _bounded_step(
-    normal: Array, right: Array, damping: float, theta: Array, low: Array, high: Array, logarithmic: NDArray[np.bool_]
+    normal: Array, right: Array, damping: float, theta: Array, low: Array, high: Array, logarithmic: Mask
 ) -> Array:
     """The damped step over the parameters that are not pushed against a bound or without any influence."""
     diagonal = np.diag(normal)

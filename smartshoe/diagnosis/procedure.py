@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.aligned import aligned
 from smartshoe.diagnosis.baseline import baseline_of
 from smartshoe.diagnosis.characteristic import characteristic_of, friction_of
@@ -33,8 +33,6 @@ from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
-
-Array = NDArray[np.float64]
 
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
 

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.session import Scale, Session
 from smartshoe.diagnosis.thresholds import Thresholds
-
-Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
 

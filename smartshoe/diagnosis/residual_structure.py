@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.denoise import noise_sd
 from smartshoe.diagnosis.gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis.lack_of_fit import LackOfFit, repeating, slow
 from smartshoe.diagnosis.session import Session
-
-Array = NDArray[np.float64]
 
 BLOCK_S = 5.0
 SIGNIFICANT_Z = 5.0

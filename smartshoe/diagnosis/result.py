@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis.held_out import Gain
 from smartshoe.diagnosis.thresholds import Thresholds, described
 from smartshoe.display import Summarised, SummaryTable, panels, significant
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from smartshoe.calibration import Calibration
 
-Array = NDArray[np.float64]
 Verdict = Literal["adequate", "explained", "partly_explained", "unexplained", "refused"]
 
 
@@ -146,9 +145,9 @@ class Trace:
     reading: Array
     baseline: Array
     extended: Array
-    usable: NDArray[np.bool_]
-    held_out: NDArray[np.bool_]
-    cycle: NDArray[np.intp]
+    usable: Mask
+    held_out: Mask
+    cycle: Index
 
 
 @dataclass(frozen=True, eq=False, repr=False)

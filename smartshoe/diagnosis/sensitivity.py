@@ -13,16 +13,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.noise import correlated_sd
 from smartshoe.diagnosis.session import Session
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

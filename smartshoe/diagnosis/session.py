@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis.denoise import noise_sd, without_noise
 from smartshoe.diagnosis.jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
@@ -22,9 +22,6 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
@@ -74,7 +71,7 @@ class Session:
     reading: Array
     usable: Mask
     held_out: Mask
-    cycle: NDArray[np.intp]
+    cycle: Index
     resting: Mask
     thinned: int
     displacement: Array | None = None
@@ -299,7 +296,7 @@ def _neighbour(recording: Recording) -> Channel | None:
     return others[0] if others else None
 
 
-def _cycles(conditions: Conditions) -> NDArray[np.intp]:
+def _cycles(conditions: Conditions) -> Index:
     load = conditions.load
     threshold = CYCLE_SHARE * min(1.0, max(float(np.ptp(load)), 1e-9))
     points = turning_points(load, threshold)

@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.held_out import own_of
 from smartshoe.diagnosis.session import REST_SHARE, Scale, Session
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
-
-Array = NDArray[np.float64]
 
 FIRST_REST_S = 0.5
 MOST_REST_S = 3.0

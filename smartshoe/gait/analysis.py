@@ -6,9 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from smartshoe.arrays import Array
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.gait.checks import trial_flags
@@ -25,8 +23,6 @@ from smartshoe.gait.window import analyse_window, is_loaded
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
     from smartshoe.calibration.folder import CalibrationsLike
-
-Array = NDArray[np.float64]
 
 
 def analyse(

@@ -9,14 +9,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import InputError, UnitError
 from smartshoe.recording import Recording
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LONGEST_HOLE_S = 10.0  # a longer one ends a stretch of recording; straight lines stand for shorter ones
 ON_GRID = 0.02  # of a step, by which a sample may be off the even times

@@ -6,15 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.files.atomic import replacing
 
 if TYPE_CHECKING:
     from smartshoe.gait.result import GaitResult
 
-Array = NDArray[np.float64]
 
 # The laboratories' own names (Vicon, Visual3D, Mokka); flat and heel off have none of their own there.
 LABELS = {"heel_strike": "Foot Strike", "toe_off": "Foot Off", "foot_flat": "Foot Flat", "heel_off": "Heel Off"}

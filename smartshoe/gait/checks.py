@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Mask
 from smartshoe.gait.flag import Flag, spans_of, where_text
 from smartshoe.gait.labels import clock_flags, label_flags
 from smartshoe.gait.series import FootSeries
@@ -20,8 +20,6 @@ from smartshoe.signals.masks import runs_of
 if TYPE_CHECKING:
     from smartshoe.gait.force_sums import Forces
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LIGHTEST_N, HEAVIEST_N = 100.0, 2500.0  # what a person may weigh
 WEIGHT_OFF = 0.05

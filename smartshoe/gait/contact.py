@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError, UsageError
 from smartshoe.gait.edges import Edges, Floors, Shapes, find_edges, floors_of
 from smartshoe.gait.swing import cut
 from smartshoe.recording import REGIONS
-
-Array = NDArray[np.float64]
 
 LEAST_LOAD_N = 25.0  # what varies less is no step
 WINDOW_S, MARGIN_S = 20.0, 3.0

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError, UsageError
 from smartshoe.files.atomic import write_text
 from smartshoe.gait.contact import Contacts
@@ -26,7 +26,6 @@ from smartshoe.gait.edges import WALKING_STANCE_S  # a runner loads the midfoot 
 if TYPE_CHECKING:
     from smartshoe.gait.result import GaitResult
 
-Array = NDArray[np.float64]
 
 POINTS = 101  # of a stance, 0 to 100 %
 LONGEST_STANCE_S = 2.5  # longer, the foot stands and the share is even

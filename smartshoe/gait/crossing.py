@@ -13,10 +13,8 @@ line between them is early. There the same power law through the next two sample
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from smartshoe.arrays import Array
 
 STEEPEST, FLATTEST = 1.0, 2.5  # the powers p that an onset may have
 USUAL_POWER = 1.5

@@ -13,8 +13,8 @@ from itertools import chain
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError, UsageError
 from smartshoe.gait.analysis import checked, given_calibrations, require_steps
 from smartshoe.gait.arriving import Piece, joined_head, pieces
@@ -35,7 +35,6 @@ from smartshoe.recording import Channel, Recording
 if TYPE_CHECKING:
     from smartshoe.calibration.folder import CalibrationsLike
 
-Array = NDArray[np.float64]
 
 WINDOW_S = 120.0
 HEAD_S = 60.0  # looked at before anything is told: which columns, at what rate, of which sign

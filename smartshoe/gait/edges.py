@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.gait.crossing import USUAL_POWER, bent_places, growth, level_places, rise_places, running_median
 from smartshoe.gait.swing import Cut
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 BEARS = 0.02  # of body weight: a foot, or a unit, bears from there on, as plates are read at 10 to 20 N
 UNIT_LEVEL = 0.06  # a unit's lowest level, of its own median peak

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import UnitError
 from smartshoe.recording import Channel
 from smartshoe.signals.masks import bridged, runs_of
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
     from smartshoe.calibration.estimators import ForceEstimate, ForceRun
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BEYOND = 1.02  # times the largest calibrated load: noise at its edge is no extrapolation
 RAIL_RUN, RAIL_LONG = 4, 100  # ties in a row; so many that no hump is as flat

@@ -6,13 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from smartshoe.arrays import Array, Mask
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MOST_SPANS = 3
 

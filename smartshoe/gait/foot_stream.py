@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.gait.contact import LEAST_LOAD_N, ContactDetector, Contacts
 from smartshoe.gait.estimate import BEYOND, UnitLoad, on_the_rail
 from smartshoe.gait.trial import Foot
 from smartshoe.recording import Channel
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BACK_S, AHEAD_S = 8.0, 8.0  # beside a stretch: two of the longest strides
 HORIZON_S = 600.0  # so long a load waits for the next swing to tell its zero

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.series import FootSeries
 from smartshoe.gait.sums import BlockMeans, Moments, weighted_mean
@@ -160,7 +161,7 @@ class ForceSums:
             source = "one_shoe"
         return BodyWeight(float(value), float(np.sqrt(variance)), source)
 
-    def _gain_sd(self, foot: str) -> np.ndarray:
+    def _gain_sd(self, foot: str) -> Array:
         return np.array([unit.gain_sd for unit in self._units[foot]])
 
     def _rmse(self) -> float | None:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.strides import Stride
-
-Array = NDArray[np.float64]
 
 POINTS = 101  # of a stride, 0 to 100 %
 

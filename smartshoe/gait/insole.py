@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from smartshoe.arrays import Array
 
 PLACES: Mapping[str, tuple[float, float]] = {
     "heel": (0.13, 0.0),

@@ -12,16 +12,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.flag import Flag
 from smartshoe.gait.indices import sequence_errors
 from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.trial import FEET, Foot
 from smartshoe.recording import REGIONS
-
-Array = NDArray[np.float64]
 
 SELDOM = 0.2
 MOSTLY_WRONG = 0.5

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 # Which units are large and which small in a phase; a unit in neither may be either.
 PHASES: Mapping[str, tuple[frozenset[str], frozenset[str]]] = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.contact import Contacts
 
-Array = NDArray[np.float64]
 States = NDArray[np.int8]
 
 PHASES = ("swing", "heel", "flat", "push")

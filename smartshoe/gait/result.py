@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.display import Shown, SummaryTable, panels, significant
 from smartshoe.errors import UsageError
 from smartshoe.gait.coverage import Coverage
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 Table = Literal["strides", "events", "forces"]
 
 SCHEMA = "smartshoe.gait/1"

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.coverage import Coverage
 from smartshoe.gait.insole import LEAST_SHARE, centre_of_pressure
 from smartshoe.gait.membership import memberships
 from smartshoe.gait.phases import crisp
 from smartshoe.gait.trial import Foot
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

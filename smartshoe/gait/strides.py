@@ -7,13 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.gait.contact import Contacts
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LONGEST_S = 3.5  # from strike to strike: longer, the person stood in between
 LONGEST_GAP_S = 0.1  # in one piece: straight lines bridge single samples well
@@ -88,7 +85,7 @@ def strides_of(
     return found
 
 
-def _loses(gaps: tuple[NDArray[np.intp], NDArray[np.intp]], first: int, last: int, rate_hz: float) -> bool:
+def _loses(gaps: tuple[Index, Index], first: int, last: int, rate_hz: float) -> bool:
     """Whether the samples [``first``, ``last``) lose more than `LONGEST_GAP_S` in one piece."""
     start, stop = gaps
     k = slice(int(np.searchsorted(stop, first, side="right")), int(np.searchsorted(start, last)))

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.strides import Stride
 
-Array = NDArray[np.float64]
 Activity = Literal["walking", "running", "standing", "mixed"]
 
 MOSTLY = 0.85  # of the time in which anything is told, that makes an activity the trial's

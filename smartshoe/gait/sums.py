@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import asymmetry, both_down, steps_of
-
-Array = NDArray[np.float64]
 
 OF_STRIDES = ("time_s", "stance_percent", "peak_n", "impulse_n_s", "loading_rate_n_per_s")
 

@@ -11,10 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from smartshoe.arrays import Array, Index, Mask
 
 OFF, ON, UP = 0.10, 0.15, 0.30  # of the load's height above its floor: swing below, contact above, wall
 LEAST_SQUARENESS = 0.67
@@ -128,7 +126,7 @@ def _without_short(start: Index, stop: Index, size: int, rate_hz: float) -> tupl
     return _joined(start, stop, (start[1:] - stop[:-1]) >= LEAST_CONTACT_S * rate_hz)
 
 
-def _joined(start: Index, stop: Index, apart: NDArray[np.bool_]) -> tuple[Index, Index]:
+def _joined(start: Index, stop: Index, apart: Mask) -> tuple[Index, Index]:
     if start.size < 2:
         return start, stop
     return start[np.concatenate([[True], apart])], stop[np.concatenate([apart, [True]])]

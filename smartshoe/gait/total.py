@@ -6,14 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.strides import MOST_MISSING, Stride
 from smartshoe.gait.trial import Foot
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LEAST_STANDING_S = 2.0
 SETTLED_S = 0.5  # after which standing stands still

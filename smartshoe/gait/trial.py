@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import InputError, MissingChannelError, UnitError, UsageError
 from smartshoe.gait.estimate import UnitLoad, calibration_of, estimate
 from smartshoe.gait.flag import Flag
@@ -18,8 +18,6 @@ from smartshoe.recording import REGIONS, UNITS_OF_A_SHOE, Channel, Recording
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 FEET = ("left", "right")
 GAP_STEPS = 2.5

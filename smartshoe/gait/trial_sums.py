@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.contact import Contacts
 from smartshoe.gait.force_sums import Forces, ForceSums
 from smartshoe.gait.indices import POINTS, deviations, overlaid, pattern, sequence_errors
@@ -17,8 +17,6 @@ from smartshoe.gait.summary import Activity, activity_by_time
 from smartshoe.gait.sums import Moments, StrideSums
 from smartshoe.gait.trial import Foot
 from smartshoe.gait.window import AnalysisWindow
-
-Array = NDArray[np.float64]
 
 
 class _Regularity:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, MutableSequence, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.gait.checks import window_flags
 from smartshoe.gait.contact import LEAST_LOAD_N, Contacts
 from smartshoe.gait.coverage import Coverage
@@ -16,9 +16,6 @@ from smartshoe.gait.series import FootSeries, series_of
 from smartshoe.gait.strides import Stride, strides_of, with_runs
 from smartshoe.gait.total import TotalForce, above_floor, standing_spans, total_of
 from smartshoe.gait.trial import Foot
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

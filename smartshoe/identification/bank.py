@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.errors import InputError, UsageError
-from smartshoe.identification.experiment import Array
 
 THIN_SAMPLES = 1000
 COARSEST_STEP_S = 0.05
@@ -26,8 +26,8 @@ class CoefficientFits:
     coefficients: Array
     covariance: Array
     rmse: Array
-    passes: NDArray[np.intp]
-    converged: NDArray[np.bool_]
+    passes: Index
+    converged: Mask
 
     @property
     def sd(self) -> Array:

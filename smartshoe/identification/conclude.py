@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification.estimator import ParameterFit
-from smartshoe.identification.experiment import Array, kept_of
+from smartshoe.identification.experiment import kept_of
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.parametrisation import GreyBox
 from smartshoe.identification.prediction_error import LARGEST_DELAY_S

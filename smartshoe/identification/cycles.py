@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array, Mask
+from smartshoe.arrays import Array, Mask
 from smartshoe.recording import Recording
 from smartshoe.signals import loading
 

@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array
+from smartshoe.arrays import Array
 from smartshoe.identification.instruments import Instruments, Source, solve_instrumental
 from smartshoe.identification.noise import MATTERS, input_noise_bias, noise_sds, output_variance
 from smartshoe.identification.prediction_error import EDGE_SAMPLES, PredictionError

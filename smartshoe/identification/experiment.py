@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.models.first_order import Steps, steps
 from smartshoe.recording import Recording
 from smartshoe.signals.masks import bridged
 from smartshoe.units import Unit
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Direction = Literal["inverse", "forward"]
 
 FEWEST_SAMPLES = 20
@@ -41,7 +39,7 @@ class Experiment:
     kept: Mask
     n_missing: int
     command_n: Array | None = None
-    rows: NDArray[np.intp] | None = None
+    rows: Index | None = None
 
     @property
     def sample_time_s(self) -> float:

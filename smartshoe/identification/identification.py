@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration, Compensator
 from smartshoe.calibration.provenance import sha256_of
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification.consistency import ConsistencyTest, consistency_test
 from smartshoe.identification.estimator import ParameterFit
-from smartshoe.identification.experiment import Array, Direction
+from smartshoe.identification.experiment import Direction
 from smartshoe.identification.residual_tests import ResidualTest, residual_tests
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models import Parameter, StandardLinearSolid, discretise

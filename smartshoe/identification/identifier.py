@@ -8,11 +8,12 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from smartshoe.arrays import Mask
 from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.identification.conclude import Choice, conclude
 from smartshoe.identification.estimator import Estimator, estimate
-from smartshoe.identification.experiment import Direction, Mask, prepare
+from smartshoe.identification.experiment import Direction, prepare
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.parametrisation import GREY_FIXED, FreeForm, GreyBox, Parametrisation, Structure
 from smartshoe.identification.prediction_error import LARGEST_DELAY_S, PredictionError, Settings

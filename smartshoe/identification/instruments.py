@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import NotIdentifiableError, RefusedError
-from smartshoe.identification.experiment import Array, Mask
 from smartshoe.identification.prediction_error import PredictionError
 from smartshoe.identification.solve import solve_normal
 from smartshoe.models.first_order import lag, shifted

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.identification.cycles import CycleGroup, repeated_cycles
-from smartshoe.identification.experiment import Array
 from smartshoe.identification.identification import Identification
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Recording

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import NotConvergedError, NotIdentifiableError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
-from smartshoe.identification.experiment import Array, Experiment, Mask, prepare
+from smartshoe.identification.experiment import Experiment, prepare
 from smartshoe.identification.identification import Identification
 from smartshoe.identification.identifier import identify
 from smartshoe.models.first_order import lag, shifted

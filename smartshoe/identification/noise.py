@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array, Experiment
+from smartshoe.arrays import Array
+from smartshoe.identification.experiment import Experiment
 from smartshoe.identification.prediction_error import EVERY, NOT_STORED, PredictionError
 from smartshoe.identification.solve import solve_normal
 from smartshoe.models.first_order import interpolation_gain

@@ -12,8 +12,9 @@ from typing import Literal
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
-from smartshoe.identification.experiment import Array, Direction
+from smartshoe.identification.experiment import Direction
 from smartshoe.models import X_OVER_NRT
 
 Structure = Literal["free", "grey_box"]

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array, Direction, Experiment, Mask, whole_blocks
+from smartshoe.arrays import Array, Mask
+from smartshoe.identification.experiment import Direction, Experiment, whole_blocks
 from smartshoe.identification.parametrisation import FreeForm, Parametrisation, Shape
 from smartshoe.identification.solve import Evaluation
 from smartshoe.identification.whitening import Whitening, whiten, whitening

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array, Integers
 from smartshoe.calibration import Compensator
 from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.identification.conclude import NAMES, WORST_RELATIVE_GAIN_SD, WORST_RELATIVE_SD, solid_of
-from smartshoe.identification.experiment import FEWEST_SAMPLES, LEAST_RETURN, Array, Direction
+from smartshoe.identification.experiment import FEWEST_SAMPLES, LEAST_RETURN, Direction
 from smartshoe.identification.parametrisation import Shape, coefficients_of
 from smartshoe.identification.sufficient_statistics import LN_POLES, POLES, Columns, Projection, Sums, pooled
 from smartshoe.identification.uncertainty import inverse_normal, t_quantile
@@ -31,7 +32,7 @@ class _Experiment:
     sums: Sums
     u: Array = field(default_factory=lambda: np.empty(BLOCK))
     y: Array = field(default_factory=lambda: np.empty(BLOCK))
-    at: NDArray[np.int64] = field(default_factory=lambda: np.empty(BLOCK, dtype=np.int64))
+    at: Integers = field(default_factory=lambda: np.empty(BLOCK, dtype=np.int64))
     filled: int = 0
     seen: int = 0
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smartshoe.identification.experiment import Array, block_means
+from smartshoe.arrays import Array, Mask
+from smartshoe.identification.experiment import block_means
 from smartshoe.identification.prediction_error import PredictionError
 from smartshoe.identification.whitening import whitened
 from smartshoe.models.parameter import finite_or_none
 
-Mask = NDArray[np.bool_]
 WHITENESS_LAGS = 20
 INPUT_LAGS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
 BLOCKS = 1500  # means of samples that the input's test looks at

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import NotIdentifiableError
 
-Array = NDArray[np.float64]
 Solver = Literal["gn", "lm", "trf"]
 
 # A Gauss-Newton step that promises less than this share of one residual's variance is a ten-thousandth of a
@@ -123,7 +122,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
     return Minimum(theta, now, max_iterations, False)
 
 
-def _free(problem: Problem, theta: Array, gradient: Array) -> NDArray[np.bool_]:
+def _free(problem: Problem, theta: Array, gradient: Array) -> Mask:
     """Unknowns that may move: not those at a bound that the descent would cross."""
     if (theta > problem.lower).all() and (theta < problem.upper).all():
         return np.ones(theta.size, dtype=bool)
@@ -131,7 +130,7 @@ def _free(problem: Problem, theta: Array, gradient: Array) -> NDArray[np.bool_]:
     return ~held
 
 
-def _newton_step(now: Evaluation, free: NDArray[np.bool_]) -> Array:
+def _newton_step(now: Evaluation, free: Mask) -> Array:
     if not (np.isfinite(now.normal).all() and np.isfinite(now.gradient).all()):
         raise NotIdentifiableError(
             "the normal equations are not finite: record a load that rises and falls at several rates"
@@ -154,7 +153,7 @@ class _GaussNewton:
     def __init__(self, _: Evaluation) -> None:
         self.fraction = 1.0
 
-    def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
+    def step(self, now: Evaluation, newton: Array, free: Mask) -> Array:
         return self.fraction * newton
 
     def keep_inside(self, trial: Array, problem: Problem) -> Array:
@@ -174,7 +173,7 @@ class _LevenbergMarquardt(_GaussNewton):
         self.damping, self.growth = 1e-4, 2.0
         self.scale = first.normal.diagonal().copy()
 
-    def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
+    def step(self, now: Evaluation, newton: Array, free: Mask) -> Array:
         self.scale = np.maximum(self.scale, now.normal.diagonal())
         damped = now.normal + self.damping * np.diag(self.scale)
         step = np.zeros(newton.size)
@@ -200,7 +199,7 @@ class _TrustRegion(_GaussNewton):
         self.radius = np.inf
         self.scale = np.sqrt(np.maximum(first.normal.diagonal(), 1e-300))
 
-    def step(self, now: Evaluation, newton: Array, free: NDArray[np.bool_]) -> Array:
+    def step(self, now: Evaluation, newton: Array, free: Mask) -> Array:
         self.scale = np.maximum(self.scale, np.sqrt(now.normal.diagonal()))
         if self.radius == np.inf or _length(self.scale * newton) <= self.radius:
             return newton

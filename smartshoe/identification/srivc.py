@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.experiment import Array
 from smartshoe.identification.prediction_error import EVERY, LARGEST_DELAY_S, PredictionError
 
 COARSE_STEP_S = 0.05  # the grid on which a delay is first looked for

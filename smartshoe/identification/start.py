@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array
+from smartshoe.arrays import Array
 from smartshoe.identification.parametrisation import Shape, coefficients_of
 from smartshoe.identification.prediction_error import PredictionError
 from smartshoe.identification.solve import solve_normal

@@ -14,10 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Integers
 from smartshoe.errors import NotConvergedError
-from smartshoe.identification.experiment import Array
 
 SLOWEST, FASTEST = 0.003, 300.0  # 1/s, the ends of the bank
 POLES = 64
@@ -74,7 +73,7 @@ class Sums:
     fall: float = 0.0
     reading_ends: tuple[float, float] = (np.inf, -np.inf)
 
-    def absorb(self, u: Array, y: Array, at: NDArray[np.int64], step_s: float, free: Columns, inverse: bool) -> None:
+    def absorb(self, u: Array, y: Array, at: Integers, step_s: float, free: Columns, inverse: bool) -> None:
         """Take in inputs (n,) at the samples ``at`` (n,); outputs (n,) are NaN where missing."""
         from smartshoe.kernels.pole_bank import lag_bank
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array
+from smartshoe.arrays import Array
 from smartshoe.identification.prediction_error import PredictionError
 from smartshoe.identification.solve import Evaluation, solve_normal
 from smartshoe.models.parameter import NORMAL_95

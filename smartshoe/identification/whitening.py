@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.identification.experiment import Array
+from smartshoe.arrays import Array
 from smartshoe.identification.parametrisation import Shape
 from smartshoe.kernels.linear_filter import linear_filter
 from smartshoe.models.first_order import hold_coefficients, hold_slopes

@@ -14,9 +14,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smartshoe.integrity.fault import Array, Finding, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.scales import five_point_median
 from smartshoe.integrity.view import Signal, View
 from smartshoe.kernels.blas import on_one_thread
@@ -256,7 +256,7 @@ def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float) -> f
     return float(np.mean(left**2))
 
 
-def _play(load: Array) -> NDArray[np.float64]:
+def _play(load: Array) -> Array:
     """(widths, n) play operators of the load, each of one width."""
     width = np.array(PLAY_WIDTHS)
     out = np.empty((load.size, width.size))

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.integrity.fault import Array, Finding, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.held import held
 from smartshoe.integrity.spikes import isolated_beside
 from smartshoe.integrity.view import View

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import InputError
 from smartshoe.integrity.clocks import align, two_clocks
 from smartshoe.integrity.dropouts import dropouts
-from smartshoe.integrity.fault import Array, DataFault, Finding, Integrity, Mask
+from smartshoe.integrity.fault import DataFault, Finding, Integrity
 from smartshoe.integrity.following import does_not_follow_load, wrong_sign
 from smartshoe.integrity.held import held_samples
 from smartshoe.integrity.lattice import quantisation

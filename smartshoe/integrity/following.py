@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.integrity.fault import Array, Finding, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.view import View
 
 LEAST_SHARE = 0.3  # of the reading's variance that a unit which follows at all leaves explained

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.integrity.fault import Array, Finding, Mask
+from smartshoe.arrays import Array, Index, Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.scales import SECOND_DIFFERENCE
-from smartshoe.integrity.view import DITHERED, Index, View
+from smartshoe.integrity.view import DITHERED, View
 from smartshoe.signals.masks import runs_of
 
 CERTAIN = 1e-9  # chance that an honest run would repeat so

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.integrity.fault import Finding, Mask
+from smartshoe.arrays import Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.view import View
 from smartshoe.signals.masks import runs_of
 

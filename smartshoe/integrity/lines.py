@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.integrity.fault import Array, Finding, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.view import View
 from smartshoe.signals.masks import runs_of
 

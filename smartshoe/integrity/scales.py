@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smartshoe.integrity.fault import Array
+from smartshoe.arrays import Array, Index, Mask
 
 BLOCK = 32
 CUT = 3.0  # medians of the absolute value
@@ -90,7 +89,7 @@ def own_corner(values: Array, near: int) -> Array:
     return out
 
 
-def lattice_step(levels: Array, count: NDArray[np.intp]) -> float:
+def lattice_step(levels: Array, count: Index) -> float:
     """The step of the lattice on which values lie; 0 where there is none that can be told.
 
     ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left
@@ -121,10 +120,10 @@ def lattice_step(levels: Array, count: NDArray[np.intp]) -> float:
     return 0.0
 
 
-def _fits(gaps: Array, step: float) -> NDArray[np.bool_]:
+def _fits(gaps: Array, step: float) -> Mask:
     """(g,) which gaps are multiples of ``step``, one at least."""
     multiple = np.rint(gaps / step)
-    out: NDArray[np.bool_] = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < 0.15)
+    out: Mask = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < 0.15)
     return out
 
 

@@ -11,9 +11,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.integrity.fault import Array, Finding, Mask
+from smartshoe.arrays import Array, Index, Mask
+from smartshoe.integrity.fault import Finding
 from smartshoe.integrity.scales import local_scale, own_corner
-from smartshoe.integrity.view import Index, Signal, View
+from smartshoe.integrity.view import Signal, View
 from smartshoe.signals.masks import runs_of
 
 NOISES = 6.5  # the largest of 1e6 normal deviates reaches 5.1 of this scale

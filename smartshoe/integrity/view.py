@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smartshoe.integrity.fault import Array, Mask
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity.scales import (
     SECOND_DIFFERENCE,
     five_point_median,
@@ -19,7 +18,6 @@ from smartshoe.integrity.scales import (
 )
 from smartshoe.recording import Recording
 
-Index = NDArray[np.intp]
 CURVE_BINS = 40
 NEAR_S = 0.1  # corners of load and reading this near to each other are taken for one
 NEAR_SAMPLES = 3

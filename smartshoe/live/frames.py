@@ -39,12 +39,10 @@ from dataclasses import dataclass
 from typing import TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.live.pixel_columns import PixelColumns, joined, reduced
 from smartshoe.live.shoe import FootNow, LiveShoe
-
-Array = NDArray[np.float64]
 
 VERSION = 1
 _HEAD = struct.Struct("<BBHIdd")

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
     from smartshoe.devices.base import Block
     from smartshoe.live.shoe import LiveShoe
-
-Array = NDArray[np.float64]
 
 
 class Outlet:

@@ -8,11 +8,11 @@ from threading import Event
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Block
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Number = TypeVar("Number", float, Array)
 
 SLICE_S = 0.02  # of the pace's time: a picture is drawn 30 to 60 times a second
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Places = NDArray[np.int64]
+from smartshoe.arrays import Array, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +17,7 @@ class PixelColumns:
     there.
     """
 
-    place: Places
+    place: Integers
     low: Array
     high: Array
 

@@ -16,13 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Block
 from smartshoe.errors import InputError, SmartShoeError, UsageError
 from smartshoe.files.journal import AppendedFile, Journal, read_journal
-
-Array = NDArray[np.float64]
 
 NOTE, END = 1, 2
 WRITE_EVERY_S = 0.1

@@ -8,8 +8,8 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration
 from smartshoe.devices.base import Block, Shoe
 from smartshoe.devices.events import Dropped, Gap, ShoeEvent
@@ -19,8 +19,6 @@ from smartshoe.live.ring import Ring
 from smartshoe.live.steps import GaitStep, StepFollower
 from smartshoe.recording import REGIONS, Channel, Recording
 from smartshoe.runs.session.streaming import StreamedForces
-
-Array = NDArray[np.float64]
 
 REFERENCE_S = 60.0
 KEPT_S = 62.0  # the longest trace on the page, and a little

@@ -11,11 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.phases import FLAT, HEEL, PUSH, SWING
-
-Array = NDArray[np.float64]
 
 ON, OFF = 0.08, 0.05  # of the rise: the foot bears above, has left below
 UNIT_ON, UNIT_OFF = 0.12, 0.06  # of the unit's own rise

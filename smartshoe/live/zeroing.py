@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.field.at_rest import check_zero
 from smartshoe.live.shoe import LiveShoe
-
-Array = NDArray[np.float64]
 
 LOOKED_AT_S = 2.0
 

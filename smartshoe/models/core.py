@@ -17,11 +17,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.models.elements import Arm, Element, Heat, Leak
-
-Array = NDArray[np.float64]
 
 MOST_SKEWED = 1e9  # condition of the modes' vectors
 USUAL_WALL_RATIO = 1.6  # N of the paper's four units: 1.51 to 1.78 (Table 1)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.models.first_order import hold_coefficients
 
-Array = NDArray[np.float64]
 Hold = Literal["bilinear", "zoh", "foh"]
 
 

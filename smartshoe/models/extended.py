@@ -8,14 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.models.core import USUAL_WALL_RATIO, Core
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter
 from smartshoe.models.elements import Arm, Element
-
-Array = NDArray[np.float64]
 
 BASELINE = (
     EffectParameter("gain", "FS_reading", "reading of a held full-scale load", None, 1e-3, 1e3, 1.0),

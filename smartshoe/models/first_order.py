@@ -8,12 +8,11 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.kernels.linear_filter import linear_filter
 
-Array = NDArray[np.float64]
 Steps = float | Array
 SMALL = 1e-3
 EVEN_TOLERANCE = 1e-3  # of a step: far below the jitter that moves an estimate, above rounded time stamps

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
-
-Array = NDArray[np.float64]
 
 AMOUNT_OF_GAS_MOL = 4.2075e-9
 GAS_CONSTANT_J_PER_MOL_K = 8.3145

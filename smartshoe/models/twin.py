@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Bladder
 from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import find_unit
-
-Array = NDArray[np.float64]
 
 
 class TwinBladder(Bladder):

@@ -11,7 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array, Index
+
 Style = Literal["line", "dashed", "points"]
 
 PAGE_BYTES = 620_000  # of packed numbers on one page, so that page, script and texts stay under a megabyte
@@ -88,7 +89,7 @@ class Chart:
         return (BYTES_OF_X + BYTES_OF_Y * columns) * BASE64
 
 
-def reduced(x: Array, signals: Sequence[Array], most: int) -> NDArray[np.intp]:
+def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
     """Indices of at most about ``most`` samples that keep each stretch's extremes of every signal."""
     if x.size <= most:
         return np.arange(x.size)
@@ -131,7 +132,7 @@ def _packed(values: Array) -> dict[str, Any]:
     return {"middle": middle, "step": step, "steps": _text(steps)}
 
 
-def _line(line: Line, index: NDArray[np.intp]) -> dict[str, Any]:
+def _line(line: Line, index: Index) -> dict[str, Any]:
     packed: dict[str, Any] = {"label": line.label, "colour": line.colour, "style": line.style}
     packed["y"] = _packed(line.values[index])
     for name, values in (("low", line.low), ("high", line.high)):

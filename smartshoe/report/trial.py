@@ -6,16 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from smartshoe.arrays import Array
 from smartshoe.gait.result import GaitResult
 from smartshoe.report.charts import Chart, Line, Panel, Style
 from smartshoe.report.gait import charts as gait_charts
 from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("truth", "raw", "corrected")
 

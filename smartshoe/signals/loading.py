@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 # A ramp counts where it spans this share of the record's load range; slower wandering is hold or rest.
 LEAST_SPAN = 0.3

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from smartshoe.arrays import Array, Index, Mask
 
 
-def runs_of(mask: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def runs_of(mask: Mask) -> tuple[Index, Index]:
     """First samples and one-past-last samples of the runs of True in ``mask`` (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return edges[0::2], edges[1::2]

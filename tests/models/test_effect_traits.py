@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import (
@@ -28,7 +29,6 @@ from smartshoe.models.effects import (
     effect,
     told_apart_by,
 )  # fmt: skip
-from smartshoe.models.effects.effect import Array
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, WORDS
 from smartshoe.models.extended import ExtendedModel
 

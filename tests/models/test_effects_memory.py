@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Array, Conditions
+from smartshoe.models.effects.effect import Conditions
 
 STEP_S = 0.02
 PLAY = np.array([0.02, 0.06, 0.5, 0.6, 0.0])

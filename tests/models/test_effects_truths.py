@@ -23,8 +23,9 @@ from simulators.plant.bladder_parameters import (
     LeakParameters,
     SofteningParameters,
 )
+from smartshoe.arrays import Array
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Array, Conditions
+from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.extended import ExtendedModel
 
 PEAK_N, RATE_HZ = 800.0, 25.0

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smartshoe.arrays import Array
 from smartshoe.models.core import USUAL_WALL_RATIO, Core
 from smartshoe.models.effects._wall_loop import relaxed
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Array, Conditions, CoreEffect, Effect
+from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect
 from smartshoe.models.elements import Arm
 
 NAMES = (

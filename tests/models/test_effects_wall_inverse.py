@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Array, Conditions, CoreEffect, Effect
+from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect
 
 EXACT = (
     "gas_compression", "wall_hardening", "contact_area", "orifice_leak", "permanent_set", "mullins_softening",

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.models.core import Core, plain
 from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.effects._monotone_curve import KNOTS
-from smartshoe.models.effects.effect import Array, CoreEffect
+from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.effects.flexible_loop import HALF_WIDTHS
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import Draws, Hideable, reading, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def floor_of_bits(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:

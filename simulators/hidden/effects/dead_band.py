@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import Draws, Hideable, bladder, uniform
 from simulators.instruments.presets import FULL_SCALE_N
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def hinge(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:

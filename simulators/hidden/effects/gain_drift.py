@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import Draws, Hideable, Options, Subject, log_uniform, sensor, signed
 from simulators.hidden.effects.zero import PER_KELVIN, ROOM, by_temperature
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def _by_clock_or_room(amount: float, draws: Draws, subject: Subject) -> Options:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import against_modes
 from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform
 from simulators.plant.bladder_parameters import HEAT_RATIO
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 COOLING = log_uniform(time_constant_s=(0.4, 3.0))
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import endochronic, jiles_atherton, slip
 from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform, uniform
 from simulators.instruments.presets import FULL_SCALE_N
 from simulators.plant.preisach import MEMORY, loop_shape
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 SLIDERS = 16
 

@@ -26,12 +26,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from smartshoe.arrays import Array
 
 if TYPE_CHECKING:
     from simulators.hidden.effects.registry import Drawing, Draws, Options, Subject
 
-Array = NDArray[np.float64]
 Place = Literal["load", "stress", "gas", "leak", "reading", "shift", "log", "tare", "options"]
 
 BUMPS = 3  # of a warp

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import against_modes, integral
 from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 LAMINAR = 2e-3  # of full scale: below it every opening's flow is viscous
 

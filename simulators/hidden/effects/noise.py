@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import (
@@ -16,8 +15,7 @@ from simulators.hidden.effects.registry import (
     sensor,
     uniform,
 )
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def alias_hz(frequency_hz: float, sample_rate_hz: float) -> float:

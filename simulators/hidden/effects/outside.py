@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.effects.outside import moments
 from simulators.hidden.effects.law import Law, Surroundings
@@ -20,8 +19,7 @@ from simulators.hidden.effects.registry import (
     signed,
     uniform,
 )
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def _odd(**given: Any) -> Options:

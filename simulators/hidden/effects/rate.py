@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import lagged
 from simulators.hidden.effects.registry import Draws, Hideable, bladder, signed, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def _speed(f: Array, draws: Draws, at: Surroundings) -> Array:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import against_modes, norton
 from simulators.hidden.effects.registry import Draws, Hideable, Subject, bladder, both, log_uniform, uniform
 from simulators.plant.bladder_parameters import X_OVER_NRT
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 SPECTRUM = 20  # modes of a continuous spectrum
 

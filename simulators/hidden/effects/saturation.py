@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import SHARE_OF_RANGE, Draws, Hideable, Options, Subject, sensor, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def _level(amount: float, draws: Draws) -> float:

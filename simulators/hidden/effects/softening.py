@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import cycles_done
 from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform, signed, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 CYCLE_BEGINS, CYCLE_ENDS = 0.1, 0.03  # of full scale
 ROUNDED = 1e-3  # of the distance to the largest strain: where the root's slope would have no end

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import (
@@ -20,8 +19,7 @@ from simulators.hidden.effects.registry import (
     uniform,
 )
 from simulators.plant.bladder_parameters import AMBIENT_PA
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 AMBIENT_MBAR = AMBIENT_PA / 100.0
 LOCKING = 0.95  # of a chain's length: beyond it the formula has no meaning

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.registry import Draws, Hideable, signed, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def warming_bridge(amount: float, draws: Draws, f: Array, at: Surroundings) -> Array:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.hidden.effects.law import Law, Surroundings
 from simulators.hidden.effects.operators import against_modes, opening_port
 from simulators.hidden.effects.registry import Draws, Hideable, reading, sensor, signed, uniform
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 
 def cole_cole(amount: float, draws: Draws, y: Array, at: Surroundings) -> Array:

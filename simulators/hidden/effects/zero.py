@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.effects.sensing import DIE_FASTER, DIE_SHARE
 from simulators.hidden.effects.law import Law, Surroundings
@@ -20,8 +19,7 @@ from simulators.hidden.effects.registry import (
     uniform,
 )
 from simulators.plant.bladder_parameters import X_OVER_NRT
-
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 PER_KELVIN = 50.0  # a coefficient per kelvin for one per second: warming is slow
 ROOM = {"logged": True, "warming_k": 4.0, "warming_time_constant_s": 90.0, "swing_k": 1.0, "swing_period_s": 83.0}

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import InputError
 
 if TYPE_CHECKING:
     from smartshoe.calibration.calibration import Calibration
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.calibration.compensator import Compensator
-from smartshoe.calibration.estimators.estimate import Array, Estimator, ForceEstimate, ForceRun, Mask
+from smartshoe.calibration.estimators.estimate import Estimator, ForceEstimate, ForceRun
 from smartshoe.calibration.estimators.reading_noise import reading_noise_sd
 from smartshoe.calibration.filter import ForceFilter
 

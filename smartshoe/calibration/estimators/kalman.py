@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smartshoe.calibration.estimators.estimate import Array, Estimator, ForceEstimate, ForceRun, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.calibration.estimators.estimate import Estimator, ForceEstimate, ForceRun
 from smartshoe.calibration.estimators.reading_noise import reading_noise_sd
 from smartshoe.calibration.estimators.state_space import (
     LOAD,

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from smartshoe.arrays import Array, Mask
 
 BLOCK = 16  # samples: 80 ms at 200 Hz, shorter than a swing
 CALM = 0.2  # of the blocks: less than the share of a stride in which a foot swings or stands still

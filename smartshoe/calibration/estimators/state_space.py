@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError
 
 if TYPE_CHECKING:
     from smartshoe.calibration.calibration import Calibration
 
-Array = NDArray[np.float64]
 
 LOAD, RATE, STRAIN = 0, 1, 2
 LEAST_DENSITY, MOST_DENSITY = 1e2, 1e11  # N²/s³: a slow sway, and a load that jumps by 10 kN within 5 ms

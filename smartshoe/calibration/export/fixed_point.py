@@ -7,12 +7,10 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Integers
 from smartshoe.calibration.export.model import FilterModel
 from smartshoe.errors import UsageError
-
-Array = NDArray[np.float64]
 
 WIDTHS = {"q15": 15, "q31": 31}
 HEADROOM = {"q15": 1.25, "q31": 16.0}
@@ -143,7 +141,7 @@ class FixedPoint:
         """The largest integer."""
         return int(2**self.width - 1)
 
-    def steps(self, readings: Array) -> NDArray[np.int64]:
+    def steps(self, readings: Array) -> Integers:
         """Readings (n,) as integers, to the nearest step, clipped at the type's ends."""
         return np.clip(np.rint(readings / self.input_lsb), -self.most - 1, self.most).astype(np.int64)
 
@@ -156,7 +154,7 @@ class FixedVector:
     fixed: FixedPoint
 
     @cached_property
-    def steps(self) -> NDArray[np.int64]:
+    def steps(self) -> Integers:
         """(n,) readings in steps."""
         readings = self.model.test_readings
         return self.fixed.steps(readings[np.isfinite(readings)])

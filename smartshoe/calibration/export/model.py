@@ -7,15 +7,14 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.calibration import Calibration
 from smartshoe.calibration.export.names import DEFAULT_NAME
 from smartshoe.calibration.extended import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models import discretise
 
-Array = NDArray[np.float64]
 DOUBLE_ROUNDING = 2.0**-53
 FLOAT_ROUNDING = 2.0**-24
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.store.quantities import (
     COEFFICIENTS,
@@ -22,8 +22,6 @@ from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.first_order import simulate
 from smartshoe.models.parameter import Parameter, finite_or_none
-
-Array = NDArray[np.float64]
 
 RATES_N_PER_S = (50.0, 100.0, 200.0, 400.0, 600.0, 800.0)  # of the paper's dynamic protocol
 SAMPLES_OF_A_RAMP = 400

@@ -9,8 +9,8 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.store.calibration_store import CalibrationStore
 from smartshoe.calibration.store.dates import days_between, iso
@@ -18,8 +18,6 @@ from smartshoe.calibration.store.entry import Entry, HistoryEvent
 from smartshoe.calibration.store.quantities import STATIC_GAIN, ZERO, quantities, require_one_reading_unit, top_load_n
 from smartshoe.errors import UsageError
 from smartshoe.models.parameter import Parameter
-
-Array = NDArray[np.float64]
 
 DAYS_OF_A_YEAR = 365.25
 ROUNDING = 1e-12
@@ -60,7 +58,7 @@ class Trend:
     days: Array
     values: Array
     sds: Array
-    pieces: NDArray[np.intp]
+    pieces: Index
     per_year: Parameter | None
     levels: Array
     repairs: tuple[DriftStep, ...]
@@ -198,7 +196,7 @@ def _trend(
     days: Array,
     values: Array,
     sds: Array,
-    lives: NDArray[np.intp],
+    lives: Index,
     entries: Sequence[Entry],
     repairs: Sequence[HistoryEvent],
 ) -> Trend:
@@ -232,7 +230,7 @@ def _trend(
     )  # fmt: skip
 
 
-def _fit_of(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) -> tuple[_TrendFit, Array | None]:
+def _fit_of(days: Array, values: Array, sds: Array, pieces: Index) -> tuple[_TrendFit, Array | None]:
     """Levels of the pieces (at the mean day) and a slope that they share; the contrast of the slope per day.
 
     Where the slope is not determined (each piece has one date) the levels alone, and None.
@@ -252,7 +250,7 @@ def _fit_of(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) ->
     return found, None
 
 
-def _jump(days: Array, values: Array, sds: Array, pieces: NDArray[np.intp]) -> int | None:
+def _jump(days: Array, values: Array, sds: Array, pieces: Index) -> int | None:
     """The first calibration after the strongest step within a piece, where chance makes one less than `JUMP_CHANCE`.
 
     Every gap between two calibrations is tried, and the chance is multiplied by their number (Bonferroni).

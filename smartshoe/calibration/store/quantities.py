@@ -6,13 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration
 from smartshoe.errors import UsageError
 from smartshoe.models.parameter import Parameter
-
-Array = NDArray[np.float64]
 
 STATIC_GAIN, ZERO = "static_gain", "zero"
 COEFFICIENTS = ("a1", "b0", "b1")

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import Calibration, compensate
 from smartshoe.calibration.calibration import calibration_from
 from smartshoe.calibration.validation import metrics
@@ -21,9 +21,6 @@ from smartshoe.signals.loading import Cycle, by_rate, cycles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Integers
 from smartshoe.devices.base import Block
 from smartshoe.devices.events import Gap, Restarted, ShoeEvent
 from smartshoe.devices.serial_link.inbox import joined
@@ -15,8 +15,6 @@ from smartshoe.devices.wire.information import Information
 from smartshoe.devices.wire.samples import Samples
 from smartshoe.errors import DeviceError
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
 
 RATED_S = 1.0
 # A step this many times the usual one is a hole; below, a rounded clock's (1 and 2 ms at 700 Hz) count as steps.
@@ -98,7 +96,7 @@ class Assembler:
             time_s, readings, samples.missing[part], self.names, self.unit, self.clock.host_time(time_s), arrivals_s
         )
 
-    def _find_gaps(self, sequence: NDArray[np.int64], time_s: Array, arrival_s: float, events: list[ShoeEvent]) -> None:
+    def _find_gaps(self, sequence: Integers, time_s: Array, arrival_s: float, events: list[ShoeEvent]) -> None:
         if self._last is not None:
             sequence, time_s = np.append(self._last[1], sequence), np.append(self._last[2], time_s)
         if time_s.size < 2:
@@ -125,7 +123,7 @@ class Assembler:
                 " with time=s, time=ms or time=us"
             )
 
-    def _steps(self, sequence: NDArray[np.int64], time_s: Array) -> NDArray[np.int64]:
+    def _steps(self, sequence: Integers, time_s: Array) -> Integers:
         """Samples that the device took from each to the next, one at least."""
         if self._counts_samples or self.rate_hz is None:
             return np.diff(sequence)

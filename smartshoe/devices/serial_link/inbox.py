@@ -8,12 +8,10 @@ from dataclasses import replace
 from threading import Condition
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Block
 from smartshoe.errors import DeviceError
-
-Array = NDArray[np.float64]
 
 
 class Inbox:

@@ -25,11 +25,11 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 
-Array = NDArray[np.float64]
 Level = Literal["least", "tenth", "median", "floor", "deep floor"]
 
 LEVELS: tuple[Level, ...] = ("least", "tenth", "median")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from smartshoe.arrays import Array, Integers, Mask
 from smartshoe.devices.wire.checksums import checksums
 from smartshoe.devices.wire.commands import Command, CommandDecoder, encode_command
 from smartshoe.devices.wire.counters import Counters
@@ -94,7 +95,7 @@ class FrameDecoder:
             placed.boot.copy(),
         )
 
-    def _carried(self, values: NDArray[np.float64], missing: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def _carried(self, values: Array, missing: Mask) -> Array:
         """``values`` with the last reading that was there in place of those missing."""
         if missing.any():
             whole = np.concatenate([self._present[None, :], values])
@@ -126,7 +127,7 @@ def encode_samples(sequence: ArrayLike, device_us: ArrayLike, readings: ArrayLik
     return _with_cobs(payload)
 
 
-def _little(values: NDArray[np.int64], kind: str) -> NDArray[np.uint8]:
+def _little(values: Integers, kind: str) -> NDArray[np.uint8]:
     return np.ascontiguousarray(values.astype(kind)).view(np.uint8).reshape(values.size, -1)
 
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Integers
 from smartshoe.devices.wire.counters import Counters
-from smartshoe.devices.wire.samples import Integers
 
 NEAR = 200
 REMEMBERED = 64  # frames within which a late one is recognised
@@ -223,7 +222,7 @@ class _Placing:
                 break
         return row
 
-    def _give_run(self, start: int, stop: int, ahead: Integers, later: NDArray[np.int64]) -> bool:
+    def _give_run(self, start: int, stop: int, ahead: Integers, later: Integers) -> bool:
         """Give out rows that are each near the one before."""
         state, size = self._state, stop - start
         here = slice(self._size, self._size + size)

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Integers, Mask
 from smartshoe.units import COUNTS, Unit
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Integers = NDArray[np.int64]
 
 CHANNELS = ("toe", "meta1", "meta4", "heel")
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Index, Mask
 from smartshoe.devices.wire.checksums import Bytes, checksums
 from smartshoe.devices.wire.counters import Counters
 from smartshoe.devices.wire.framing import is_intact, unframed
@@ -67,7 +67,7 @@ class FrameScanner:
         there = lengths > 0
         return self._sort(data, buffer, ends[there], lengths[there])
 
-    def _sort(self, data: bytes, buffer: Bytes, ends: NDArray[np.intp], lengths: NDArray[np.intp]) -> Scanned:
+    def _sort(self, data: bytes, buffer: Bytes, ends: Index, lengths: Index) -> Scanned:
         """Tell the gaps between zeros apart: sample frames, information frames, garbage."""
         may_be = np.flatnonzero(lengths >= self._length)
         payloads, is_whole = self._decode(buffer, ends[may_be])
@@ -91,7 +91,7 @@ class FrameScanner:
         self._is_lost = not is_good[-1] if ends.size else self._is_lost
         return Scanned(payloads[:, is_whole], information)
 
-    def _decode(self, buffer: Bytes, ends: NDArray[np.intp]) -> tuple[Bytes, NDArray[np.bool_]]:
+    def _decode(self, buffer: Bytes, ends: Index) -> tuple[Bytes, Mask]:
         """Payloads (length, n) of the frames that would end at ``ends``, and which of them are sample frames."""
         length = self._length
         if not ends.size:

@@ -12,8 +12,8 @@ is refused with them are frames of these nine bytes, such as every 256th of thos
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Index
 from smartshoe.devices.wire.checksums import Bytes
 
 FOUR_READINGS = 17  # bytes, from type to checksum
@@ -26,7 +26,7 @@ FORMS: tuple[tuple[tuple[int, int], ...], ...] = (
 )
 
 
-def may_be_flipped(payloads: Bytes) -> NDArray[np.intp]:
+def may_be_flipped(payloads: Bytes) -> Index:
     """Which of the ``payloads`` (length, n) have one of the forms."""
     if len(payloads) != FOUR_READINGS:
         return np.zeros(0, dtype=np.intp)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.logs import detect, read
 from smartshoe.files.logs.columns import recording_from
@@ -20,8 +20,6 @@ from smartshoe.files.logs.sheet import Column, Sheet
 from smartshoe.files.logs.text import even_rows
 from smartshoe.files.logs.times import check_increasing, time_of
 from smartshoe.recording import Channel, Recording, split_column
-
-Array = NDArray[np.float64]
 
 BLOCK_BYTES = 4 << 20  # of text; as numbers and while it is parsed some five times as much
 
@@ -71,7 +69,7 @@ def _texts(path: Path, header_line: int, block_bytes: int) -> Iterator[tuple[byt
             line += text.count(b"\n")
 
 
-def _numbers(path: Path, header: list[str], text: bytes, first_line: int) -> tuple[Array, NDArray[np.intp] | None]:
+def _numbers(path: Path, header: list[str], text: bytes, first_line: int) -> tuple[Array, Index | None]:
     """The cells (rows, columns) of a block of lines, and the rows' lines where blank ones lie between."""
     import pandas as pd
 
@@ -101,7 +99,7 @@ def _numbers(path: Path, header: list[str], text: bytes, first_line: int) -> tup
 
 
 def _sheet(
-    path: Path, header: list[str], values: Array, lines: NDArray[np.intp] | None, first_line: int,
+    path: Path, header: list[str], values: Array, lines: Index | None, first_line: int,
     said: dict[str, list[str]],
 ) -> Sheet:  # fmt: skip
     columns = []

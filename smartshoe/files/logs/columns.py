@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smartshoe.errors import InputError
 from smartshoe.files.logs.picks import Pick, names_a_column, need_quantity, need_unit, pick, titles, unit_in_file
@@ -25,8 +24,6 @@ from smartshoe.recording import (
     Role,
 )
 from smartshoe.units import Unit, declared, on_one_cm2
-
-Array = NDArray[np.float64]
 
 _COMMANDS = re.compile(r"command(ed)?|demand|set[ _-]?point|target|soll(wert)?", re.IGNORECASE)
 _ESTIMATE = re.compile(r"estimate", re.IGNORECASE)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
 from smartshoe.files.logs.text import encoding_of
-
-Array = NDArray[np.float64]
 
 EMPTY = frozenset({"", "-"})
 

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
 from smartshoe.files.logs.numbers import is_missing
-
-Array = NDArray[np.float64]
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d{1,9})?)?\s?(Z|[+-]\d\d:?\d\d)?", re.ASCII)
 _OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d([.,]\d{1,9})?", re.ASCII)

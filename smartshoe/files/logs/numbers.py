@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
-
-Array = NDArray[np.float64]
 
 MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "-", "--", "---"})
 _INTEGER = re.compile(r"[+-]?\d+(?:[eE][+-]?\d+)?", re.ASCII)

@@ -9,13 +9,11 @@ from typing import Any, get_args
 from unicodedata import category
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns, require_values
 from smartshoe.recording import Recording, Role
-
-Array = NDArray[np.float64]
 
 LARGEST = 1e30  # in any unit: beyond it are broken files, and numbers that overflow when they are squared twice
 
@@ -54,7 +52,7 @@ class Sheet:
     has_header: bool = True
     recording_name: str | None = None
     unit_name: str | None = None
-    lines: NDArray[np.intp] | None = None
+    lines: Index | None = None
 
     def place(self, row: int) -> str:
         """Where the 0-based ``row`` stands in the file, as an error message names it."""

@@ -6,14 +6,12 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import InputError
 from smartshoe.files.logs.picks import Pick, need_quantity, pick, titles
 from smartshoe.files.logs.sheet import Column, Sheet
 from smartshoe.units import SECOND, Unit
-
-Array = NDArray[np.float64]
 
 _TIME_NAMES = frozenset({"time", "t", "x_value", "zeit", "czas", "temps", "tijd", "tiempo", "时间"})
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import RefusedError, UsageError
-from smartshoe.gait.field.finding import Array, CheckResult, Verdict, white_noise
+from smartshoe.gait.field.finding import CheckResult, Verdict, white_noise
 
 SHORTEST_S = 1.0
 FEWEST = 20

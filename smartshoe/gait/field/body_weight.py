@@ -12,8 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
-from smartshoe.gait.field.finding import Array, CheckResult, Verdict
+from smartshoe.gait.field.finding import CheckResult, Verdict
 from smartshoe.gait.field.swing_zero import WINDOW_S
 from smartshoe.gait.field.swings import swings
 from smartshoe.signals.masks import runs_of

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration, compensate
 from smartshoe.errors import InputError, MissingChannelError, UsageError
 from smartshoe.gait.estimate import calibration_of
 from smartshoe.gait.field.at_rest import SHORTEST_S, check_zero
 from smartshoe.gait.field.body_weight import check_body_weight
-from smartshoe.gait.field.finding import Array, CheckResult, Verdict, white_noise
+from smartshoe.gait.field.finding import CheckResult, Verdict, white_noise
 from smartshoe.gait.field.silence import check_units
 from smartshoe.gait.field.swing_zero import SwingZero
 from smartshoe.gait.field.temperature import temperature_of_zeros

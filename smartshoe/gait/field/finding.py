@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from smartshoe.arrays import Array
+
 Verdict = Literal["ok", "warning", "fault", "unknown"]
 
 

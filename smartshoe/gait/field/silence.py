@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.errors import UsageError
-from smartshoe.gait.field.finding import Array, CheckResult, Mask, white_noise
+from smartshoe.gait.field.finding import CheckResult, white_noise
 from smartshoe.signals.masks import runs_of
 
 UP, DOWN = 0.6, 0.4  # of a unit's own rise: a press goes above the one after it was below the other
@@ -68,7 +69,7 @@ def _rise(values: Array) -> float:
     return float(high - low)
 
 
-def _presses(values: Array, rise: float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def _presses(values: Array, rise: float) -> Index:
     """Samples at which the unit is pressed anew."""
     low = float(np.quantile(values, 0.02))
     index = np.arange(values.size)
@@ -98,7 +99,7 @@ def _gaps(time: Array, there: Mask, name: str) -> list[CheckResult]:
 
 def _stuck_or_dead(
     time: Array, values: Array, name: str, rises: Array, scale: Array, k: int, others: list[int],
-    presses: list[np.ndarray[tuple[int], np.dtype[np.intp]]],
+    presses: list[Index],
 ) -> list[CheckResult]:  # fmt: skip
     def sat_out(first: int, last: int) -> int:
         return int(np.median([np.count_nonzero((presses[j] > first) & (presses[j] <= last)) for j in others]))

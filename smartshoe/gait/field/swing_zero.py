@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
-from smartshoe.gait.field.finding import Array
 from smartshoe.gait.field.swings import swings
 
 WINDOW_S, HOP_S = 4.0, 0.5  # two strides of a slow walk; how often it is looked at

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.gait.field.finding import Array, Mask
+from smartshoe.arrays import Array, Mask
 
 SHORTEST_S, LONGEST_S = 0.15, 1.0  # a sprinter's swing is longer, a valley of 1 s and more is a foot that rests
 ENTER, LEAVE = 0.10, 0.25  # of the rise above the valley

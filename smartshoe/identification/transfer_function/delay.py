@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.transfer_function.discrete import Array, prefilter
+from smartshoe.identification.transfer_function.discrete import prefilter
 from smartshoe.identification.transfer_function.problem import OutputError
 
 MOST_SAMPLES = 500

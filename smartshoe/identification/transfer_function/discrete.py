@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
+
 Intersample = Literal["zoh", "foh"]
 EVEN_DELAY = 1e-12  # of a step: a delay this near whole samples is whole
 

@@ -8,9 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.identification.residual_tests import ResidualTest, whiteness
-from smartshoe.identification.transfer_function.discrete import Array, Intersample
+from smartshoe.identification.transfer_function.discrete import Intersample
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
 from smartshoe.identification.transfer_function.problem import ErrorGradient, OutputError, Structure, orthogonal_factor
 from smartshoe.models.parameter import NORMAL_95, Parameter

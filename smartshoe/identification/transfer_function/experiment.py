@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import InputError, NotIdentifiableError, UsageError
-from smartshoe.identification.transfer_function.discrete import Array, Intersample
+from smartshoe.identification.transfer_function.discrete import Intersample
 from smartshoe.models.first_order import steps
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

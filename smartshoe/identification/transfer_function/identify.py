@@ -8,10 +8,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.solve import minimise
 from smartshoe.identification.transfer_function import delay
-from smartshoe.identification.transfer_function.discrete import Array, Intersample
+from smartshoe.identification.transfer_function.discrete import Intersample
 from smartshoe.identification.transfer_function.estimate import Ending, TransferFunctionEstimate, summarise
 from smartshoe.identification.transfer_function.experiment import InputOutput, prepare
 from smartshoe.identification.transfer_function.problem import InitialState, OutputError, Structure, Whitened

@@ -8,8 +8,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError, RefusedError, UsageError
-from smartshoe.identification.transfer_function.discrete import Array
 from smartshoe.identification.transfer_function.estimate import TransferFunctionEstimate
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
 from smartshoe.identification.transfer_function.identify import identify_transfer_function

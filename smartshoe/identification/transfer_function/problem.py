@@ -15,8 +15,9 @@ from typing import Literal
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.identification.solve import Evaluation
-from smartshoe.identification.transfer_function.discrete import Array, Intersample, StateVariableFilter, Trajectory
+from smartshoe.identification.transfer_function.discrete import Intersample, StateVariableFilter, Trajectory
 from smartshoe.identification.transfer_function.experiment import InputOutput
 
 InitialState = Literal["estimate", "steady", "rest"]

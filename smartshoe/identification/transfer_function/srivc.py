@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.identification.transfer_function.discrete import Array, StateVariableFilter, prefilter
+from smartshoe.identification.transfer_function.discrete import StateVariableFilter, prefilter
 from smartshoe.identification.transfer_function.problem import ErrorGradient, OutputError
 
 NEGLIGIBLE_STEP = 1e-3  # of a standard error, over all parameters together

@@ -10,7 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Array, CStep, Inverse
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import CStep, Inverse
 from smartshoe.models.elements import Arm
 from smartshoe.models.first_order import hold_coefficients
 

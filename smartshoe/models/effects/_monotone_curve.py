@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Array, EffectParameter, Inverse
+from smartshoe.models.effects.effect import EffectParameter, Inverse
 
 KNOTS = np.linspace(0.0, 1.0, 6) ** 1.5  # shares of full scale; denser at low loads, where contacts and gaps bend most
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Array, Conditions
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import Conditions
 
 LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
 SAME_AS_TIME = 0.98  # correlation above which a temperature is a clock, and the two have no separate coefficients

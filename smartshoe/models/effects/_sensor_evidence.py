@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Array, Conditions, EffectParameter
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import Conditions, EffectParameter
 
 FALSE_ALARMS = 1e-3
 """Rate at which each test finds something in white Gaussian noise."""

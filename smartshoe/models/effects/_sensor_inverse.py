@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from smartshoe.models.effects.effect import Array, CStep, Inverse
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import CStep, Inverse
 
 
 def c_number(value: float) -> str:

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Array, Conditions
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import Conditions
 
 ROUNDS = 2
 

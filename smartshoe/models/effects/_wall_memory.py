@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Array, Conditions, CStep, Inverse
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import Conditions, CStep, Inverse
 
 LEAST_DEAD_ZONE = 1e-3  # of full scale
 SIGMAS = 4.0

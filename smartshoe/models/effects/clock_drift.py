@@ -6,8 +6,9 @@ from functools import cache
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_clock import running_time_s
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter
 from smartshoe.models.effects.exposure import by
 
 FRACTIONS = 512  # of a sample; between two of them the weights are interpolated, 2e-6 of a signal's highest tones off

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_evidence import SensorEvidence, Waveformless
-from smartshoe.models.effects.effect import Array, Conditions, Effect
+from smartshoe.models.effects.effect import Conditions, Effect
 from smartshoe.models.effects.exposure import by
 
 MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter
 from smartshoe.models.effects.exposure import by
 
 

@@ -14,14 +14,13 @@ from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.models.core import Core
 from smartshoe.models.effects.exposure import Direction, Exposure
 from smartshoe.models.elements import Arm, Element
 
-Array = NDArray[np.float64]
 Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
 PLACES: tuple[Place, ...] = ("machine", "contact", "wall", "core", "gas", "sensor", "logger")
 """Order of the chain. "wall" blocks turn the load that acts on the tube, "core" ones add states to the linear network

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._monotone_curve import bent, slope_weights, straightened
-from smartshoe.models.effects.effect import Array, Conditions, Effect, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, Inverse
 from smartshoe.models.effects.exposure import by
 
 

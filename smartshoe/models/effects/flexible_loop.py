@@ -7,9 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone, dead_zone
-from smartshoe.models.effects.effect import Array, Conditions, CStep, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, CStep, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 HALF_WIDTHS = np.geomspace(0.01, 0.4, 5)  # of the plays, shares of full scale

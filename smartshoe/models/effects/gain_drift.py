@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_clock import drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 LEAST_GAIN = 0.01

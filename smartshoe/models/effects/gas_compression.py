@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import GasBesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects._wall_loop import relaxed, shared
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, SensorEvidence
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_loop import shared
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, dead_zone
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter
 from smartshoe.models.effects.exposure import by
 
 RAIL_KNEE = 5e-4  # of full scale: below a sensor's noise, and yet no kink for derivatives to stumble over

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from smartshoe.models.effects.effect import Array, CoreEffect, EffectParameter
+from smartshoe.arrays import Array
+from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm, Element
 

@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 SCALES = np.array([4.0, 6.0 * 3.0**0.5, 16.0])  # one over the extremes of c (1 - c) (1 - 2c)^k on 0 ... 1, k = 0, 1, 2

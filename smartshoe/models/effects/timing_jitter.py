@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from math import sqrt
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, SensorEvidence, Waveformless, growing_noise
-from smartshoe.models.effects.effect import Array, Conditions, Effect
+from smartshoe.models.effects.effect import Conditions, Effect
 from smartshoe.models.effects.exposure import by
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects._wall_loop import shared
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
 

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_clock import running_time_s
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Array, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 

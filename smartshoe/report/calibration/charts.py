@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration.validation import ForceTrace, Validation
 from smartshoe.recording import Recording
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.numbers import plain
 from smartshoe.signals.loading import Cycle, Ramp, by_rate, cycles
-
-Array = NDArray[np.float64]
 
 LOOP_POINTS = 160
 SHARE = np.linspace(0.02, 0.98, LOOP_POINTS)  # of the load's span: a ramp's own corners are cut off

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.result import Diagnosis, Trace
 from smartshoe.protocol import Protocol
 from smartshoe.report.charts import Chart, Line, Mark, Panel, Style
@@ -24,8 +24,6 @@ from smartshoe.report.diagnosis.views import (
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import words
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
 
 BEFORE, AFTER = "raw", "corrected"
 WAYS = ((1, "loading", "line"), (-1, "unloading", "dashed"))

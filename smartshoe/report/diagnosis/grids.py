@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.result import Diagnosis
 from smartshoe.report.diagnosis.views import Map
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import words
 
-Array = NDArray[np.float64]
 Kind = Literal["cause", "equivalent", "other"]
 
 MOST_BARS, MOST_ALIKE = 12, 10

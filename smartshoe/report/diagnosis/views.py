@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis.result import Trace
 from smartshoe.signals.loading import Cycle, by_rate, cycles, ramps
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SLOPE_S = 0.2  # over which a load's rate is taken
 STANDING_SHARE = 0.004  # of full scale a second: below it the load stands
@@ -64,7 +61,7 @@ class EvidenceView:
     load_n: Array
     reading: Array
     rate_n_per_s: Array
-    cycle: NDArray[np.intp]
+    cycle: Index
     before: Array
     after: Array
     held_out: Mask
@@ -83,7 +80,7 @@ class EvidenceView:
         return not np.array_equal(self.before, self.after)
 
     @cached_property
-    def direction(self) -> NDArray[np.intp]:
+    def direction(self) -> Index:
         """(n,) 1 while loading, -1 while unloading, 0 while the load stands."""
         still = STANDING_SHARE * self.full_scale_load_n
         return np.sign(np.where(np.abs(self.rate_n_per_s) < still, 0.0, self.rate_n_per_s)).astype(np.intp)
@@ -250,9 +247,7 @@ def by_place_and_cycle(found: EvidenceView, residual: Array) -> Map | None:
     return Map(values, tuple(f"{a}" if a == b else f"{a}–{b}" for a, b in ends), edges)
 
 
-def _means(
-    row: NDArray[np.intp], column: NDArray[np.intp], values: Array, rows: int, columns: int, fewest: int
-) -> Array:
+def _means(row: Index, column: Index, values: Array, rows: int, columns: int, fewest: int) -> Array:
     flat = row * columns + column
     count = np.bincount(flat, minlength=rows * columns).astype(float)
     total = np.bincount(flat, values, rows * columns)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.indices import POINTS, overlaid
 from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
@@ -15,8 +15,6 @@ from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.gait.strides import main_strides, whole_of
 from smartshoe.report.numbers import plain
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
 
 PERCENT = np.linspace(0.0, 100.0, POINTS)
 WINDOW_STRIDES = 5

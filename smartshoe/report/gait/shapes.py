@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.insole import OUTLINE, PLACES
 from smartshoe.gait.result import GaitResult
 from smartshoe.gait.series import FootSeries
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain
-
-Array = NDArray[np.float64]
 
 MIDDLE = {"left": -0.23, "right": 0.23}  # of each insole's axis, in insole lengths to the right
 INWARDS = {"left": 1.0, "right": -1.0}

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.result import GaitFindings
 from smartshoe.gait.series import FootSeries
 from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
-
-Array = NDArray[np.float64]
 
 
 def whole_of(foot: FootSeries) -> Array:

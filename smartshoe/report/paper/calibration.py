@@ -8,15 +8,12 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from smartshoe.calibration.validation import ForceTrace
 from smartshoe.recording import Recording
 from smartshoe.report.calibration.unit_report import UnitReport
 from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
 from smartshoe.signals.loading import by_rate, cycles
-
-Array = NDArray[np.float64]
 
 LOAD, READING, RAW, COMPENSATED = "#1f2937", "#2563eb", "#d97706", "#059669"
 FEWEST = 300

@@ -7,15 +7,13 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.result import Diagnosis
 from smartshoe.report.diagnosis.grids import ALIKE, compared, ranked
 from smartshoe.report.diagnosis.views import Map
 from smartshoe.report.paper.drawing import STYLE, figure_of
 from smartshoe.report.wording import words
-
-Array = NDArray[np.float64]
 
 CAUSE, EQUIVALENT, OTHER = "#0072B2", "#56B4E9", "#cbd5e1"
 

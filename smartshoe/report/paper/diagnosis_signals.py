@@ -8,8 +8,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis.result import Trace
 from smartshoe.report.diagnosis.views import (
     BINS,
@@ -24,8 +24,6 @@ from smartshoe.report.diagnosis.views import (
 )
 from smartshoe.report.paper.drawing import STYLE, figure_of, thin
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
 
 # Okabe and Ito's colours, told apart by colour-blind readers too; the baseline is dashed besides.
 MEASURED, BASELINE, EXTENDED = "#111827", "#D55E00", "#0072B2"

@@ -8,11 +8,9 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.files.atomic import replacing
-
-Array = NDArray[np.float64]
 
 MOST = 900  # points of a line
 FOOT_COLOURS = {"left": "#0072B2", "right": "#D55E00"}

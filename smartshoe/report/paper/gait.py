@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.indices import POINTS, overlaid
 from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
@@ -22,8 +22,6 @@ from smartshoe.gait.summary import of_main_activity
 from smartshoe.report.gait.strides import main_strides, whole_of
 from smartshoe.report.paper.drawing import FOOT_COLOURS, REGION_COLOURS, STYLE, TOTAL, figure_of, save, thin
 from smartshoe.report.paper.soles import centre
-
-Array = NDArray[np.float64]
 
 PHASE_COLOURS = ("#f3f4f6", "#a5b4fc", "#6ee7b7", "#fcd34d")
 MEMBER_COLOURS = ("#c7d2fe", "#a5b4fc", "#6ee7b7", "#fde68a", "#fbbf24", "#f3f4f6")

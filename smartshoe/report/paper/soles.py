@@ -10,16 +10,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.gait.insole import OUTLINE, PLACES
 from smartshoe.gait.result import GaitResult
 from smartshoe.gait.series import FootSeries
 from smartshoe.report.gait.shapes import INWARDS, MIDDLE, paths_of, placed
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.paper.drawing import FOOT_COLOURS, REGION_COLOURS, STYLE, TOTAL
-
-Array = NDArray[np.float64]
 
 MOST_STANCES = 30
 MOST_SWAY = 3000

@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.recording import Recording
 
 if TYPE_CHECKING:
     from smartshoe.gait import GaitResult
     from smartshoe.runs.scenario.trial import TrialEvent, TrialTruth
 
-Array = NDArray[np.float64]
 
 CONTACT = 0.02  # of body weight: a unit bears
 SAME_EVENT_S = 0.1  # further apart, they are not the same event
@@ -94,7 +93,7 @@ def _rmse_coils(
     }
 
 
-def _means(totals: Mapping[str, Array], where: NDArray[np.bool_]) -> dict[str, float] | None:
+def _means(totals: Mapping[str, Array], where: Mask) -> dict[str, float] | None:
     if not where.any():
         return None
     return {name: float(values[where].mean()) for name, values in totals.items()}

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices import open_shoe
 from smartshoe.devices.base import Shoe
 from smartshoe.errors import OptionError, UsageError
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
     from smartshoe.gait import GaitResult
 
-Array = NDArray[np.float64]
 
 WORN = ("bladder", "sensor")  # of a unit's keys: the rest is the testing machine's
 

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.following import zeros_at
 from smartshoe.devices.joining import Alignment, align_reading, coarse
 from smartshoe.errors import InputError
@@ -17,8 +17,6 @@ from smartshoe.protocol import Protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals import loading
 from smartshoe.signals.masks import runs_of
-
-Array = NDArray[np.float64]
 
 FOLLOWS = 0.8  # correlation of a reading with the load that presses it
 END_OF_RANGE = 0.995

@@ -5,13 +5,11 @@ from __future__ import annotations
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.devices.base import Block
 from smartshoe.errors import FormatError
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
 
 _HEAD = struct.Struct("<IHH")  # samples, units, flags
 _HAS_HOST, _HAS_ARRIVAL = 1, 2

@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.filter import ForceFilter
 from smartshoe.devices.base import Block, Shoe
 from smartshoe.errors import UnitError, UsageError
 from smartshoe.files.journal import AppendedFile
 from smartshoe.units import Unit
-
-Array = NDArray[np.float64]
 
 LONGEST_BRIDGED_S = 2.0
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.files.atomic import json_text, make_folder, write_text
 from smartshoe.runs.studies.plan import StudyPlan, read_study
@@ -29,7 +29,6 @@ from smartshoe.runs.studies.trials import TrialFigures, figures_of_trial
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 SCHEMA = "smartshoe.study/1"

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from smartshoe.arrays import Array
 
 CONFIDENCE = 0.95
 BOOTSTRAP_FROM = 10  # subjects: with fewer, resampling them cannot show their spread, and Student's t is used

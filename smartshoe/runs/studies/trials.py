@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import SmartShoeError
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.runs.studies.plan import TrialEntry
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from smartshoe.gait import GaitResult
     from smartshoe.recording import Recording
 
-Array = NDArray[np.float64]
 
 COMPARED = ("stance_time_s", "stance_percent", "peak_n", "impulse_n_s")  # stride by stride with a reference
 SAME_STRIDE_S = 0.15  # between two heel strikes: further apart, they are not the same

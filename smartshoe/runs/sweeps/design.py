@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import ScenarioError
 from smartshoe.files.gate import limits
 
@@ -65,7 +65,7 @@ class SweepDesign:
         return self.count * len(self.seeds)
 
     @cached_property
-    def _shares(self) -> NDArray[np.float64]:
+    def _shares(self) -> Array:
         return np.random.default_rng(self.draw).random((self.count, len(self.axes)))
 
     def values(self, case: int) -> dict[str, Any]:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.calibration.estimators.estimate import Array, ForceEstimate, ForceRun, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.calibration.estimators.estimate import ForceEstimate, ForceRun
 from smartshoe.calibration.estimators.kalman import KalmanEstimator, ahead, filter_of, straight
 from smartshoe.calibration.estimators.state_space import contact_model, swing_model
 

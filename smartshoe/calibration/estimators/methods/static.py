@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.calibration.estimators.estimate import Array, Estimator, ForceEstimate, ForceRun, Mask
+from smartshoe.arrays import Array, Mask
+from smartshoe.calibration.estimators.estimate import Estimator, ForceEstimate, ForceRun
 from smartshoe.calibration.estimators.reading_noise import reading_noise_sd
 
 

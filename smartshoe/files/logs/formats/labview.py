@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
 from smartshoe.files.gate import require_columns
 from smartshoe.files.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, Role
-
-Array = NDArray[np.float64]
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"

@@ -6,13 +6,11 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array, Mask
 from smartshoe.errors import FormatError
-from smartshoe.files.logs.exported import Array, lines_of, numbers_below
+from smartshoe.files.logs.exported import lines_of, numbers_below
 from smartshoe.files.logs.sheet import Column, Format, Sheet
-
-Mask = NDArray[np.bool_]
 
 _SENSOR = re.compile(r"(?P<serial>\w+)-(?P<side>[LR])(::(?P<part>\w+))?")
 _SIDES = {"L": "left", "R": "right"}

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
 from smartshoe.files.logs.columns import roles_of
@@ -99,7 +99,7 @@ def _marks(path: Path, skip_lines: int) -> tuple[int, int]:
     return commas, lines + (last != b"\n")
 
 
-def _read_fast(path: Path, header: list[str], header_line: int) -> NDArray[np.float64] | None:
+def _read_fast(path: Path, header: list[str], header_line: int) -> Array | None:
     """All cells (rows, columns) by pandas' C parser, or None where only the slow pass can say what is wrong."""
     import pandas as pd
 
@@ -133,7 +133,7 @@ def _data_lines(path: Path, header_line: int) -> tuple[list[str], list[int]]:
     return [line for _, line in rows], [number for number, _ in rows]
 
 
-def _read_slowly(path: Path, header: list[str], header_line: int) -> NDArray[np.float64]:
+def _read_slowly(path: Path, header: list[str], header_line: int) -> Array:
     """The same by way of every cell, raising `FormatError` at the first one that is at fault."""
     lines, numbers = _data_lines(path, header_line)
     rows = [[cell.strip() for cell in line.split(",")] for line in lines]

@@ -9,14 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
 from smartshoe.files.gate import require_columns, require_values
 from smartshoe.files.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording
-
-Array = NDArray[np.float64]
 
 _PADDING = "channels end at different samples; the shorter ones were filled up with missing samples"
 
