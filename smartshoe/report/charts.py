@@ -63,7 +63,8 @@ class Chart:
 
     ``says`` tells in words what is to be seen: it is the text for those who do not see it. Charts of one ``group``
     share cursor and zoom. ``dates``: x is in seconds since 1970.
-    ``window`` is what is seen of x at first, all where it is None.
+    ``window`` is what is seen of x at first, all where it is None; its samples are kept whole where they fit.
+    ``weight`` is the chart's part of the page's numbers, where the others have 1.
     """
 
     title: str
@@ -76,6 +77,7 @@ class Chart:
     dates: bool = False
     marks: Sequence[Mark] = field(default_factory=tuple)
     window: tuple[float, float] | None = None
+    weight: float = 1.0
 
     @property
     def lines(self) -> list[Line]:
@@ -106,15 +108,27 @@ def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
 
 
 def shares(charts: Sequence[Chart], page_bytes: float = PAGE_BYTES) -> list[int]:
-    """How many points each chart may keep: those that need less leave the rest to the others."""
+    """How many points each chart may keep, by weight: those that need less leave the rest to the others."""
     allowed = [0] * len(charts)
-    left = page_bytes
-    order = sorted(range(len(charts)), key=lambda k: charts[k].x.size * charts[k].bytes_of_point)
-    for done, k in enumerate(order):
-        each = charts[k].bytes_of_point
-        allowed[k] = min(charts[k].x.size, max(FEWEST_POINTS, int(left / (len(order) - done) / each)))
+    left, weights = page_bytes, sum(chart.weight for chart in charts)
+    order = sorted(range(len(charts)), key=lambda k: charts[k].x.size * charts[k].bytes_of_point / charts[k].weight)
+    for k in order:
+        each, own = charts[k].bytes_of_point, charts[k].weight
+        allowed[k] = min(charts[k].x.size, max(FEWEST_POINTS, int(left * own / weights / each)))
         left -= allowed[k] * each
+        weights -= own
     return allowed
+
+
+def _kept(chart: Chart, most: int) -> NDArray[np.intp]:
+    """Indices of about ``most`` samples: extremes, and all in the window where those are at most half of that."""
+    signals = [line.values for line in chart.lines]
+    if chart.window is not None and chart.x.size > most:
+        first, last = np.searchsorted(chart.x, chart.window)
+        if last - first <= most // 2:
+            elsewhere = reduced(chart.x, signals, most - int(last - first))
+            return np.union1d(elsewhere, np.arange(first, last))
+    return reduced(chart.x, signals, most)
 
 
 def _text(values: NDArray[Any]) -> str:
@@ -143,7 +157,7 @@ def _line(line: Line, index: Index) -> dict[str, Any]:
 
 def packed(chart: Chart, most: int) -> dict[str, Any]:
     """The chart as the page's script reads it, with at most about ``most`` points."""
-    index = reduced(chart.x, [line.values for line in chart.lines], most)
+    index = _kept(chart, most)
     x0 = float(chart.x[0]) if chart.x.size else 0.0
     return {
         "title": chart.title,
@@ -154,7 +168,7 @@ def packed(chart: Chart, most: int) -> dict[str, Any]:
         "group": chart.group,
         "logX": chart.log_x,
         "dates": chart.dates,
-        "window": chart.window,
+        "window": chart.window and (max(chart.window[0], x0), min(chart.window[1], float(chart.x[-1]))),
         "marks": [[mark.start, mark.end, mark.colour, mark.label] for mark in chart.marks],
         "panels": [
             {

@@ -14,6 +14,7 @@ from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
 
 COLUMNS = ("truth", "raw", "corrected")
+WEIGHT = 8.0  # of the trial on the page of its calibrations: minutes, beside their pressings
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,8 @@ def total_chart(found: GaitResult, time_s: Array, totals: Mapping[str, Array]) -
         apart = [Line(f"{name} − truth", totals[name] - totals["truth"], name, styles[name])
                  for name in COLUMNS[1:] if name in totals]  # fmt: skip
         panels.append(Panel("estimate − truth (N)", apart, height=150))
-    return Chart("The trial's total force", says, "time (s)", time_s, panels, window=gait_charts.some_strides(found))
+    return Chart("The trial's total force", says, "time (s)", time_s, panels,
+                 window=gait_charts.some_strides(found), weight=WEIGHT)  # fmt: skip
 
 
 def print_trial(result: Mapping[str, Any]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from browser import Browser
 
 SMALLEST_PX = 9.0
+SHEET_PX = 717  # of A4 between Chromium's margins, at 96 to the inch
 LEAST_CONTRAST = 4.5  # WCAG 2.1 AA for text
 
 CLIPPED = """
@@ -75,6 +76,26 @@ def look(browser: Browser) -> list[str]:
     found += [f"clipped: {text}" for text in browser.run(CLIPPED)]
     found += [f"too small: {text}" for text in browser.run(SMALL.replace("LEAST", str(SMALLEST_PX)))]
     found += [f"too faint: {text}" for text in browser.run(FAINT.replace("LEAST", str(LEAST_CONTRAST)))]
+    return found
+
+
+OFF_PAPER = """
+[...document.querySelectorAll('table, h1, h2, h3, p, pre, figure, svg')].filter(e => {
+  const box = e.getBoundingClientRect();
+  return box.width && !e.closest('.live') && (box.right > innerWidth + 1 || box.left < -1);
+}).map(e => e.tagName + ': ' + e.textContent.slice(0, 60))
+"""
+
+
+def look_of_paper(browser: Browser) -> list[str]:
+    """What would stand beside an A4 sheet, in words: nothing scrolls there."""
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    browser.call("Emulation.setDeviceMetricsOverride", width=SHEET_PX, height=1000, deviceScaleFactor=1, mobile=False)
+    browser.run("dispatchEvent(new Event('beforeprint'))")
+    browser.settle()
+    found = [f"beside the sheet: {text}" for text in browser.run(OFF_PAPER)]
+    browser.run("dispatchEvent(new Event('afterprint'))")
+    browser.call("Emulation.setEmulatedMedia", media="")
     return found
 
 

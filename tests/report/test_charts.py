@@ -62,6 +62,19 @@ def test_what_is_packed_comes_back_to_a_step_of_its_range_and_gaps_stay_gaps(val
         assert np.abs(back[there] - values[there]).max() <= 0.51 * span / STEPS + 1e-9 * np.abs(values[there]).max()
 
 
+def test_what_is_seen_at_first_is_whole_and_a_weight_takes_from_the_others() -> None:
+    x = np.arange(200_000.0)
+    long = Chart("t", "s", "x", x, [Panel("y", [Line("l", np.sin(x), "raw")])], window=(-50.0, 99.5), weight=3.0)
+    made = packed(long, 2000)
+    kept = np.frombuffer(base64.b64decode(made["x"]), dtype="<f4")
+    assert kept[:100].tolist() == list(range(100))
+    assert kept.size < 2100
+    assert made["window"] == (0.0, 99.5)
+    other = chart(200_000)
+    heavy, light = shares([long, other])
+    assert light * 2.9 < heavy < light * 3.1
+
+
 def test_a_name_cannot_end_the_script() -> None:
     x = np.arange(3.0)
     text = script_text([Chart("</script><b>", "s", "x", x, [Panel("y", [Line("</script>", x, "raw")])])])

@@ -9,7 +9,7 @@ from typing import Any
 from smartshoe.gait.result import GaitResult
 from smartshoe.report.document import write_document
 from smartshoe.report.gait import charts, shapes
-from smartshoe.report.gait.terminal import COVERAGE_NOTE, by_foot, depends_on_coverage
+from smartshoe.report.gait.terminal import COVERAGE_NOTE, by_foot, depends_on_coverage, weight_mark
 from smartshoe.report.numbers import plain, with_sd
 
 UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # kinds of flags: the numbers mean nothing
@@ -76,7 +76,7 @@ def _numbers(found: GaitResult) -> list[tuple[str, str]]:
     weight = found.forces.body_weight
     if weight is not None:
         text = f"{with_sd({'value': weight.value, 'sd': weight.sd})} N"
-        said.append((text, f"body weight ({weight.source.replace('_', ' ')})"))
+        said.append((text, f"body weight{weight_mark(found)} ({weight.source.replace('_', ' ')})"))
     if found.forces.standing_total_n is not None:
         said.append((f"{found.forces.standing_total_n:.1f} N", "total while standing"))
     return said

@@ -13,14 +13,20 @@ from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
 
 COVERAGE_NOTE = (
-    "* no --coverage was given: peaks, impulses and loading rates are those of the load on the units alone, lower than"
-    " the foot's where part of it passes beside them"
+    "* no --coverage was given: peaks, impulses, loading rates and an estimated body weight are those of the load on"
+    " the units alone, lower than the foot's where part of it passes beside them"
 )
 
 
 def depends_on_coverage(found: GaitFindings) -> bool:
     """Whether forces of feet rest on a coverage that nobody gave."""
     return found.coverage == 1.0 and any(own["mean"] is not None for own in found.figures["peak_n"].values())
+
+
+def weight_mark(found: GaitFindings) -> str:
+    """The star of a body weight that was estimated from loads without a coverage."""
+    weight = found.forces.body_weight
+    return "*" if weight is not None and weight.source != "given" and depends_on_coverage(found) else ""
 
 
 def _peaks(found: GaitFindings, foot: str) -> str:
@@ -92,7 +98,8 @@ def print_gait(found: GaitFindings, title: str) -> None:
     forces = found.forces
     if forces.body_weight is not None:
         weight = forces.body_weight
-        line = f"body weight {with_sd({'value': weight.value, 'sd': weight.sd})} N ({weight.source.replace('_', ' ')})"
+        weighed = with_sd({"value": weight.value, "sd": weight.sd})
+        line = f"body weight{weight_mark(found)} {weighed} N ({weight.source.replace('_', ' ')})"
         for name, value in (("mean total", forces.mean_total_n), ("standing total", forces.standing_total_n)):
             if value is not None:
                 line += f", {name} {value:.1f} N"

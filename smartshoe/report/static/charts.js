@@ -139,9 +139,20 @@
       const plots = drawn.get(figure.dataset.chart);
       if (plots && plots[0].group === u.group) {
         figure.querySelector("button.whole").hidden = whole;
+        tellThin(figure, plots[0]);
         fillNumbers(figure);
       }
     });
+  }
+
+  // Where the page keeps too few samples for what is zoomed into, a line between extremes is not the signal's course.
+  function tellThin(figure, u) {
+    const chart = charts[+figure.dataset.chart], { min, max } = u.scales.x, x = chart.data.x;
+    const seen = x.reduce((n, v) => n + (v >= min && v <= max), 0);
+    const there = chart.of * (Math.min(max, u.whole[1]) - Math.max(min, u.whole[0])) / (u.whole[1] - u.whole[0]);
+    const thin = figure.querySelector(".thin"), isThin = x.length < chart.of && seen < 0.9 * there && seen < u.bbox.width / devicePixelRatio / 2;
+    thin.hidden = !isThin;
+    thin.textContent = isThin ? "Zoomed in beyond what the page keeps: extremes of each stretch, about one sample in " + Math.max(2, Math.round(there / seen)) + "." : "";
   }
 
   function widthOf(plot) {
@@ -225,7 +236,8 @@
     const columns = [];
     chart.panels.forEach((panel, p) => panel.lines.forEach((line, i) => {
       columns.push([line.label + (chart.panels.length > 1 ? ", " + panel.label : ""), data.panels[p][i].y]);
-      for (const name of ["low", "high"]) if (data.panels[p][i][name]) columns.push([line.label + ", " + name, data.panels[p][i][name]]);
+      const whose = chart.panels.length > 1 || panel.lines.some((other) => other !== line && other.low) ? line.label + ", " : "";
+      for (const name of ["low", "high"]) if (data.panels[p][i][name]) columns.push([whose + name, data.panels[p][i][name]]);
     }));
     for (const name of [chart.xLabel, ...columns.map((c) => c[0])]) {
       const cell = document.createElement("th"); cell.scope = "col"; cell.textContent = name; head.append(cell);
@@ -238,7 +250,7 @@
     }
     const note = document.createElement("p");
     note.className = "note";
-    note.textContent = (every > 1 ? "Every " + every + "th of " + seen.length + " points that are shown" : "All " + seen.length + " points that are shown")
+    note.textContent = (every > 1 ? "One in " + every + " of the " : "All ") + seen.length + " points that are shown"
       + (chart.of > data.x.length ? "; the record has " + chart.of + " samples, of which the page keeps " + data.x.length + " with every extreme." : ".");
     const box = details.querySelector(".scroll");
     box.replaceChildren(table, note);

@@ -92,8 +92,10 @@ def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
         said = f"accepted at attempt {next(attempt.number for attempt in tries if attempt.state == 'accepted')}"
         found = [f"attempt {attempt.number}: {one['says']}" for attempt in tries for one in attempt.findings]
         rows.append((f"pressed: {name}", "; ".join([said, *found]) if found else f"{said}, no fault found"))
-    looked_for = " ".join((check.__doc__ or "").split("\n")[0] for check in AT_THE_END)
-    rows.append(("faults looked for", looked_for))
+    looked_for = [(check.__doc__ or "").split("\n")[0].rstrip(".") for check in AT_THE_END]
+    rows.append(
+        ("faults that each attempt is searched for", "; ".join(f"{one[0].lower()}{one[1:]}" for one in looked_for))
+    )
     rows += [("clocks", _clocks(name, recording)) for name, recording in result.recordings.items()]
     if entry is None:
         return [*rows, ("stored", "only in this folder: with --serial-number it goes into the store")]

@@ -18,13 +18,25 @@ if TYPE_CHECKING:
     from smartshoe.runs.studies.running import Difference, StudyResult
 
 COLOURS = ("reading", "raw", "corrected", "toe", "heel", "meta4")
-SHOWN = (
-    "cadence_steps_per_min", "stride_time_s", "stride_time_s.cv_percent", "stance_percent", "double_support_percent",
-    "flight_percent", "asymmetry_percent", "peak_body_weight_percent", "impulse_body_weight_percent_s",
-    "loading_rate_n_per_s",
-)  # fmt: skip
+SHOWN = {
+    "cadence_steps_per_min": "cadence (steps/min)",
+    "stride_time_s": "stride time (s)",
+    "stride_time_s.cv_percent": "variation of stride time (%)",
+    "stance_percent": "stance (% of stride)",
+    "double_support_percent": "double support (% of stride)",
+    "flight_percent": "flight (% of stride)",
+    "asymmetry_percent": "asymmetry (%)",
+    "peak_body_weight_percent": "peak force (% of body weight)",
+    "impulse_body_weight_percent_s": "impulse (% of body weight × s)",
+    "loading_rate_n_per_s": "loading rate (N/s)",
+}  # what a person reads, by the name in the files
 NAMED = 3  # of the trials that a sentence is said of
-AGREED = {"stance_time_s": "s", "stance_percent": "%", "peak_n": "N", "impulse_n_s": "N s"}
+AGREED = {
+    "stance_time_s": ("stance time", "s"),
+    "stance_percent": ("stance", "% of stride"),
+    "peak_n": ("peak force", "N"),
+    "impulse_n_s": ("impulse", "N s"),
+}
 
 
 def write_page(path: Path, result: StudyResult, source: Path) -> None:
@@ -49,14 +61,10 @@ def write_page(path: Path, result: StudyResult, source: Path) -> None:
             "left_out": [(trial.entry.file, trial.left_out) for trial in result.left_out],
             "flags": [*result.flags, *careful(result)],
             "conditions": list(result.conditions),
-            "rows": [(name, [_mean(own.get(name)) for own in result.conditions.values()]) for name in figures],
+            "rows": [(SHOWN[name], [_mean(own.get(name)) for own in result.conditions.values()]) for name in figures],
             "differences": [_difference_row(each) for each in result.differences if each.figure in figures],
-            "subjects": [
-                (subject, [(name, [_of_subject(result, subject, condition, name) for condition in result.conditions])
-                           for name in figures[:6]])
-                for subject in sorted(subjects)
-            ],
-            "figures": figures,
+            "subjects": [(subject, _rows_of_subject(result, subject, figures[:6])) for subject in sorted(subjects)],
+            "figures": [SHOWN[name] for name in figures],
             "trials": [_trial_row(trial, figures) for trial in result.trials],
             "bands": _band_chart(result),
             "agreement": [_agreement_row(name, each) for name, each in result.agreement.items()],
@@ -101,7 +109,7 @@ def headline(result: StudyResult) -> str:
     told = []
     for each in clear[:3]:
         sign = "+" if each.change.mean > 0 else ""
-        told.append(f"{each.figure} {sign}{plain(each.change.mean, 2)} from {each.start} to {each.end}")
+        told.append(f"{SHOWN[each.figure]} {sign}{plain(each.change.mean, 2)} from {each.start} to {each.end}")
     return "; ".join(told) + (f"; {len(clear) - 3} more" if len(clear) > 3 else "")
 
 
@@ -121,8 +129,15 @@ def _mean(mean: Mean | None) -> str:
 def _difference_row(each: Difference) -> tuple[str, list[str], bool]:
     change = each.change
     interval = "–" if change.ci95 is None else f"{plain(change.ci95[0])} … {plain(change.ci95[1])}"
-    cells = [each.figure, plain(change.mean), interval, str(change.subjects), change.method]
+    cells = [SHOWN[each.figure], plain(change.mean), interval, str(change.subjects), change.method]
     return f"{each.start} to {each.end}", cells, is_clear(change)
+
+
+def _rows_of_subject(result: StudyResult, subject: str, figures: list[str]) -> list[tuple[str, list[str]]]:
+    return [
+        (SHOWN[name], [_of_subject(result, subject, condition, name) for condition in result.conditions])
+        for name in figures
+    ]
 
 
 def _of_subject(result: StudyResult, subject: str, condition: str, name: str) -> str:
@@ -159,7 +174,7 @@ def _agreement_row(name: str, each: Agreement) -> tuple[str, list[str]]:
     if each.icc is not None and each.icc_ci95 is not None:
         icc = f"{each.icc:.3f} ({each.icc_ci95[0]:.3f} … {each.icc_ci95[1]:.3f})"
     limits = f"{plain(each.limits[0])} … {plain(each.limits[1])}{half}"
-    return f"{name} ({AGREED[name]})", [plain(each.bias), bias, limits, icc, str(each.strides), str(each.trials)]
+    return "{} ({})".format(*AGREED[name]), [plain(each.bias), bias, limits, icc, str(each.strides), str(each.trials)]
 
 
 def _bland_altman(name: str, result: StudyResult) -> Chart:
@@ -176,5 +191,6 @@ def _bland_altman(name: str, result: StudyResult) -> Chart:
     ]
     limits = f"{plain(found.limits[0])} … {plain(found.limits[1])}"
     says = f"Ours less the reference: bias {plain(found.bias)}, 95 % of strides within {limits}."
-    x_label = f"mean of both ({AGREED[name]})"
-    return Chart(f"Bland-Altman: {name}", says, x_label, middle[order], [Panel(f"difference ({AGREED[name]})", lines)])
+    what, unit = AGREED[name]
+    panels = [Panel(f"difference ({unit})", lines)]
+    return Chart(f"Bland-Altman: {what}", says, f"mean of both ({unit})", middle[order], panels)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
-from smartshoe.runs.studies.page import careful, headline, is_clear, shown_figures
+from smartshoe.runs.studies.page import SHOWN, careful, headline, is_clear, shown_figures
 from smartshoe.runs.studies.running import StudyResult
 
 
@@ -18,14 +18,14 @@ def print_study(result: StudyResult) -> None:
             mean = figures.get(name)
             spread = "" if mean is None or mean.sd is None else f" ± {plain(mean.sd, 2)}"
             cells.append("–" if mean is None else f"{plain(mean.mean, 4)}{spread}")
-        table.add_row(name, *cells)
+        table.add_row(SHOWN[name], *cells)
     console.print(table)
     console.print(headline(result), soft_wrap=True, markup=False)
     for each in result.differences:
         if is_clear(each.change) and each.change.ci95 is not None and each.figure in shown_figures(result):
             low, high = each.change.ci95
             change = f"{plain(each.change.mean)} ({plain(low)} … {plain(high)}), {each.change.subjects} subjects"
-            console.print(f"  {each.figure}, {each.start} to {each.end}: {change}", soft_wrap=True, markup=False)
+            console.print(f"  {SHOWN[each.figure]}, {each.start} to {each.end}: {change}", soft_wrap=True, markup=False)
     for file, says in [
         *((trial.entry.file, f"left out: {trial.left_out}") for trial in result.left_out),
         *result.flags,
