@@ -14,14 +14,12 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis.thresholds import Thresholds
-from smartshoe.integrity.scales import SECOND_DIFFERENCE
 from smartshoe.recording import Recording
+from smartshoe.signals.noise import NORMAL_95, white_noise_sd
 
 Course = Literal["exponential", "slower", "faster", "undecided"]
 
 STANDARD = Thresholds()
-NORMAL_MEDIAN = 1.482602218505602  # a normal deviate's standard deviation over the median of its absolute value
-NORMAL_95 = 1.959964  # a normal deviate lies within it with a probability of 95 %
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +64,7 @@ def decay_of(recording: Recording, thresholds: Thresholds = STANDARD) -> Decay |
     largest = largest_of_noise(reading.size, thresholds)
     end = max(time_s.size // 20, 3)
     high, low = float(np.median(reading[:3])), float(np.median(reading[-end:]))
-    begun = np.flatnonzero(reading < high - max(thresholds.standing * (high - low), largest * _noise(reading)))
+    begun = np.flatnonzero(reading < high - max(thresholds.standing * (high - low), largest * white_noise_sd(reading)))
     # A decay of which hardly anything is seen is a straight line, without a corner to begin at.
     first = max(int(begun[0]) - 1, 0) if begun.size and high - low > slight * high else 0
     if time_s.size - first < thresholds.local // 4:
@@ -145,7 +143,7 @@ def _falls(reading: Array, thresholds: Thresholds) -> bool:
     first, last = reading[:tenth], reading[-tenth:]
     fall = float(np.median(first) - np.median(last))
     if fall <= max(
-        largest_of_noise(reading.size, thresholds) * _noise(reading) / np.sqrt(tenth),
+        largest_of_noise(reading.size, thresholds) * white_noise_sd(reading) / np.sqrt(tenth),
         thresholds.material * abs(float(np.median(first))),
     ):
         return False
@@ -157,11 +155,6 @@ def _falls(reading: Array, thresholds: Thresholds) -> bool:
         and moved > 0.0
         and float(-steps[steps < 0].sum()) >= (1.0 - thresholds.same) * moved
     )
-
-
-def _noise(reading: Array) -> float:
-    """White noise's standard deviation, from second differences."""
-    return NORMAL_MEDIAN * float(np.median(np.abs(np.diff(reading, 2)))) / SECOND_DIFFERENCE
 
 
 def _guess(t: Array, v: Array) -> float:

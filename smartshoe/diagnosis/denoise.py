@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.signals.noise import robust_sd
 
 HALF_WIDTHS_S = (0.12, 0.06, 0.03)
 FEWEST = 7  # samples a line is drawn through
@@ -27,7 +28,7 @@ def noise_sd(signal: Array) -> float:
     if signal.size < 10:
         return 0.0
     third = np.abs(np.diff(signal, 3))
-    sd = float(np.median(third)) / 0.6745
+    sd = robust_sd(third)
     inside = third <= CLIPPED * sd
     return float(np.sqrt(np.mean(third[inside] ** 2) / 20.0))
 

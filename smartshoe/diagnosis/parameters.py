@@ -6,7 +6,8 @@ import numpy as np
 
 from smartshoe.diagnosis.likelihood import Fit
 from smartshoe.diagnosis.session import Scale
-from smartshoe.models.parameter import NORMAL_95, Parameter
+from smartshoe.models.parameter import Parameter
+from smartshoe.signals.noise import NORMAL_95
 
 
 def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:

@@ -33,6 +33,7 @@ from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
+from smartshoe.signals.noise import NORMAL_95
 
 BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
 
@@ -341,7 +342,7 @@ def _zero_cause(
     parameter = zero.effect.parameters[0]
     factor = scale.load_n if "FS_load" in parameter.unit else abs(scale.reading)
     unit = "N" if "FS_load" in parameter.unit else scale.unit.symbol
-    low, high = zero.value - 1.96 * zero.sd, zero.value + 1.96 * zero.sd
+    low, high = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
     values = {parameter.name: Parameter(zero.value * factor, zero.sd * factor, (low * factor, high * factor), unit)}
     deviations = abs(zero.value) / zero.sd
     seen = Statement(

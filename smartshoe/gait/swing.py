@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.signals.noise import white_noise_sd
 
 OFF, ON, UP = 0.10, 0.15, 0.30  # of the load's height above its floor: swing below, contact above, wall
 LEAST_SQUARENESS = 0.67
@@ -48,13 +49,6 @@ def boxcar(signal: Array, count: int) -> Array:
     return np.asarray((total[high] - total[low]) / (high - low) + signal[0])
 
 
-def noise_of(signal: Array) -> float:
-    """A sample's sd from the median of second differences: a steady slope counts for nothing."""
-    if signal.size < 4:
-        return 0.0
-    return float(np.median(np.abs(np.diff(signal, 2))) / 0.6745 / np.sqrt(6.0))
-
-
 def cut(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
     """The swings in a stretch of a foot's whole load (n,); None where the load does not vary as a swing makes it.
 
@@ -85,7 +79,7 @@ def _trend(load: Array, found: Cut) -> Array:
 
 
 def _cut_level(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
-    noise = noise_of(load)
+    noise = white_noise_sd(load)
     wide = boxcar(load, round(WIDE_S * rate_hz))
     low, high = float(wide.min()), float(wide.max())
     top = float(np.quantile(wide[wide >= low + 0.15 * (high - low)], 0.9))

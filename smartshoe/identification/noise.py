@@ -11,43 +11,19 @@ from smartshoe.identification.experiment import Experiment
 from smartshoe.identification.prediction_error import EVERY, NOT_STORED, PredictionError
 from smartshoe.identification.solve import solve_normal
 from smartshoe.models.first_order import interpolation_gain
+from smartshoe.signals.noise import white_noise_sd
 
 MATTERS = 0.1  # of a standard error: a smaller bias is not worth another estimator
 DIFFERENCES = 4000  # third differences looked at
-THIRD_DIFFERENCE_POWER = 20.0  # 1 + 9 + 9 + 1
-NORMAL_QUARTILE = 0.6744897501960817
 IMPULSE_SAMPLES = 512
-
-
-def white_noise_sd(signals: Sequence[Array]) -> float:
-    """Standard deviation of the white noise on smooth signals, from the median of their third differences.
-
-    Straight lines and slow curves leave nothing in a third difference; corners are few and do not move a median. A
-    noise below a converter's step is not seen (the median is 0): what a step leaves is the step's own, step/sqrt(12).
-    """
-    thirds = []
-    share = max(sum(signal.size for signal in signals) // DIFFERENCES, 1)
-    for signal in signals:
-        if signal.size < 8:
-            continue
-        now, size = signal[::share], -(-(signal.size - 3) // share)
-        first, second, third = (signal[lead::share][:size] for lead in (1, 2, 3))
-        thirds.append(third - 3.0 * second + 3.0 * first - now[:size])
-    if not thirds:
-        return 0.0
-    size = sum(third.size for third in thirds)
-    # A median by one partition: no experiment holds NaN, for which numpy's would look.
-    middle = np.partition(np.abs(np.concatenate(thirds)), size // 2)
-    median = middle[size // 2] if size % 2 else 0.5 * (middle[size // 2] + middle[: size // 2].max())
-    return float(median) / (NORMAL_QUARTILE * float(np.sqrt(THIRD_DIFFERENCE_POWER)))
 
 
 def noise_sds(experiments: Sequence[Experiment]) -> tuple[float, float]:
     """White noise of the load in N and of the reading in its unit."""
     usable = [experiment for experiment in experiments if experiment.kept.any()]
     return (
-        white_noise_sd([experiment.load_n for experiment in usable]),
-        white_noise_sd([experiment.reading for experiment in usable]),
+        white_noise_sd(*(experiment.load_n for experiment in usable), order=3, most=DIFFERENCES),
+        white_noise_sd(*(experiment.reading for experiment in usable), order=3, most=DIFFERENCES),
     )
 
 

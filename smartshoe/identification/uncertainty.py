@@ -9,7 +9,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.identification.prediction_error import PredictionError
 from smartshoe.identification.solve import Evaluation, solve_normal
-from smartshoe.models.parameter import NORMAL_95
+from smartshoe.signals.noise import NORMAL_95
 
 PERSISTENT_CONDITION = 1e-13
 CURVED = 0.1  # of ln alpha: beyond this sd a straight line no longer describes the interval

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal law
+from smartshoe.signals.noise import NORMAL_95
 
 
 def finite_or_none(value: float) -> float | None:

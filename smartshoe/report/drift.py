@@ -19,6 +19,7 @@ from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
 from smartshoe.report.wording import sentence
+from smartshoe.signals.noise import NORMAL_95
 
 DAY_S = 86400.0
 
@@ -37,7 +38,7 @@ def _chart(drift: Drift, trend: Trend) -> Chart:
                 row.append(math.nan)
         x.append(float(day))
         values.append(float(trend.values[k]))
-        sds.append(1.96 * float(trend.sds[k]) if math.isfinite(trend.sds[k]) else 0.0)
+        sds.append(NORMAL_95 * float(trend.sds[k]) if math.isfinite(trend.sds[k]) else 0.0)
         fitted.append(float(trend.fitted(np.array([day]), int(trend.pieces[k]))[0]))
     y, bar, line = np.array(values), np.array(sds), np.array(fitted)
     marks = [Mark(event.date.timestamp(), event.date.timestamp(), "look", "repaired")

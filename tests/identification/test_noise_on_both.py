@@ -6,8 +6,8 @@ from presses import FIXED, SIX_RATES, TOE, coefficients, press
 
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.identification import identify
-from smartshoe.identification.noise import white_noise_sd
 from smartshoe.recording import Recording
+from smartshoe.signals.noise import white_noise_sd
 
 A1 = TOE[1]
 
@@ -94,7 +94,7 @@ def test_white_noise_is_measured_through_ramps_and_corners(sd: float) -> None:
     recording = press(rates=SIX_RATES)
     noise = sd * np.random.default_rng(4).standard_normal(len(recording))
     # A median over 4000 dependent differences: 4 % is five standard errors.
-    assert white_noise_sd([recording.force_n + noise]) == pytest.approx(sd, rel=0.1)
+    assert white_noise_sd(recording.force_n + noise, order=3) == pytest.approx(sd, rel=0.1)
 
 
 def test_a_missing_or_useless_command_is_refused() -> None:

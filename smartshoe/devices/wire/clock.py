@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
+from smartshoe.signals.noise import NORMAL_95, robust_sd
 
 Level = Literal["least", "tenth", "median", "floor", "deep floor"]
 
@@ -38,7 +39,6 @@ BIN_S = 0.25
 KEPT_BINS = 2400  # ten minutes
 FEW_BINS = 8
 CRYSTALS_SD = 100e-6  # what skews are before anything is known
-NORMAL_95 = 1.96
 TUKEY = 4.685  # Huber 1981: 95 % of least squares' efficiency under normal noise
 SWITCH_GAIN = 0.7
 ALIKE = 0.5  # how the levels' errors correlate: 0.1 to 0.8 under the laws of tests/devices/wire
@@ -228,7 +228,7 @@ def _line(time_s: Array, delay_s: Array) -> _Line:
     about, offset, scatter, spread = float(time_s.mean()), float(np.median(delay_s)), math.inf, 1.0
     for _ in range(ROUNDS):
         rest = delay_s - offset - slope * (time_s - about)
-        scatter = max(1.4826 * float(np.median(np.abs(rest - np.median(rest)))), 1e-7)
+        scatter = max(robust_sd(rest - np.median(rest)), 1e-7)
         weights = np.clip(1.0 - (rest / (TUKEY * scatter)) ** 2, 0.0, None) ** 2
         total = float(weights.sum())
         if total < 2.0:

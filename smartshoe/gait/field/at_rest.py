@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array
 from smartshoe.errors import RefusedError, UsageError
-from smartshoe.gait.field.finding import CheckResult, Verdict, white_noise
+from smartshoe.gait.field.finding import CheckResult, Verdict
+from smartshoe.signals.noise import white_noise_sd
 
 SHORTEST_S = 1.0
 FEWEST = 20
@@ -118,7 +119,7 @@ def _zero_of(
     if y.size < FEWEST:
         says = f"{name} sent {y.size} samples of {values.size} at rest: look at its cable"
         return ZeroReading(name, np.nan, np.nan, np.nan, np.nan, "fault", says, span)
-    noise = white_noise(y)
+    noise = white_noise_sd(y)
     slope, level = np.polyfit(at - at.mean(), y, 1)
     left = y - level - slope * (at - at.mean())
     count = max(int((span[1] - span[0]) / BLOCK_S), 2)

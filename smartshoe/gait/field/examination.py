@@ -15,11 +15,12 @@ from smartshoe.errors import InputError, MissingChannelError, UsageError
 from smartshoe.gait.estimate import calibration_of
 from smartshoe.gait.field.at_rest import SHORTEST_S, check_zero
 from smartshoe.gait.field.body_weight import check_body_weight
-from smartshoe.gait.field.finding import CheckResult, Verdict, white_noise
+from smartshoe.gait.field.finding import CheckResult, Verdict
 from smartshoe.gait.field.silence import check_units
 from smartshoe.gait.field.swing_zero import SwingZero
 from smartshoe.gait.field.temperature import temperature_of_zeros
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
+from smartshoe.signals.noise import white_noise_sd
 
 USUAL_FULL_SCALE_N = 800.0  # of the paper's protocols
 REST_LONGEST_S = 5.0
@@ -234,7 +235,7 @@ def _at_rest(
     """The zero of the stretch before somebody steps in, where there is one."""
     held = np.column_stack([channel.values for channel in group.values()])  # missing samples repeat the last one
     first = np.median(held[: max(2, int(0.2 / np.median(np.diff(time_s))))], axis=0)
-    noise = np.array([white_noise(column) for column in held.T])
+    noise = np.array([white_noise_sd(column) for column in held.T])
     moved = np.abs(held - first) > np.maximum(STEPS_ON * scale, 6.0 * noise)
     unscaled = [name for name, channel in group.items() if _known_full_scale(name, channel, by_unit) is None]
     if unscaled and (np.ptp(held, axis=0) <= LOADED_NOISES * noise).all():
@@ -307,7 +308,7 @@ def _in_swing(
     if len(warm) == len(names) and len(warm) > 1:
         # Back from force to pressure by the static gain: a zero moves slowly.
         per_n = np.array([by_unit[n].a1 / by_unit[n].b1 * by_unit[n].reading_unit.scale for n in warm])
-        spread_n = np.array([max(white_noise(forces[name]), 1.0) for name in warm])
+        spread_n = np.array([max(white_noise_sd(forces[name]), 1.0) for name in warm])
         found.append(temperature_of_zeros(follower.zero * per_n, spread_n * per_n, warm, when="in swing at the end: "))
     return found
 

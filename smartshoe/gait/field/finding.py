@@ -7,10 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-
-from smartshoe.arrays import Array
-
 Verdict = Literal["ok", "warning", "fault", "unknown"]
 
 
@@ -38,11 +34,3 @@ class CheckResult:
             "numbers": {name: float(x) if math.isfinite(x) else None for name, x in self.numbers.items()},
             "says": self.says,
         }
-
-
-def white_noise(values: Array) -> float:
-    """Standard deviation of the sample-to-sample noise of ``values`` (n,), whatever slow signal is below it."""
-    if values.size < 3:
-        return 0.0
-    # Second differences take off a straight line; sqrt(6) sd is their spread, 1.4826 times the median is robust.
-    return float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))

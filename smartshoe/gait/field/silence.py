@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.errors import UsageError
-from smartshoe.gait.field.finding import CheckResult, white_noise
+from smartshoe.gait.field.finding import CheckResult
 from smartshoe.signals.masks import runs_of
+from smartshoe.signals.noise import white_noise_sd
 
 UP, DOWN = 0.6, 0.4  # of a unit's own rise: a press goes above the one after it was below the other
 MOVES = 10.0  # noises: a unit with a smaller rise is not pressed
@@ -44,7 +45,7 @@ def check_units(
     there = np.isfinite(values)
     filled = _held(values, there)
     rises = np.array([_rise(filled[:, k]) for k in range(len(names))])
-    moves = np.array([rises[k] > MOVES * white_noise(filled[:, k]) and rises[k] > 0.0 for k in range(len(names))])
+    moves = np.array([rises[k] > MOVES * white_noise_sd(filled[:, k]) and rises[k] > 0.0 for k in range(len(names))])
     presses = [_presses(filled[:, k], rises[k]) if moves[k] else np.empty(0, dtype=np.intp) for k in range(len(names))]
     found: list[CheckResult] = []
     for k, name in enumerate(names):

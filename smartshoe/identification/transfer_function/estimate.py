@@ -14,7 +14,8 @@ from smartshoe.identification.residual_tests import ResidualTest, whiteness
 from smartshoe.identification.transfer_function.discrete import Intersample
 from smartshoe.identification.transfer_function.experiment import as_signals, prepare
 from smartshoe.identification.transfer_function.problem import ErrorGradient, OutputError, Structure, orthogonal_factor
-from smartshoe.models.parameter import NORMAL_95, Parameter
+from smartshoe.models.parameter import Parameter
+from smartshoe.signals.noise import NORMAL_95
 
 LEAST_P_VALUE = 1e-3  # of the whiteness test, below which a note says so
 NOISE_FREE = 1e-9  # of the output's spread: a smaller residual is arithmetic

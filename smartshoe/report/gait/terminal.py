@@ -11,6 +11,7 @@ from smartshoe.gait.result import GaitFindings
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
+from smartshoe.signals.noise import NORMAL_95
 
 COVERAGE_NOTE = (
     "* no --coverage was given: peaks, impulses, loading rates and an estimated body weight are those of the load on"
@@ -36,7 +37,7 @@ def _peaks(found: GaitFindings, foot: str) -> str:
         return "–"
     own_sd = float(np.std(own, ddof=1)) / math.sqrt(len(own))
     sd = math.hypot(own_sd, found.forces.rmse_estimate_n or 0.0)
-    return f"{plain(float(np.mean(own)))} ± {plain(1.96 * sd, 2)}"
+    return f"{plain(float(np.mean(own)))} ± {plain(NORMAL_95 * sd, 2)}"
 
 
 def _cv(spread: dict[str, Any] | None, digits: int = 3) -> str:

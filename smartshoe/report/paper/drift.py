@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from smartshoe.calibration.store.drift import Drift, Trend
 from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.paper.drawing import STYLE, figure_of
+from smartshoe.signals.noise import NORMAL_95
 
 POINT, LINE, REPAIR, JUMP = "#2563eb", "#1f2937", "#d97706", "#dc2626"
 COLUMNS = 2
@@ -47,7 +48,7 @@ def _panel(axis: Any, drift: Drift, trend: Trend) -> None:
         axis.plot(
             [start + timedelta(days=float(day)) for day in span], trend.fitted(span, int(piece)), color=LINE, lw=1
         )
-    bars = np.where(np.isfinite(trend.sds), 1.96 * trend.sds, 0.0)
+    bars = np.where(np.isfinite(trend.sds), NORMAL_95 * trend.sds, 0.0)
     axis.errorbar(dates, trend.values, yerr=bars, fmt="o", ms=3.5, color=POINT, elinewidth=1, capsize=2)
     for repair in repairs:
         axis.axvline(repair, color=REPAIR, ls="--", lw=1)

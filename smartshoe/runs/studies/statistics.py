@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.signals.noise import NORMAL_95
 
 CONFIDENCE = 0.95
 BOOTSTRAP_FROM = 10  # subjects: with fewer, resampling them cannot show their spread, and Student's t is used
@@ -139,7 +140,7 @@ def agreement_of(pairs: Sequence[Array]) -> Agreement:
         half = float(t.ppf(0.5 + CONFIDENCE / 2, means.size - 1) * np.sqrt(3.0 / means.size) * sd)
     icc = _icc(np.array([own.mean(axis=0) for own in pairs])) if means.size > 2 else None
     return Agreement(
-        bias, _t_interval(means), sd, (bias - 1.96 * sd, bias + 1.96 * sd), half,
+        bias, _t_interval(means), sd, (bias - NORMAL_95 * sd, bias + NORMAL_95 * sd), half,
         None if icc is None else icc[0], None if icc is None else icc[1], every.size, means.size,
     )  # fmt: skip
 

@@ -12,6 +12,7 @@ from smartshoe.runs.studies.plan import TrialEntry
 from smartshoe.runs.studies.statistics import _icc, agreement_of, difference_of, mean_of, prediction_interval
 from smartshoe.runs.studies.swapped import swapped_trials
 from smartshoe.runs.studies.trials import TrialFigures
+from smartshoe.signals.noise import NORMAL_95
 
 # Shrout and Fleiss 1979, table 2: six targets, four judges.
 JUDGED = np.array([[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]], dtype=float)
@@ -62,7 +63,7 @@ def test_a_bias_moves_the_limits_and_leaves_their_width(shift: float, seed: int)
     after = agreement_of([own + np.array([shift, 0.0]) for own in pairs])
     assert after.bias == pytest.approx(before.bias + shift, abs=1e-9)
     assert after.sd == pytest.approx(before.sd, rel=1e-9)
-    assert np.ptp(after.limits) == pytest.approx(2 * 1.96 * before.sd, rel=1e-9)
+    assert np.ptp(after.limits) == pytest.approx(2 * NORMAL_95 * before.sd, rel=1e-9)
 
 
 def test_limits_hold_both_what_varies_within_and_between_trials() -> None:
