@@ -90,5 +90,5 @@ def what_drives(figure: str, drivers: list[Driver]) -> str:
 
 def worst_first(table: pd.DataFrame, figure: str, count: int) -> pd.DataFrame:
     """The ``count`` rows in which ``figure`` is worst, the worst first."""
-    ordered = table.dropna(subset=[figure]).sort_values(figure, ascending=figure.endswith(LOW_IS_BAD), kind="stable")
-    return ordered.head(count)
+    ordered = table[figure].dropna().sort_values(ascending=figure.endswith(LOW_IS_BAD), kind="stable")
+    return table.loc[ordered.index[:count]]

@@ -139,19 +139,24 @@ def _plain(content: dict[str, Any]) -> dict[str, Any]:
     return dict(json.loads(json.dumps(content, default=str)))
 
 
-def write_results(plan: SweepPlan, folder: SweepFolder) -> Path:
-    """Write ``results.csv``: a row a case, in the design's order. One case is read at a time, twice: header first."""
+def write_results(plan: SweepPlan, folder: SweepFolder) -> dict[str, str]:
+    """Write ``results.csv``: a row a case, in the design's order; what each column holds, by name.
+
+    That is "bool", "int", "float", or "text". One case is read at a time, twice: for the header first.
+    """
     keys = [axis.key for axis in plan.design.axes]
-    figures: dict[str, None] = {}
+    kinds: dict[str, str] = {}
     for name in plan.names():
-        figures.update(dict.fromkeys(folder.read(name)["figures"]))
-    target = folder.path / "results.csv"
-    with replacing(target) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        for figure, value in folder.read(name)["figures"].items():
+            kinds[figure] = _wider(kinds.get(figure), value)
+    figures = list(kinds)
+    with replacing(folder.path / "results.csv") as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*keys, "seed", *figures, "status", "says", "case"])
         for number, name in enumerate(plan.names()):
             case, values = folder.read(name), plan.design.values(number)
             own = case["figures"]
+            kinds.update({key: _wider(kinds.get(key), values[key]) for key in keys})
             writer.writerow(
                 [
                     *(_cell(values[key]) for key in keys),
@@ -162,7 +167,17 @@ def write_results(plan: SweepPlan, folder: SweepFolder) -> Path:
                     name,
                 ]
             )
-    return target
+    return {**kinds, "seed": "int", "status": "text", "says": "text", "case": "text"}
+
+
+def _wider(kind: str | None, value: Any) -> str:
+    """The narrowest kind of column that holds what it held and ``value``."""
+    if value is None:
+        return kind or ""
+    own = {bool: "bool", int: "int", float: "float"}.get(type(value), "text")
+    if not kind or kind == own:
+        return own
+    return "float" if {kind, own} == {"int", "float"} else "text"
 
 
 def _cell(value: Any) -> Any:

@@ -37,10 +37,11 @@ class Section:
 
 
 def write_page(path: Path, plan: SweepPlan, table: pd.DataFrame) -> None:
-    """Write the page to ``path``, whole or not at all; ``table`` is ``results.csv``."""
+    """Write the page to ``path``, whole or not at all; ``table`` is ``results.csv``, or its main columns."""
     main = main_figures(table, plan)
     failed = table[table["status"] == "failed"]
-    sentences = failed.groupby("says", sort=False)["case"].agg(["size", "first"]).sort_values("size", ascending=False)
+    numbered = failed["says"].index.to_series().groupby(failed["says"], sort=False)
+    sentences = numbered.agg(["size", "first"]).sort_values("size", ascending=False)
     sections = [_section(plan, table, figure) for figure in main]
     done = f"{len(plan) - len(failed)} of {len(plan)} cases done" if len(failed) else f"All {len(plan)} cases done"
     done = "The one case is done" if len(plan) == 1 and not len(failed) else done
@@ -63,7 +64,7 @@ def write_page(path: Path, plan: SweepPlan, table: pd.DataFrame) -> None:
             "shares": [f"{100 * share:.0f} %" for share in QUANTILES],
             "failed": len(failed),
             "sentences": [
-                (str(says), int(row["size"]), _command(plan, table, str(row["first"])))
+                (str(says), int(row["size"]), command_of(plan, int(row["first"])))
                 for says, row in sentences.head(SENTENCES).iterrows()
             ],
             "sections": sections,
@@ -79,10 +80,6 @@ def _range_of(table: pd.DataFrame, key: str) -> str:
         return f"{plain(float(min(values)))} … {plain(float(max(values)))}"
     shown = ", ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in values[:6])
     return shown + (" …" if len(values) > 6 else "")
-
-
-def _command(plan: SweepPlan, table: pd.DataFrame, case: str) -> str:
-    return command_of(plan, int(table.index[table["case"] == case][0]))
 
 
 def _section(plan: SweepPlan, table: pd.DataFrame, figure: str) -> Section:

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smartshoe.errors import UsageError
-from smartshoe.files.atomic import replacing
 from smartshoe.runs.sweeps.case import computed
 from smartshoe.runs.sweeps.folder import SweepFolder, write_results
 from smartshoe.runs.sweeps.places import Compute
 from smartshoe.runs.sweeps.plan import SweepPlan, read_plan
 from smartshoe.runs.sweeps.queue import Progress, compute_all, place_of, shard_of
+from smartshoe.runs.sweeps.results import main_results, read_results, write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,11 +37,17 @@ class SweepResult:
 
     def table(self) -> pd.DataFrame:
         """``results.csv``: one row a case in the design's order; raises `UsageError` while cases are missing."""
-        import pandas as pd
+        return read_results(self._results)
 
+    def main_table(self) -> pd.DataFrame:
+        """Of `table` the varied keys, seed, main figures, status and sentence: less memory where cases are many."""
+        return main_results(self._results, self.plan)
+
+    @property
+    def _results(self) -> Path:
         if self.results is None:
             raise UsageError(f"{self.folder} still misses {self.missing} of {self.cases} cases: run the other shards")
-        return pd.read_csv(self.results, keep_default_na=False, na_values=[""])
+        return self.results
 
     def to_dict(self) -> dict[str, Any]:
         """The counts as a plain object, schema smartshoe.sweep_summary/1."""
@@ -115,11 +121,15 @@ def sweep_plan(
     folder = SweepFolder(out)
     folder.claim(plan)
     count = compute_all(plan, folder, mine, place_of(jobs, scheduler, len(mine)), compute, progress)
-    done = folder.done()
-    missing = sum(name not in done for name in set(plan.names()))
+    missing = _missing(plan, folder)
     if missing:
         return SweepResult(plan, out, len(plan), count, missing, None, None, None)
     return _concluded(plan, folder, count)
+
+
+def _missing(plan: SweepPlan, folder: SweepFolder) -> int:
+    done = folder.done()
+    return len({name for name in plan.names() if name not in done})
 
 
 def _concluded(plan: SweepPlan, folder: SweepFolder, count: int) -> SweepResult:
@@ -127,13 +137,13 @@ def _concluded(plan: SweepPlan, folder: SweepFolder, count: int) -> SweepResult:
     from smartshoe.runs.sweeps.page import write_page
 
     folder.claim(plan)  # of two sweeps that took the folder at the same moment, the first to end sees it here
-    results = write_results(plan, folder)
+    kinds = write_results(plan, folder)
+    results = folder.path / "results.csv"
     report = folder.path / "sweep.html"
     result = SweepResult(plan, folder.path, len(plan), count, 0, 0, results, report)
-    table = result.table()
     if importlib.util.find_spec("pyarrow") is not None:
-        with replacing(folder.path / "results.parquet") as temporary:
-            table.to_parquet(temporary, index=False)
+        write_parquet(results, kinds, folder.path / "results.parquet")
+    table = result.main_table()
     write_page(report, plan, table)
     failed = int((table["status"] == "failed").sum())
     return SweepResult(plan, folder.path, len(plan), count, 0, failed, results, report)

@@ -10,7 +10,7 @@ from smartshoe.runs.sweeps.running import SweepResult
 
 def print_sweep(result: SweepResult) -> None:
     """Counts, the main figures' medians and worst, what drives each, and where the files lie."""
-    found = result.table()
+    found = result.main_table()
     shown = table_of("figures over the cases", ["figure", "median", "5 %", "95 %"])
     figures = main_figures(found, result.plan)
     for figure in figures:

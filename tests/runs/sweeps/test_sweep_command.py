@@ -10,6 +10,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from small_sweeps import SMALL, empty, write_scenario
 
@@ -165,6 +166,43 @@ def test_a_sweep_grows_in_its_folder(tmp_path: Path) -> None:
     result = sweep_plan(grown, out, compute=empty)
     assert (result.cases, result.computed) == (6, 2)
     assert list(result.table()["unit.left_toe.bladder.k1"]) == [1.2, 1.2, 1.35, 1.35, 1.5, 1.5]
+
+
+def test_the_parquet_table_holds_what_the_cases_hold(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    figures = [
+        {"left_toe.k1": 1, "left_toe.verdict": "adequate", "left_toe.whole": True},
+        {"left_toe.k1": 0.1 + 0.2, "left_toe.verdict": "12", "left_toe.whole": None},
+        {},
+        {"left_toe.k1": 3, "left_toe.late": None},
+    ]
+    plan = read_plan(write_scenario(tmp_path))
+    of_case = {plan.name(number): own for number, own in enumerate(figures)}
+
+    def given(case: Case) -> str:
+        says = None if of_case[case.name] else 'refused: "so",\nand so'
+        status = "done" if of_case[case.name] else "failed"
+        return json.dumps({"status": status, "says": says, "figures": of_case[case.name]})
+
+    result = sweep_plan(plan, tmp_path / "out", compute=given)
+    found = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert list(found) == list(result.table())
+    for name in ("left_toe.k1", "left_toe.verdict", "left_toe.whole", "left_toe.late"):
+        assert [None if pd.isna(value) else value for value in found[name]] == [own.get(name) for own in figures]
+    assert list(found["seed"]) == [0, 1, 0, 1]
+    assert found["says"][2] == 'refused: "so",\nand so'
+    assert result.failed == 1
+
+
+def test_a_page_of_figures_that_nobody_named_tells_of_the_first_that_differs(tmp_path: Path) -> None:
+    def other(case: Case) -> str:
+        figures = {"left_toe.word": "so", "left_toe.same": 1.0, "left_toe.speed": float(case.seed), "left_toe.last": 2}
+        return json.dumps({"status": "done", "says": None, "figures": figures})
+
+    result = sweep_plan(read_plan(write_scenario(tmp_path)), tmp_path / "out", compute=other)
+    assert "left_toe.speed" in result.main_table()
+    assert "left_toe.last" not in result.main_table()
+    assert "left_toe.speed" in result.report.read_text(encoding="utf-8")
 
 
 def test_a_damaged_case_is_named(tmp_path: Path) -> None:
