@@ -153,7 +153,7 @@ def command(
 
             write_c3d(c3d_path, found)
             written["c3d"] = Path(c3d_path)
-    if emit_json(found.to_dict(), json_path):
+    if json_path is not None and emit_json(found.to_dict(), json_path):
         return
     from smartshoe.report.gait.terminal import print_gait
 

@@ -88,10 +88,9 @@ def whole_strides(total: TotalForce, strides: Sequence[Stride]) -> list[Stride]:
     """
     time_s = total.time_s
     gone = np.concatenate([[0.0], np.cumsum(total.missing)])
-    places = np.arange(gone.size)
 
     def lost(stride: Stride) -> float:
-        first, last = np.interp(np.searchsorted(time_s, [stride.start_s, stride.end_s]), places, gone)
+        first, last = gone[np.searchsorted(time_s, [stride.start_s, stride.end_s])]
         return float(last - first)
 
     step = (time_s[-1] - time_s[0]) / max(time_s.size - 1, 1)

@@ -26,14 +26,14 @@ def placed(foot: str, centre: Array) -> Array:
 
 def paths_of(found: GaitResult, foot: FootSeries) -> tuple[list[Array], Array]:
     """Each stance's path, and the mean one (`PATH_POINTS`, 2), at 2 to 98 % of stance."""
-    share = np.linspace(0.02, 0.98, PATH_POINTS)
-    paths = []
-    for stride in main_strides(found, foot.name):
-        at = stride.start_s + share * (stride.toe_off_s - stride.start_s)
-        known = np.isfinite(foot.centre[:, 0])
-        path = np.column_stack([np.interp(at, foot.time_s[known], foot.centre[known, way]) for way in range(2)])
-        paths.append(path)
-    return paths, np.mean(paths, axis=0) if paths else np.zeros((0, 2))
+    strides = main_strides(found, foot.name)
+    if not strides:
+        return [], np.zeros((0, 2))
+    start, end = (np.array([[getattr(stride, name)] for stride in strides]) for name in ("start_s", "toe_off_s"))
+    at = start + np.linspace(0.02, 0.98, PATH_POINTS) * (end - start)
+    known = np.isfinite(foot.centre[:, 0])
+    paths = np.stack([np.interp(at, foot.time_s[known], foot.centre[known, way]) for way in range(2)], axis=-1)
+    return list(paths), paths.mean(axis=0)
 
 
 def _points(points: Array) -> Array:

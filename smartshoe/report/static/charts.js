@@ -152,7 +152,7 @@
     const there = chart.of * (Math.min(max, u.whole[1]) - Math.max(min, u.whole[0])) / (u.whole[1] - u.whole[0]);
     const thin = figure.querySelector(".thin"), isThin = x.length < chart.of && seen < 0.9 * there && seen < u.bbox.width / devicePixelRatio / 2;
     thin.hidden = !isThin;
-    thin.textContent = isThin ? "Zoomed in beyond what the page keeps: extremes of each stretch, about one sample in " + Math.max(2, Math.round(there / seen)) + "." : "";
+    thin.textContent = isThin ? "Zoomed in beyond what the page keeps: straight pieces join the extremes of a stretch." : "";
   }
 
   function widthOf(plot) {
