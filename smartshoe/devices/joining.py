@@ -25,6 +25,7 @@ COPY_CLOSER = 0.5  # a copy of the load is closer to it than the reading is; ano
 ITERATIONS = 8
 LARGEST_MISFIT = 1.5
 LONGEST_BRIDGED_STEPS = 3.5
+Ticks = Literal["logger", "machine"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,11 +131,19 @@ def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array
     return Alignment(*at_corners, correlation, found.residual, True)
 
 
-def join(machine_log: Recording, logger_log: Recording, *, ticks: Literal["logger", "machine"] = "logger") -> Recording:
+def join(machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger") -> Recording:
+    """One recording of two logs, as `join_with_clocks` makes it."""
+    return join_with_clocks(machine_log, logger_log, ticks=ticks)[0]
+
+
+def join_with_clocks(
+    machine_log: Recording, logger_log: Recording, *, ticks: Ticks = "logger"
+) -> tuple[Recording, Alignment]:
     """One recording on the logger's clock, at the ``ticks`` of the one and with the channels of the other moved to it.
 
-    The slower one's ticks keep noise white: a signal that is read more often than it was sampled repeats its noise.
-    Raises `InputError` where the logs do not belong together.
+    Beside it how the two clocks lie; the recording's metadata has it too, for its file. The slower one's ticks keep
+    noise white: a signal that is read more often than it was sampled repeats its noise. Raises `InputError` where the
+    logs do not belong together.
     """
     load = machine_log.load
     candidates = [c for c in logger_log.channels.values() if c.role != "sensor"]
@@ -182,15 +191,16 @@ def join(machine_log: Recording, logger_log: Recording, *, ticks: Literal["logge
         f"joined with {machine_log.label} by {copy.name}: machine clock ahead by {found.delay_s:.4f} ±"
         f" {found.delay_sd_s:.4f} s, rate {1e6 * found.rate:.1f} ± {1e6 * found.rate_sd:.1f} ppm{caveat}"
     )
-    return Recording(
+    joined = Recording(
         time_s,
         channels,
         name=logger_log.name,
         unit=logger_log.unit or machine_log.unit,
-        metadata={**machine_log.metadata, **logger_log.metadata, **_said(found)},
+        metadata={**machine_log.metadata, **logger_log.metadata, **_as_metadata(found)},
         source=logger_log.source,
         notes=(*machine_log.notes, *logger_log.notes, note),
     )
+    return joined, found
 
 
 def _moved(channel: Channel, own_s: Array, to_s: Array) -> Channel:
@@ -205,7 +215,7 @@ def _moved(channel: Channel, own_s: Array, to_s: Array) -> Channel:
     return replace(made, range_=channel.range_)
 
 
-def _said(found: Alignment) -> dict[str, str]:
+def _as_metadata(found: Alignment) -> dict[str, str]:
     numbers = {"delay_s": found.delay_s, "delay_sd_s": found.delay_sd_s, "rate": found.rate, "rate_sd": found.rate_sd}
     return {f"join_{name}": repr(value) for name, value in numbers.items()}
 

@@ -213,12 +213,14 @@ def _session(
     load = as_sampled(load, scale.share(reading), step_s)
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)
+    beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
     conditions = Conditions(
         time_s[::factor],
         smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, raw_noise), weights, factor),
         step_s * factor,
         noise * float(np.sqrt(np.sum(weights**2))),
-        **{name: smoothed(values, weights, factor) for name, values in extra.items()},
+        temperature_k=beside.get("temperature_k"),
+        neighbour=beside.get("neighbour"),
         before=before,
     )
     measured = drawn = None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array
 from smartshoe.models.core import USUAL_WALL_RATIO, Core
@@ -32,7 +33,7 @@ class Part:
 
     @property
     def name(self) -> str:
-        """The effect's."""
+        """The name of the effect."""
         return self.effect.name
 
 
@@ -77,8 +78,9 @@ class ExtendedModel:
         gain, share, rate = (float(value) for value in theta[: len(BASELINE)])
         return replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
 
-    def with_part(self, added: Effect, values: Array | None = None) -> ExtendedModel:
-        """This model with one more effect, at null where ``values`` are not given."""
+    def with_part(self, added: Effect | str, values: ArrayLike | None = None) -> ExtendedModel:
+        """This model with one more effect, itself or its name, at null where ``values`` are not given."""
+        added = effect(added) if isinstance(added, str) else added
         part = Part(added, added.start() if values is None else np.array(values, dtype=float))
         return replace(self, parts=(*self.parts, part))
 
@@ -114,14 +116,22 @@ class ExtendedModel:
 
         return (*sorted(before, key=order), None, *sorted(after, key=order))
 
-    def _run(self, signal: Array, conditions: Conditions, first: int = 0, kept: list[Array] | None = None) -> Array:
+    def _run(
+        self,
+        signal: Array,
+        conditions: Conditions,
+        first: int = 0,
+        kept: list[Array] | None = None,
+        core: Core | None = None,
+    ) -> Array:
+        """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
         # Blocks that bend a spring beside the relaxing arm solve the balance of both.
-        conditions.kept["relaxing"] = np.array([self.relaxing_share, self.relaxation_rate_per_s])
+        conditions = conditions.within(self.relaxing_share, self.relaxation_rate_per_s)
         for part in self.chain[first:]:
             if kept is not None:
                 kept.append(signal)
             if part is None:
-                signal = self.core.simulate(signal, conditions.step_s)
+                signal = (core or self.core).simulate(signal, conditions.step_s)
             else:
                 signal = part.effect.apply(signal, conditions, part.values)
         return self.gain * signal
@@ -152,8 +162,8 @@ class ExtendedModel:
         return self.core.deformation(load, conditions.step_s)
 
     @cached_property
-    def _varied(self) -> tuple[tuple[float, ExtendedModel, int], ...]:
-        """For each parameter but the gain: its step, the model with it taken, the first block that it moves."""
+    def _varied(self) -> Extensions:
+        """For each parameter but the gain."""
         theta, made = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
         core = self.chain.index(None)
@@ -165,9 +175,8 @@ class ExtendedModel:
             moved[j] += step
             first = place_of.get(owner, core) if owner != "baseline" else 0
             trial = self.at(moved)
-            if first != core and owner != "baseline":
-                trial.__dict__["core"] = self.core  # not touched by this parameter
-            made.append((step, trial, first))
+            alike = first != core and owner != "baseline"  # this parameter does not touch the core
+            made.append(Extension(step, trial, first, self.core if alike else None))
         return tuple(made)
 
     def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:
@@ -179,8 +188,8 @@ class ExtendedModel:
         reading = self._run(conditions.load, conditions, 0, kept)
         out = np.empty((reading.size, 1 + len(self._varied)), order="F")
         out[:, 0] = reading / self.gain
-        for j, (step, trial, first) in enumerate(self._varied, start=1):
-            out[:, j] = (trial._run(kept[first], conditions, first) - reading) / step
+        for j, by in enumerate(self._varied, start=1):
+            out[:, j] = by.slope(reading, kept, conditions)
         return reading, out
 
     def trace(self, conditions: Conditions) -> tuple[Array, list[Array]]:
@@ -198,19 +207,18 @@ class ExtendedModel:
             step = derivative_step(parameter, start[j])
             moved = start.copy()
             moved[j] += step
-            trial = self.with_part(added, moved)
-            if not isinstance(added, CoreEffect):
-                trial.__dict__["core"] = self.core
+            trial, in_core = self.with_part(added, moved), isinstance(added, CoreEffect)
             names = [None if part is None else part.name for part in trial.chain]
-            made.append((step, trial, names.index(None if isinstance(added, CoreEffect) else added.name)))
+            first = names.index(None if in_core else added.name)
+            made.append(Extension(step, trial, first, None if in_core else self.core))
         return tuple(made)
 
     def column_of(self, by: Extensions, conditions: Conditions, trace: tuple[Array, list[Array]]) -> Array:
         """Derivatives (n, k) of the reading with respect to the k strengths of ``by``; ``trace`` is the model's own."""
         reading, kept = trace
         out = np.empty((reading.size, len(by)), order="F")
-        for column, (step, trial, first) in enumerate(by):
-            out[:, column] = (trial._run(kept[first], conditions, first) - reading) / step
+        for column, one in enumerate(by):
+            out[:, column] = one.slope(reading, kept, conditions)
         return out
 
     # -- to and from a file ---------------------------------------------------------------------------------------
@@ -250,4 +258,19 @@ def derivative_step(parameter: EffectParameter, value: float) -> float:
     return -step if value + step > parameter.upper else step
 
 
-Extensions = tuple[tuple[float, ExtendedModel, int], ...]
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A model with one parameter moved by ``step``: the ``first`` block that it moves, the ``core`` where it stays."""
+
+    step: float
+    model: ExtendedModel
+    first: int
+    core: Core | None
+
+    def slope(self, reading: Array, kept: Sequence[Array], conditions: Conditions) -> Array:
+        """The reading's derivative (n,), ``kept`` being what goes into each block of the model that did not move."""
+        moved = self.model._run(kept[self.first], conditions, self.first, core=self.core)
+        return (moved - reading) / self.step
+
+
+Extensions = tuple[Extension, ...]

@@ -95,7 +95,6 @@ def loading() -> Conditions:
 
 def simulated(model: ExtendedModel) -> Array:
     """The model's reading (n,); springs that bend in the loop know the arm beside them."""
-    loading().kept["relaxing"] = np.array([model.relaxing_share, model.relaxation_rate_per_s])
     return model.simulate(loading())
 
 

@@ -148,12 +148,10 @@ def test_every_corner_of_the_bounds_gives_finite_numbers(name: str) -> None:
     made = effect(name)
     for given_ in (conditions(corners(3)), conditions(corners(3), noise=0.002)):
         for values in product(*[(one.lower, one.upper) for one in made.parameters]):
-            for relaxing in (None, np.array([0.3, 0.5])):
+            for within in (given_, given_.within(0.3, 0.5)):
                 given_.kept.clear()
-                if relaxing is not None:
-                    given_.kept["relaxing"] = relaxing
                 with np.errstate(all="raise", under="ignore"):
-                    out = made.apply(given_.load, given_, np.array(values))
+                    out = made.apply(given_.load, within, np.array(values))
                 assert np.all(np.isfinite(out))
                 assert np.max(np.abs(out)) <= 2.0
 
@@ -267,9 +265,8 @@ def test_a_spring_that_bends_in_the_loop_keeps_the_balance(
 ) -> None:
     # f = phi(u) + kappa (u - q), phi(u) the load of the bent spring alone: what the block's inverse gives. The core
     # takes the load for straight lines and the block the deformation: rates above 5/s would show the difference.
-    made, given_ = effect(name), conditions(corners(seed))
+    made, given_ = effect(name), conditions(corners(seed)).within(share, rate_per_s)
     values = drawn(made, seed)
-    given_.kept["relaxing"] = np.array([share, rate_per_s])
     core = Core([Arm(share, rate_per_s)])
     inverse = made.inverse(values, STEP_S)
     assert inverse is not None

@@ -16,14 +16,14 @@ def shared(static: Callable[[Array], Array], load: Array, conditions: Conditions
     """How the spring that bends and the arm that relaxes share a load (n,): (n,) each.
 
     Balance: f = phi(u) + kappa (u - q), q' = a (u - q), phi the inverse of ``static``. A block hands the linear core
-    u + kappa (u - q), which it turns into u. kappa and a are ``conditions.kept["relaxing"]``; without them the arm has
+    u + kappa (u - q), which it turns into u. kappa and a are ``conditions.relaxing``; without them the arm has
     nothing. Each round is the linear network's answer to what is off, which shrinks by kappa |1 - static'|/(1 + kappa);
     the paper's units have kappa of 0.03 to 0.06.
     """
-    relaxing = conditions.kept.get("relaxing")
+    relaxing = conditions.relaxing
     if relaxing is None:
         return load, np.zeros(load.size)
-    share, slow = float(relaxing[0]), float(relaxing[1]) / (1.0 + float(relaxing[0]))
+    share, slow = relaxing[0], relaxing[1] / (1.0 + relaxing[0])
     deformation = _yielding(static(load), share, slow, conditions)
     for _ in range(ROUNDS):
         off = static(load - relaxed(deformation, conditions)) - deformation
@@ -36,10 +36,10 @@ def relaxed(deformation: Array, conditions: Conditions) -> Array:
     """Load (n,) of the arm that relaxes, kappa (u - q), under a deformation (n,) in straight lines."""
     from smartshoe.models.first_order import lag
 
-    relaxing = conditions.kept.get("relaxing")
+    relaxing = conditions.relaxing
     if relaxing is None:
         return np.zeros(deformation.size)
-    force: Array = float(relaxing[0]) * (deformation - lag(deformation, float(relaxing[1]), float(conditions.step_s)))
+    force: Array = relaxing[0] * (deformation - lag(deformation, relaxing[1], float(conditions.step_s)))
     return force
 
 

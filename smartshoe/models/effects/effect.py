@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -60,6 +59,7 @@ class Conditions:
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
     load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
     ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
+    ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, None outside a model.
     """
 
     time_s: Array
@@ -69,19 +69,22 @@ class Conditions:
     temperature_k: Array | None = None
     neighbour: Array | None = None
     before: Mapping[str, float] = field(default_factory=dict)
+    relaxing: tuple[float, float] | None = None
+    kept: dict[str, Array] = field(default_factory=dict, repr=False)
+    """What blocks derive from the load alone (largest so far, cycles done), by name."""
 
-    @cached_property
+    def within(self, share: float, rate_per_s: float) -> Conditions:
+        """The same conditions, and what was derived from them, within a model whose arm relaxes so."""
+        return replace(self, relaxing=(share, rate_per_s))
+
+    @property
     def rate_per_s(self) -> Array:
         """(n,) the load's slope in full scales a second, central differences."""
-        return np.gradient(self.load, self.step_s) if self.load.size > 1 else np.zeros(self.load.size)
-
-    @cached_property
-    def kept(self) -> dict[str, Array]:
-        """A place for what blocks derive from the load alone (largest so far, cycles done), by name.
-
-        "relaxing" holds the baseline's share and rate of the run that is under way.
-        """
-        return {}
+        found = self.kept.get("rate_per_s")
+        if found is None:
+            found = np.gradient(self.load, self.step_s) if self.load.size > 1 else np.zeros(self.load.size)
+            self.kept["rate_per_s"] = found
+        return found
 
 
 class Inverse(ABC):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.validation import Validation, validate
-from smartshoe.devices.joining import join
+from smartshoe.devices.joining import Alignment, join_with_clocks
 from smartshoe.errors import InputError, NotIdentifiableError, SmartShoeError
 from smartshoe.identification import Identification, identify
 from smartshoe.recording import Recording
@@ -30,11 +30,15 @@ def _silent(_: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class SessionResult:
-    """What came out of a session; ``recordings`` are load and reading on one time base, by experiment."""
+    """What came out of a session.
+
+    By experiment ``recordings`` are load and reading on one time base, ``clocks`` how the machine's and the shoe's lay.
+    """
 
     plan: SessionPlan
     attempts: tuple[Attempt, ...]
     recordings: dict[str, Recording]
+    clocks: dict[str, Alignment]
     identification: Identification
     calibration: Calibration
     validation: Validation
@@ -70,22 +74,21 @@ class SessionResult:
             "calibration": self.calibration.to_dict(),
         }
 
-    @staticmethod
-    def _experiment(name: str, recording: Recording) -> dict[str, Any]:
-        said = {key: float(recording.metadata[f"join_{key}"]) for key in ("delay_s", "delay_sd_s", "rate", "rate_sd")}
+    def _experiment(self, name: str, recording: Recording) -> dict[str, Any]:
+        clocks = self.clocks[name]
         return {
             "name": name,
             "samples": len(recording),
             "duration_s": recording.duration_s,
             "join": {
-                "delay_s": {"value": said["delay_s"], "sd": said["delay_sd_s"]},
-                "rate_ppm": {"value": 1e6 * said["rate"], "sd": 1e6 * said["rate_sd"]},
+                "delay_s": {"value": clocks.delay_s, "sd": clocks.delay_sd_s},
+                "rate_ppm": {"value": 1e6 * clocks.rate, "sd": 1e6 * clocks.rate_sd},
             },
         }
 
 
-def joined(plan: SessionPlan, attempt: Attempt, *, to_fit: bool = False) -> Recording:
-    """Load and the unit's reading at the shoe's samples; raises `InputError` where the two do not match.
+def joined(plan: SessionPlan, attempt: Attempt, *, to_fit: bool = False) -> tuple[Recording, Alignment]:
+    """Load and the unit's reading at the shoe's samples, and the clocks; raises `InputError` where they do not match.
 
     ``to_fit``: at the samples of whichever is slower, so that noise stays white and error bars hold.
     """
@@ -94,9 +97,9 @@ def joined(plan: SessionPlan, attempt: Attempt, *, to_fit: bool = False) -> Reco
     own = replace(stream.without(*others), unit=plan.unit)
     load = attempt.load()
     coarser = to_fit and load.sample_rate_hz < SLOWER * own.sample_rate_hz
-    found = join(load, own, ticks="machine" if coarser else "logger")
+    found, clocks = join_with_clocks(load, own, ticks="machine" if coarser else "logger")
     source = f"{attempt.experiment}, attempt {attempt.number}"
-    return replace(found, name=attempt.experiment, unit=plan.unit, source=source)
+    return replace(found, name=attempt.experiment, unit=plan.unit, source=source), clocks
 
 
 def analyse(folder: SessionFolder, progress: Progress = _silent) -> SessionResult:
@@ -115,10 +118,11 @@ def analyse(folder: SessionFolder, progress: Progress = _silent) -> SessionResul
         )
     try:
         progress("joining the shoe's stream and the machine's log")
-        recordings = {p.name: joined(plan, accepted[p.name]) for p in plan.protocols}
+        both = {p.name: joined(plan, accepted[p.name]) for p in plan.protocols}
+        recordings = {name: recording for name, (recording, _) in both.items()}
         several = list(recordings.values())
         progress("identifying")
-        found, without_a_rate = _identified([joined(plan, accepted[p.name], to_fit=True) for p in plan.protocols])
+        found, without_a_rate = _identified([joined(plan, accepted[p.name], to_fit=True)[0] for p in plan.protocols])
         calibration = replace(
             found.calibration(created=plan.created),
             serial_number=plan.serial_number,
@@ -134,7 +138,18 @@ def analyse(folder: SessionFolder, progress: Progress = _silent) -> SessionResul
     except SmartShoeError as error:
         error.args = (f"{folder.path}: {error}",)
         raise
-    return SessionResult(plan, tuple(attempts), recordings, found, calibration, validation, diagnosis, without_a_rate)
+    clocks = {name: found_clocks for name, (_, found_clocks) in both.items()}
+    return SessionResult(
+        plan=plan,
+        attempts=tuple(attempts),
+        recordings=recordings,
+        clocks=clocks,
+        identification=found,
+        calibration=calibration,
+        validation=validation,
+        diagnosis=diagnosis,
+        without_a_rate=without_a_rate,
+    )
 
 
 def _identified(recordings: list[Recording]) -> tuple[Identification, LeaveOneRateOut | None]:

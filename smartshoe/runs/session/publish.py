@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from smartshoe.calibration.provenance import calibrated_on
 from smartshoe.files.atomic import json_text, make_folder, write_text
 from smartshoe.files.logs import write
-from smartshoe.recording import Recording
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.runs.session.analysis import SessionResult
 from smartshoe.runs.session.checks import AT_THE_END
@@ -17,6 +16,7 @@ from smartshoe.version import __version__
 
 if TYPE_CHECKING:
     from smartshoe.calibration.store.entry import Entry
+    from smartshoe.devices.joining import Alignment
 
 
 def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
@@ -75,7 +75,7 @@ def _write_page(result: SessionResult, folder: Path, unit: UnitReport, entry: En
     plan = result.plan
     about = (
         f"Pressed by {', '.join(result.recordings)}. Load and reading were put on one time base by the load itself"
-        f" ({'; '.join(_clocks(name, recording) for name, recording in result.recordings.items())})."
+        f" ({'; '.join(_clocks_text(name, clocks) for name, clocks in result.clocks.items())})."
     )
     facts = {"shoe": plan.shoe, "machine": plan.machine, "serial number": plan.serial_number or "not given",
              "date": plan.created, "smartshoe": __version__}  # fmt: skip
@@ -96,7 +96,7 @@ def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
     rows.append(
         ("faults that each attempt is searched for", "; ".join(f"{one[0].lower()}{one[1:]}" for one in looked_for))
     )
-    rows += [("clocks", _clocks(name, recording)) for name, recording in result.recordings.items()]
+    rows += [("clocks", _clocks_text(name, clocks)) for name, clocks in result.clocks.items()]
     if entry is None:
         return [*rows, ("stored", "only in this folder: with --serial-number it goes into the store")]
     until = "no expiry was set: --valid-for-days sets one"
@@ -105,11 +105,10 @@ def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
     return [*rows, ("stored", f"{entry.path}"), ("valid", until)]
 
 
-def _clocks(name: str, recording: Recording) -> str:
-    said = {key: float(recording.metadata[f"join_{key}"]) for key in ("delay_s", "delay_sd_s", "rate", "rate_sd")}
+def _clocks_text(name: str, clocks: Alignment) -> str:
     return (
-        f"{name}: machine's clock ahead of the shoe's by {said['delay_s']:.4f} ± {said['delay_sd_s']:.4f} s,"
-        f" {1e6 * said['rate']:.1f} ± {1e6 * said['rate_sd']:.1f} ppm fast"
+        f"{name}: machine's clock ahead of the shoe's by {clocks.delay_s:.4f} ± {clocks.delay_sd_s:.4f} s,"
+        f" {1e6 * clocks.rate:.1f} ± {1e6 * clocks.rate_sd:.1f} ppm fast"
     )
 
 
