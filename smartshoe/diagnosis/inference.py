@@ -25,6 +25,7 @@ from smartshoe.diagnosis.session import CYCLE_SHARE, Session
 from smartshoe.diagnosis.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.effects.effect import CoreEffect
+from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.loading import turning_points
 
@@ -103,7 +104,10 @@ def infer(
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         again = _settled(_with_another_pole(state, sessions, thresholds), sessions, thresholds, progress)
-        state = _simpler(state, again, Likelihood(sessions, state.evidence.noise_sd, plain.model, thresholds))
+        state = _simpler(state, again, sessions)
+    if state.fit.model.relaxing_share < 0.0:
+        again = _settled(_with_an_arm_that_creeps(state, sessions, thresholds), sessions, thresholds, progress)
+        state = _simpler(state, again, sessions)
     state = _with_laws(state, sessions, thresholds)
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     refused: list[str] = []
@@ -160,24 +164,28 @@ class _State:
         return tuple(self.given.candidates[m] for m in self.best.members)
 
     def total(self, likelihood: Likelihood) -> float:
-        """-2 log likelihood of the fit, and of the odds against its members."""
-        return likelihood.cost(self.fit.model) + self.evidence.odds * len(self.fit.model.parts)
+        """-2 log likelihood of the fit, and of the odds against its effects."""
+        return likelihood.cost(self.fit.model) + self.evidence.odds * _effects(self.fit.model)
 
 
-def _simpler(first: _State, second: _State, likelihood: Likelihood) -> _State:
+def _simpler(first: _State, second: _State, sessions: Sequence[Session]) -> _State:
     """The likelier of two, odds against their members counted; that with fewer where they hardly read differently.
 
     What is immaterial counts for nothing, however sure it is: an arm that imitates a lag of a millisecond needs another
     one in its own place.
     """
     thresholds = first.given.thresholds
+    likelihood = Likelihood(sessions, first.evidence.noise_sd, first.fit.model, thresholds)
     if apart(likelihood.sessions, first.fit.model, second.fit.model) < thresholds.alike * thresholds.material:
-        return min(first, second, key=lambda one: (len(one.fit.model.parts), one.total(likelihood)))
+        return min(first, second, key=lambda one: (_effects(one.fit.model), one.total(likelihood)))
     return min(first, second, key=lambda one: one.total(likelihood))
 
 
 def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> _State:
-    """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back."""
+    """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
+
+    In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one.
+    """
     seen: set[tuple[str, ...]] = set()
     for _ in range(ROUNDS):
         chosen = tuple(sorted(one.name for one in state.chosen))
@@ -191,6 +199,10 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
         state = _State(*_searched(found.model, sessions, thresholds), found)
+    for name, arm in _arms(state.fit.model):
+        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+        found = fit(likelihood, _with_arm(state.fit.model.without(name), arm))
+        state = _simpler(state, _State(*_searched(found.model, sessions, thresholds), found), sessions)
     return state
 
 
@@ -210,6 +222,11 @@ def _promising(state: _State) -> list[Posterior]:
     ]
     tried = {*additions(state.evidence, start, RIVALS), *flexible}
     return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
+
+
+def _effects(model: ExtendedModel) -> int:
+    """How many effects a model has: its parts, and an arm of the baseline's that falls where a wall's creeps."""
+    return len(model.parts) + (model.relaxing_share < 0.0)
 
 
 def _strengths(model: ExtendedModel) -> int:
@@ -264,6 +281,36 @@ def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: T
     starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in thresholds.memory_s]
     best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
     return _State(*_searched(best.model, sessions, thresholds), best)
+
+
+def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresholds: Thresholds) -> _State:
+    """The best of fits from a baseline that creeps under load, where that of ``state`` falls.
+
+    Which of two exponentials is the baseline's is a convention: of a wall it is the one that creeps under load, and
+    what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls.
+    """
+    bare = state.fit.model
+    for part in bare.parts:
+        if isinstance(part.effect, CoreEffect):
+            bare = bare.without(part.name)
+    arms = [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in thresholds.memory_s]
+    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    found = []
+    for start in (_with_arm(bare, arm) for arm in [*arms, *(arm for _, arm in _arms(state.fit.model))]):
+        given, _, best = _searched(start, sessions, thresholds)
+        found.append(fit(likelihood, _with(given, best, start), FEW_STEPS))
+    nearest = min(found, key=lambda one: one.cost + state.evidence.odds * _effects(one.model))
+    return _State(*_searched(nearest.model, sessions, thresholds), nearest)
+
+
+def _arms(model: ExtendedModel) -> list[tuple[str, Arm]]:
+    """The arms that creep under load, one each, of a model's effects, by name."""
+    made = [(part.name, part.effect.elements(part.values)) for part in model.parts if isinstance(part.effect, CoreEffect)]
+    return [(name, arm) for name, (arm, *more) in made if not more and isinstance(arm, Arm) and arm.share > 0.0]
+
+
+def _with_arm(model: ExtendedModel, arm: Arm) -> ExtendedModel:
+    return replace(model, relaxing_share=arm.share, relaxation_rate_per_s=arm.rate_per_s)
 
 
 def independent(sessions: Sequence[Session]) -> int:
