@@ -50,9 +50,10 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
 
 
 def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
-    """(m, 2) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
+    """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
-    Nothing has happened to the unit yet, so that the reading is its zero whatever its model.
+    Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
+    by then, which is taken out: the third column is how much that is.
     """
     found = []
     for session in sessions:
@@ -69,9 +70,19 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
         first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
         kept = session.fitted[first]
         if kept.sum() * session.conditions.step_s >= FIRST_REST_S:
-            reading = session.reading[first][kept] / model.gain
-            found.append((float(np.mean(load[first][kept])), float(np.mean(reading))))
-    return np.array(found).reshape(-1, 2)
+            drifted = float(np.mean(_drifted(session, model)[first][kept]))
+            reading = float(np.mean(session.reading[first][kept])) - drifted
+            found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
+    return np.array(found).reshape(-1, 3)
+
+
+def _drifted(session: Session, model: ExtendedModel) -> Array:
+    """(n,) by how much the model's effects that move the reading at rest have moved it."""
+    still = model
+    for part in model.parts:
+        if part.effect.is_seen_at_rest:
+            still = still.without(part.name)
+    return model.simulate(session.conditions) - still.simulate(session.conditions)
 
 
 def zeros_of(
@@ -92,9 +103,10 @@ def zeros_of(
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size:
         return _unseen(sessions, model, left, remembered, sensor, machine, thresholds)
-    loads, readings = rests.T
+    loads, readings, drifted = rests.T
     sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
+    reading_sd = float(np.hypot(reading_sd, thresholds.departure * np.mean(np.abs(drifted))))
     load, reading = float(np.mean(loads)), float(np.mean(readings))
     many = thresholds.zero_deviations
     if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
@@ -123,10 +135,11 @@ def _unseen(
     begun = float(np.mean([abs(one.conditions.load[0]) for one in fitted]))
     lowest = min(float(np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01)) for one in fitted)
     scatter = float(np.std(found, ddof=1) / np.sqrt(found.size)) if found.size > 1 else 0.0
-    # What the unit remembers of an unknown past, beyond what its one arm does; and the curve below the lowest load.
+    # What the unit remembers of an unknown past, beyond what its one arm does; the curve below the lowest load; drifts.
     past = begun * (thresholds.departure * abs(model.relaxing_share) + remembered)
     below = thresholds.departure * lowest
-    sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below]))
+    drifted = thresholds.departure * float(np.mean([np.ptp(_drifted(one, model)) for one in fitted]))
+    sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
     if abs(mean) > thresholds.foreign_zero or abs(mean) < thresholds.zero_deviations * sd:
         return ()
     return (Zero(sensor, mean, sd, abs(mean), (machine.name,)),)
