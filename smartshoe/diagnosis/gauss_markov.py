@@ -11,11 +11,13 @@ Morris 1976), and what it leaves when it predicts the next sample, the innovatio
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
+from scipy.special import ndtri
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis.session import Session
@@ -27,8 +29,6 @@ MEMORIES_S = np.geomspace(0.5 * BLOCK_S, SLOWEST_S, 18)
 MOVING_AVERAGES = np.linspace(-0.98, 0.5, 38)
 SETTLED = 5  # blocks
 FEWEST = 300  # blocks: below, the tests tell little
-WHITE = 1.95  # Kolmogorov's statistic at a chance of 1 in 1000
-DEVIATIONS = 4.0  # of the other tests, normal each: 1 in 16,000
 JUMPS = 10.0  # the same: far more than a model's small errors at corners bring about
 TWO_LEVELS = -1.0  # excess kurtosis: of two levels that lie three standard deviations of the noise apart
 CUT = 9.0  # squares of innovations, in variances: so that one jump is no trend with load
@@ -41,6 +41,7 @@ class GaussMarkov:
     ``coloured`` (Kolmogorov's statistic of the innovations' spectrum), ``surprises`` (their kurtosis beyond a normal
     deviate's) and ``follows`` (correlation of their squares with load or its rate, the larger), both in deviations.
     ``flatness`` is the excess kurtosis of the blocks themselves: 0 of noise, -1.5 of a sine, -2 of two levels.
+    ``false_alarm``: chance at which noise fails one of the tests.
     """
 
     rms: float
@@ -49,19 +50,28 @@ class GaussMarkov:
     surprises: float
     follows: float
     flatness: float
+    false_alarm: float
 
     @property
     def is_noise(self) -> bool:
         """Whether nothing speaks against noise."""
-        told = self.tau_s < SLOWEST_S and self.coloured < WHITE
-        return told and max(abs(self.surprises), self.follows) < DEVIATIONS
+        return self._is_white and self.tau_s < SLOWEST_S and max(abs(self.surprises), self.follows) < self._deviations
 
     @property
     def switches(self) -> bool:
         """Whether it stays at one of two levels, leaves it at once, and does so under any load."""
         # A level that switches at random has the spectrum of first-order noise.
-        random = self.coloured < WHITE and self.follows < DEVIATIONS
+        random = self._is_white and self.follows < self._deviations
         return random and self.surprises > JUMPS and self.flatness < TWO_LEVELS
+
+    @property
+    def _is_white(self) -> bool:
+        """By the tail of Kolmogorov's distribution."""
+        return self.coloured < math.sqrt(-0.5 * math.log(0.5 * self.false_alarm))
+
+    @property
+    def _deviations(self) -> float:
+        return -float(ndtri(0.5 * self.false_alarm))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +88,7 @@ class _Blocks:
     step_s: float
 
 
-def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> GaussMarkov | None:
+def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array], false_alarm: float) -> GaussMarkov | None:
     """What the slow part of ``residuals``, (n,) a session, is made of; None where there is too little to tell."""
     blocks = [_blocks(session, residual) for session, residual in zip(sessions, residuals, strict=True)]
     blocks = [one for one in blocks if one.good.any()]
@@ -107,7 +117,8 @@ def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array]) -> 
     follows = max(abs(_correlation(one, size)) for one in drive) * np.sqrt(count)
     level = np.concatenate([one.residual[one.good] for one in blocks])
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
-    return GaussMarkov(float(np.sqrt(remembered)), tau_s, coloured, float(kurtosis), float(follows), flatness)
+    tests = coloured, float(kurtosis), float(follows)
+    return GaussMarkov(float(np.sqrt(remembered)), tau_s, *tests, flatness, false_alarm)
 
 
 def _blocks(session: Session, residual: Array) -> _Blocks:

@@ -305,7 +305,9 @@ def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresho
 
 def _arms(model: ExtendedModel) -> list[tuple[str, Arm]]:
     """The arms that creep under load, one each, of a model's effects, by name."""
-    made = [(part.name, part.effect.elements(part.values)) for part in model.parts if isinstance(part.effect, CoreEffect)]
+    made = [
+        (part.name, part.effect.elements(part.values)) for part in model.parts if isinstance(part.effect, CoreEffect)
+    ]
     return [(name, arm) for name, (arm, *more) in made if not more and isinstance(arm, Arm) and arm.share > 0.0]
 
 

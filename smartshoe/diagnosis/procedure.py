@@ -163,8 +163,9 @@ def _diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     extended = found.fit.model
-    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions])
-    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions])
+    alarm = thresholds.false_alarm
+    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], alarm)
+    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions], alarm)
     left = after.rms if after.significant else 0.0
     everything = max(left, after.size)
     silent = given.is_no_unit or not found.can_validate
@@ -182,7 +183,7 @@ def _diagnosed(
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
-    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material)
+    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, after.memory)
     named = {cause.name for cause in causes}
     parameters, covariance = joint_parameters(found.fit, scale)
     force = force_rmse_n(fine, extended)

@@ -60,9 +60,11 @@ class ResidualStructure:
         return found if self.memory is None else [*found, min(self.memory.rms, self.size)]
 
 
-def residual_structure(sessions: Sequence[Session], residuals: Sequence[Array]) -> ResidualStructure:
-    """Both tests of the residuals, and the place of the largest part."""
-    memory = gauss_markov_of(sessions, residuals)
+def residual_structure(
+    sessions: Sequence[Session], residuals: Sequence[Array], false_alarm: float
+) -> ResidualStructure:
+    """Both tests of the residuals, and the place of the largest part; ``false_alarm`` of the tests for noise."""
+    memory = gauss_markov_of(sessions, residuals, false_alarm)
     says = where(sessions, residuals)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"

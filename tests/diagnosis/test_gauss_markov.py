@@ -13,8 +13,10 @@ from smartshoe.diagnosis.gauss_markov import gauss_markov_of
 from smartshoe.diagnosis.jittered import as_sampled, jitter_s
 from smartshoe.diagnosis.residual_structure import residual_structure
 from smartshoe.diagnosis.session import Session
+from smartshoe.diagnosis.thresholds import Thresholds
 
 NOISE = 0.001
+ALARM = Thresholds().false_alarm
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +40,11 @@ def noises(sessions: list[Session], seed: int, tau_s: float = 0.0, rms: float = 
 @given(st.integers(0, 999), st.floats(0.3, 2.0), st.floats(0.003, 0.05))
 def test_first_order_noise_is_noise_however_strong(sessions, seed, tau_s, rms):
     residuals = noises(sessions, seed, tau_s, rms)
-    found = gauss_markov_of(sessions, residuals)
+    found = gauss_markov_of(sessions, residuals, ALARM)
     assert found is not None
     assert found.is_noise
     assert found.rms == pytest.approx(rms, rel=0.4)
-    assert not residual_structure(sessions, residuals).significant
+    assert not residual_structure(sessions, residuals, ALARM).significant
 
 
 def switching(session: Session, rng: np.random.Generator) -> np.ndarray:
@@ -62,7 +64,7 @@ def seated(session: Session, rng: np.random.Generator) -> np.ndarray:
 def test_an_unknown_effect_is_no_noise(sessions, unknown):
     rng = np.random.default_rng(4)
     residuals = [noise + 0.01 * unknown(one, rng) for noise, one in zip(noises(sessions, 4), sessions, strict=True)]
-    found, left = gauss_markov_of(sessions, residuals), residual_structure(sessions, residuals)
+    found, left = gauss_markov_of(sessions, residuals, ALARM), residual_structure(sessions, residuals, ALARM)
     assert found is not None
     assert not found.is_noise
     assert left.significant
@@ -72,8 +74,8 @@ def test_an_unknown_effect_is_no_noise(sessions, unknown):
 
 
 def test_too_little_tells_nothing(sessions):
-    assert gauss_markov_of([], []) is None
-    assert gauss_markov_of(sessions, [np.zeros(one.reading.size) for one in sessions]) is None
+    assert gauss_markov_of([], [], ALARM) is None
+    assert gauss_markov_of(sessions, [np.zeros(one.reading.size) for one in sessions], ALARM) is None
 
 
 # -- jitter ------------------------------------------------------------------------------------------------------------
