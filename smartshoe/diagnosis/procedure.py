@@ -313,7 +313,8 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
             Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")
         )
     values = parameters_of(found.fit, member.name, given.scale)
-    return Cause(name.effect, name.confidence, name.equivalents, values, tuple(evidence), won, member.size, rivals)
+    sure = name.confidence, name.kind
+    return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals)
 
 
 def _held_out_evidence(size: float, won: Gain) -> list[Statement]:
@@ -353,9 +354,8 @@ def _zero_cause(
         f"it is {deviations:.3g} standard deviations from nothing",
     )
     sure = 1.0 / (1.0 + len(zero.alternatives)) if zero.alternatives else thresholds.seen_confidence
-    return Cause(
-        zero.effect, sure, zero.alternatives, values, (seen, *_held_out_evidence(zero.size, won)), won, zero.size
-    )
+    evidence = (seen, *_held_out_evidence(zero.size, won))
+    return Cause(zero.effect, sure, sure, zero.alternatives, values, evidence, won, zero.size)
 
 
 def _with_offset(

@@ -56,10 +56,15 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale."""
+    """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale.
+
+    ``confidence`` that it is this very effect, one half in a dead heat of two laws; ``kind_confidence`` that it is one
+    of its family.
+    """
 
     effect: Effect
     confidence: float
+    kind_confidence: float
     equivalents: tuple[str, ...]
     parameters: dict[str, Parameter]
     evidence: tuple[Statement, ...]
@@ -79,6 +84,7 @@ class Cause:
             "family": self.effect.family,
             "stage": self.effect.stage,
             "confidence": self.confidence,
+            "kind_confidence": self.kind_confidence,
             "equivalents": list(self.equivalents),
             "parameters": {
                 name: {key: value for key, value in parameter.to_dict().items() if key != "sd"}

@@ -101,6 +101,7 @@ def _goodness(trace: Trace, simulated: np.ndarray, structure: float) -> Goodness
 LEAK_CAUSE = Cause(
     LEAK[0],
     0.9931,
+    0.9931,
     (),
     {"leak_rate": Parameter.from_sd(0.002, 0.00003, "1/s")},
     (Statement("fall", 1234.0, 30.0, "without it the fit is worse by 1234 where 30 would do"),),
@@ -111,6 +112,7 @@ LEAK_CAUSE = Cause(
 PLAY_CAUSE = Cause(
     PLAY[0],
     0.62,
+    0.95,
     ("bouc_wen_hysteresis",),
     {"half_height": Parameter.from_sd(9.6, 0.4, "N"), "width": Parameter.from_sd(80.0, math.nan, "N")},
     (Statement("fall", 321.0, 30.0, "without it the fit is worse by 321 where 30 would do"),),

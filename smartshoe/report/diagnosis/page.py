@@ -144,7 +144,7 @@ def _card(number: int, cause: Cause) -> Card:
     return Card(
         f"{number}. {words(cause.name).capitalize()}",
         cause,
-        sentences.sure(cause.confidence),
+        sentences.how_sure(cause),
         sentences.gain_sentence(cause.held_out),
         [
             (words(name), sentences.parameter_text(parameter), says.get(name, ""))

@@ -40,6 +40,12 @@ def sure(confidence: float) -> str:
     return f"over {100 * SUREST:.0f} %" if confidence > SUREST else f"{100 * confidence:.0f} %"
 
 
+def how_sure(cause: Cause) -> str:
+    """The confidence of a cause's name, and that of its kind where it is another."""
+    name, kind = sure(cause.confidence), sure(cause.kind_confidence)
+    return f"{name} sure" if name == kind else f"{name} sure, of its kind {kind}"
+
+
 def unit_of(symbol: str) -> str:
     """A unit behind its number; nothing for a pure number."""
     return "" if symbol in ("", "1") else f" {symbol}"
