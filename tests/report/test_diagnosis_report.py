@@ -282,7 +282,7 @@ def test_pointing_at_the_error_reads_it_and_dragging_zooms(browser: Browser, pag
 def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be() -> None:
     text = plain_text(page("two causes"))
     assert "1. Linear leak: over 99 % sure" in text
-    assert "2. Play hysteresis: 62 % sure; or it is bouc wen hysteresis" in text
+    assert "2. Play hysteresis: 62 % sure, of its kind 95 %; or it is bouc wen hysteresis" in text
     assert LEAK[0].says[1:] in text
     assert "0.002000 [0.001941, 0.002059] 1/s" in text
     assert "9.60 [8.82, 10.38] N" in text
