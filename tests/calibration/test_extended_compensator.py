@@ -247,6 +247,16 @@ def test_the_bilinear_form_takes_over_where_the_exact_one_would_ring() -> None:
     assert ExtendedCompensator(BASELINE, 100.0).core.is_exact
 
 
+@given(share=st.floats(40.0, 100.0), rate=st.floats(12.0, 35.0), seed=seeds)
+@settings(max_examples=10)
+def test_the_bilinear_form_is_the_papers_filter(share: float, rate: float, seed: int) -> None:
+    coarse = ExtendedCompensator(ExtendedModel(1.0, share, rate, 1.0, 1.0, "mbar"), 1.0)
+    assert not coarse.core.is_exact
+    readings = np.random.default_rng(seed).standard_normal(40)
+    paper = Compensator(rate, 1.0 + share, rate, sample_rate_hz=1.0)  # equation (13) with kappa and a of one arm
+    np.testing.assert_allclose(coarse.apply(readings), paper.apply(readings), rtol=1e-8, atol=1e-8)
+
+
 def test_a_leak_says_that_an_error_of_zero_grows() -> None:
     model = BASELINE.with_part(effect("linear_leak"), np.array([0.01]))
     filter_ = ExtendedCompensator(model, 100.0)

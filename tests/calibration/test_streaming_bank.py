@@ -62,6 +62,10 @@ def test_any_kind_of_array_gives_the_same_forces(kind: str, with_out: bool, ndim
     assert out is None or forces_n is out
 
 
+def test_a_bank_is_as_long_as_its_filters_are_many() -> None:
+    assert [len(stack([Compensator(0.2, 5.0, 1.0)] * units)) for units in (1, 4)] == [1, 4]
+
+
 def test_a_returned_array_is_never_written_to_again() -> None:
     bank = stack(some_filters(3))
     first = bank.push(np.ones(3))

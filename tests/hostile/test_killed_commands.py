@@ -7,32 +7,16 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hosted_commands import KILLED, Host, Tried
-from writing_commands import WRITING, write_inputs
+from writing_commands import WRITING
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks the commands")
 EVERYDAY = ("calibrations add", "identify", "stream")
 MOST_STEPS, AT_RANDOM = 24, 8  # kills a command
-
-
-@pytest.fixture(scope="module")
-def host() -> Iterator[Host]:
-    found = Host()
-    yield found
-    found.close()
-
-
-@pytest.fixture(scope="module")
-def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What every command reads."""
-    folder = tmp_path_factory.mktemp("inputs")
-    write_inputs(folder)
-    return folder
 
 
 @pytest.mark.parametrize("name", EVERYDAY)

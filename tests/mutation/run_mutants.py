@@ -5,8 +5,9 @@ a room; without a room's name it takes all of ``rooms.toml``. The same seed on t
 the kept file holds is not run again; with ``--survivors`` those that survived are. ``--listed`` runs the bugs of
 ``listed.toml`` instead. A mutant whose name stands in docs/reliability.md is argued for there and counts as neither.
 
-Each is put into a copy of the checkout, so that programs that tests start meet it too. Tests that take more than five
-times the processor time that they take without it count as having noticed.
+Each is put into a copy of the checkout, so that programs that tests start meet it too. Of the room's tests those files
+are run that call its function. Tests that take more than five times the processor time that they take without it count
+as having noticed.
 """
 
 from __future__ import annotations
@@ -103,10 +104,15 @@ class Checkout:
         return self._kept.tests[test]
 
     def tried(self, mutant: Mutant) -> Result:
-        """Put ``mutant`` in, run its tests, cheapest of those that call its function first, and take it out."""
+        """Put ``mutant`` in, run its tests, cheapest first, and take it out.
+
+        Of a function that files of tests call, only those are run; of one that only compiled code or other programs
+        call, all.
+        """
         about = {test: self.measured(test) for test in mutant.tests}
-        calling = [mutant.file, mutant.function]
-        order = sorted(about, key=lambda test: (calling not in about[test]["calls"], about[test]["cost_s"]))
+        calling = {test: item for test, item in about.items() if [mutant.file, mutant.function] in item["calls"]}
+        about = calling or about
+        order = sorted(about, key=lambda test: about[test]["cost_s"])
         usual_s = sum(item["cost_s"] for item in about.values())
         with self._with(mutant):
             ended = run_tests(self.path, order, max(LEAST_S, SLOWER * usual_s))
