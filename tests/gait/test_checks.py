@@ -281,3 +281,4 @@ def test_a_result_shows_itself_in_a_line_a_table_and_a_figure() -> None:
     axes = found.plot().axes
     assert [axis.get_title() for axis in axes] == list(found.feet)
     assert all(axis.lines for axis in axes)
+    assert {axis.get_ylabel() for axis in axes} == {"force (N)"}

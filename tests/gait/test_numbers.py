@@ -141,6 +141,24 @@ def test_loading_rate_of_a_ramp() -> None:
     assert loading_rate(np.zeros(20), 200.0) is None
 
 
+@given(samples=st.integers(8, 60), phase=st.floats(0.0, 0.9), slope=st.floats(10.0, 1e5))
+def test_the_loading_rate_of_a_straight_rise_is_its_slope_wherever_the_samples_lie(
+    samples: int, phase: float, slope: float
+) -> None:
+    rise_n = slope / 200.0 * (phase + np.arange(samples))
+    fall_n = np.linspace(rise_n[-1], 0.0, 3 * samples)
+    assert loading_rate(np.concatenate([rise_n, fall_n[1:]]), 200.0) == pytest.approx(slope, rel=1e-9)
+
+
+def test_the_centre_of_pressure_stays_on_the_insole_and_reaches_both_ends_of_it() -> None:
+    table = analysed().columns()
+    for foot in ("left", "right"):
+        along = table[f"{foot}_centre_along_percent"]
+        seen = along[np.isfinite(along)]
+        assert 0.0 <= seen.min() < 40.0
+        assert 60.0 < seen.max() <= 100.0
+
+
 def test_asymmetry_is_right_less_left_over_their_mean() -> None:
     assert asymmetry(90.0, 110.0) == pytest.approx(20.0)
     assert asymmetry(5.0, 5.0) == 0.0

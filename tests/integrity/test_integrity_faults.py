@@ -117,21 +117,25 @@ def test_held_samples(protocol, seed, noise_percent, length, share):
 def test_dropouts(protocol, seed, noise_percent, length, share, level):
     rng = np.random.default_rng(seed)
     recording = recorded(protocol, seed, noise_percent)
-    reading = recording.sensor.values.copy()
-    value = {"rail": -12.5, "rest": float(np.median(reading[:30])), "0": 0.0}[level]
+    clean = recording.sensor.values
+    reading, rest = clean.copy(), float(np.median(clean[:30]))
+    value = {"rail": -12.5, "rest": rest, "0": 0.0}[level]
     touched = np.zeros(reading.size, dtype=bool)
-    for start in rng.integers(1, reading.size - length - 1, max(3, int(share * reading.size / length))):
+    starts = rng.integers(1, reading.size - length - 1, max(3, int(share * reading.size / length)))
+    for start in starts:
         reading[start : start + length] = value
         touched[start : start + length] = True
-    loaded = recording.sensor.values > 8.0 + 30.0 * noise_percent  # below, a dropout is rest
+    loaded = clean > 8.0 + 30.0 * noise_percent  # below, a dropout is rest
     bad = touched & loaded
     if bad.sum() < 3:
         return
     found = examine([with_reading(recording, reading)])
     recall, false = recall_and_false(found, bad, touched)
-    assert "dropouts" in kinds(found)
     assert recall >= RECALL
     assert false < FALSELY_MASKED
+    # Falls from low loads alone may be a logger that held its rest, or a rail: masked all the same.
+    falls_from_high = float((clean[starts] - rest).max()) > 0.4 * float(np.ptp(clean))
+    assert kinds(found) & ({"dropouts"} if falls_from_high else {"dropouts", "held_samples", "low_rail"})
 
 
 @settings(max_examples=8)

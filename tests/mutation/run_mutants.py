@@ -6,7 +6,7 @@ the kept file holds is not run again; with ``--survivors`` those that survived a
 ``listed.toml`` instead. A mutant whose name stands in docs/reliability.md is argued for there and counts as neither.
 
 Each is put into a copy of the checkout, so that programs that tests start meet it too. Of the room's tests those files
-are run that call its function. Tests that take more than five times the processor time that they take without it count
+are run that call its function. Tests that take more than three times the processor time that they take without it count
 as having noticed.
 """
 
@@ -33,7 +33,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 COPIED = ("smartshoe", "simulators", "tests", "scenarios", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
 ARGUED = ROOT / "docs" / "reliability.md"
-SLOWER, LEAST_S = 5.0, 30.0  # times the usual processor time, and never less, before tests count as hanging
+SLOWER, LEAST_S = 3.0, 20.0  # times the usual processor time, and never less, before tests count as hanging
 Result = dict[str, Any]
 
 

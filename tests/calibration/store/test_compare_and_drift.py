@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lives import LEFT_TOE, aged, calibration, day
+from lives import LEFT_TOE, SDS, aged, calibration, day
+from scipy.stats import chi2, linregress
+from scipy.stats import t as student
 
 from smartshoe.calibration.store import CalibrationStore
-from smartshoe.calibration.store.compare import compare
+from smartshoe.calibration.store.compare import Comparison, compare
 from smartshoe.calibration.store.drift import drift
 from smartshoe.calibration.store.quantities import quantities
 from smartshoe.errors import UsageError
@@ -77,6 +79,20 @@ def test_a_changed_unit_is_called_changed() -> None:
     assert by_name["static_gain"].percent == pytest.approx(1.0, abs=0.2)
 
 
+@pytest.mark.parametrize(("chance", "says"), [(0.008, "has changed"), (0.015, "")])
+def test_a_unit_is_called_changed_where_errors_would_do_it_less_than_once_in_a_hundred(chance: float, says: str) -> None:
+    a1, b0, b1 = LEFT_TOE
+
+    def changed_by(sds: float) -> Comparison:
+        return compare(calibration(), calibration((a1, b0 + sds * SDS[1], b1)), (200.0,))
+
+    # The quadratic form of the difference is a chi-square of three, one for a1, b0 and b1 each.
+    one = chi2.isf(changed_by(1.0).p_value, 3)
+    found = changed_by(math.sqrt(chi2.isf(chance, 3) / one))
+    assert found.p_value == pytest.approx(chance, rel=1e-6)
+    assert ("has changed" in found.says) == bool(says)
+
+
 def test_without_errors_nothing_is_claimed() -> None:
     found = compare(calibration(has_errors=False), calibration(aged(0, 0, 1.01)))
     assert math.isnan(found.p_value)
@@ -129,6 +145,32 @@ def test_a_trend_is_found_with_its_size(tmp_path: Path) -> None:
     assert gain.per_year.ci95[0] < true < gain.per_year.ci95[1]
     assert not found.trends["a1"].moves
     assert "drifts" in found.says
+
+
+@pytest.mark.parametrize("has_errors", [False, True])
+@pytest.mark.parametrize("count", [3, 6])
+def test_a_slope_and_its_error_are_those_of_linear_regression(tmp_path: Path, count: int, has_errors: bool) -> None:
+    rng, store = np.random.default_rng(11), CalibrationStore(tmp_path)
+    for k in range(count):  # scattered by far more than the calibrations' own errors
+        theta = aged(30.0 * k, -0.02, 1.0 + 0.01 * rng.standard_normal())
+        store.add(calibration(theta, created=day(30.0 * k), has_errors=has_errors))
+    trend = drift(store, "S1").trends["static_gain"]
+    line = linregress(trend.days, trend.values)
+    assert trend.jumps == ()
+    assert trend.per_year is not None
+    # Errors that go with the values weight them a little differently.
+    assert trend.per_year.value == pytest.approx(365.25 * line.slope, rel=0.02 if has_errors else 1e-9)
+    assert trend.per_year.sd == pytest.approx(365.25 * line.stderr, rel=0.02 if has_errors else 1e-9)
+    half = 0.5 * (trend.per_year.ci95[1] - trend.per_year.ci95[0])
+    assert half == pytest.approx(student.ppf(0.975, count - 2) * trend.per_year.sd)
+
+
+def test_the_drift_of_a_unit_that_is_not_there_says_which_are(tmp_path: Path) -> None:
+    store = life(tmp_path, np.random.default_rng(5), count=1)
+    with pytest.raises(UsageError, match=r"no calibration of unit 'S2'.*it has S1"):
+        drift(store, "S2")
+    with pytest.raises(UsageError, match="unit S1 has one calibration"):
+        drift(store, "S1")
 
 
 @pytest.mark.parametrize("placed", [0.0, 0.002])
