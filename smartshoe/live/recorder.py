@@ -122,17 +122,23 @@ class LiveRecording:
         self._pieces: queue.Queue[tuple[int, bytes, int] | None] = queue.Queue(MOST_WAITING)
         self._error: str | None = None
         self._files: list[AppendedFile] = []
+        # The journal first: by it what a kill leaves is known for a recording that was interrupted.
+        beside = journal_path(path)
+        is_new = not beside.exists()
+        self._journal = Journal(beside)
         try:
             for layout in layouts:
                 file = AppendedFile(layout.path, new=True)
                 self._files.append(file)
                 head = [f"# {key}: {value}\n" for key, value in layout.facts.items()]
                 file.append("".join([*head, ",".join(["time_s", *layout.columns]), "\n"]).encode())
-            self._journal = Journal(journal_path(path))
         except SmartShoeError:
             for file in self._files:
                 file.close()
                 file.path.unlink()
+            self._journal.close()
+            if is_new:
+                beside.unlink()
             raise
         self._thread = threading.Thread(target=self._run, name=f"writer of {path}", daemon=True)
         self._thread.start()

@@ -49,6 +49,11 @@ class _Notes:
             self.failed = report.nodeid
 
     def pytest_sessionstart(self) -> None:
+        from hypothesis import Phase, settings
+
+        # That an example fails is enough: it need not be made small.
+        settings.register_profile("mutants", settings(), phases=(Phase.explicit, Phase.generate))
+        settings.load_profile("mutants")
         if self._below:
             sys.setprofile(self._called)
             threading.setprofile(self._called)
@@ -115,7 +120,7 @@ def _child(checkout: Path, tests: list[str], cpu_s: float, calls: bool, answer: 
     import pytest
 
     notes = _Notes(f"{checkout}/" if calls else "")
-    words = ["-x", "-p", "no:cacheprovider", "--tb=short", f"--basetemp={checkout / 'made'}"]
+    words = ["-x", "-p", "no:cacheprovider", "-p", "no:randomly", "--tb=short", f"--basetemp={checkout / 'made'}"]
     words += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of hypothesis, which is imported already
     status = int(pytest.main([*words, *tests], plugins=[notes]))
     sys.setprofile(None)

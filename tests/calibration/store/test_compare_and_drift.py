@@ -80,7 +80,7 @@ def test_a_changed_unit_is_called_changed() -> None:
 
 
 @pytest.mark.parametrize(("chance", "says"), [(0.008, "has changed"), (0.015, "")])
-def test_a_unit_is_called_changed_where_errors_would_do_it_less_than_once_in_a_hundred(chance: float, says: str) -> None:
+def test_a_unit_is_called_changed_where_errors_do_it_less_than_once_in_a_hundred(chance: float, says: str) -> None:
     a1, b0, b1 = LEFT_TOE
 
     def changed_by(sds: float) -> Comparison:

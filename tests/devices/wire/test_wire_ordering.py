@@ -218,3 +218,20 @@ def test_a_frame_whose_clock_is_less_than_half_a_period_off_is_given_out(periods
     counters = Counters()
     assert [count for _, count, _ in _place(Ordering(counters), sent, [])] == list(range(1000, 1200))
     assert (counters.implausible, counters.lost) == (0, 0)
+
+
+@pytest.mark.parametrize(("lost", "restarted"), [(30_000, False), (40_000, True)])
+def test_a_young_device_whose_clock_and_count_might_also_have_wrapped_is_one_that_restarted(
+    lost: int, restarted: bool
+) -> None:
+    # The last frame lies so that count 200 at 1 s is, modulo both wraps, also ``lost`` samples later: within half a
+    # turn of the count that is a gap, beyond it the device has booted.
+    period_us, young = 5000, (200, 1_000_000)
+    last = ((young[0] - lost) & 0xFFFF, (young[1] - lost * period_us) & 0xFFFFFFFF)
+    steps = np.concatenate([np.arange(-299, 1), np.arange(300)])
+    counts = np.where(np.arange(600) < 300, last[0], young[0]) + steps
+    clocks = np.where(np.arange(600) < 300, last[1], young[1]) + steps * period_us
+    placed = Ordering(Counters()).place(counts & 0xFFFF, clocks & 0xFFFFFFFF)
+    assert sorted(set(placed.boot.tolist())) == ([0, 1] if restarted else [0])
+    if not restarted:
+        assert np.diff(placed.sequence).max() == lost
