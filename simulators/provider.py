@@ -102,14 +102,6 @@ class Provider:
         ]
         return SimulatedShoe(sensing, target, rng, checked.gait(), checked.parameters())
 
-    def options_schema(self, kind: str) -> dict[str, Any]:
-        """JSON schema of the options of ``kind`` 'machine' or 'shoe'."""
-        _require(kind, ("machine", "shoe"), "kind of device")
-        from simulators.benches.machine_options import MachineOptions
-        from simulators.benches.shoe_options import ShoeOptions
-
-        return (MachineOptions if kind == "machine" else ShoeOptions).model_json_schema()
-
 
 def _require(target: str, known: tuple[str, ...], what: str) -> None:
     if target not in known:

@@ -155,4 +155,4 @@ def declared(symbol: str) -> Unit:
 
 
 SECOND, NEWTON, PASCAL, MILLIBAR = unit("s"), unit("N"), unit("Pa"), unit("mbar")
-VOLT, COUNTS, METRE, KELVIN, ONE = unit("V"), unit("counts"), unit("m"), unit("K"), unit("1")
+VOLT, COUNTS, ONE = unit("V"), unit("counts"), unit("1")

@@ -46,8 +46,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):  # of one process, or the one that starts the workers
         _require_unique_names(ROOT / "tests")
-    elif os.name == "posix":
-        from compiled_once import compile_each_kernel_once
+    else:
+        from smartshoe.kernels.once import compile_each_kernel_once
 
         compile_each_kernel_once()
 

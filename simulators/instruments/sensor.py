@@ -35,7 +35,6 @@ class HdiParameters:
     gain_error_fraction: float = 0.0
     over_range_fraction: float = 0.01
     proof_pressure_pa: float = 1e5
-    burst_pressure_pa: float = 1.5e5
     bidirectional: bool = False
     second_lag_s: float = 0.0
     curve: Curve = field(default_factory=Curve)

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.arrays import Array
-from smartshoe.devices.base import Bladder, Block, ChannelDescription, Shoe
-from smartshoe.errors import DeviceError, MissingChannelError, UnitError, UsageError
+from smartshoe.devices.base import Block, ChannelDescription, Shoe
+from smartshoe.errors import MissingChannelError, UnitError, UsageError
 from smartshoe.files.logs import read
 from smartshoe.recording import Recording
 
@@ -55,38 +54,6 @@ class ReplayedShoe(Shoe):
         for start in range(0, len(self.recording), self.block_samples):
             span = slice(start, start + self.block_samples)
             yield Block(self.recording.time_s[span], readings[span], missing[span], names, sensors[0].unit)
-
-
-class RecordedBladder(Bladder):
-    """A bladder as it was measured: it answers the load history that was recorded, and no other."""
-
-    def __init__(self, recording: Recording, tolerance_n: float = 5.0) -> None:
-        self.recording = recording
-        self.tolerance_n = tolerance_n
-        self._load_n, self._pressure_pa = recording.force_n, recording.pressure_pa
-        self._elapsed_s = 0.0
-
-    def reset(self) -> None:
-        """Back to the recording's first sample."""
-        self._elapsed_s = 0.0
-
-    def press(self, load_n: Array, sample_rate_hz: float) -> Array:
-        """The recorded pressure (n,) in Pa; raises `DeviceError` where the load is not the recorded one."""
-        begin = self.recording.time_s[0] + self._elapsed_s
-        time_s = begin + np.arange(load_n.size) / sample_rate_hz
-        if load_n.size and time_s[-1] > self.recording.time_s[-1] + 1.0 / sample_rate_hz:
-            raise DeviceError(f"{self.recording.label} ends before the load that was asked for: press for less long")
-        recorded_n = np.interp(time_s, self.recording.time_s, self._load_n)
-        apart = np.abs(recorded_n - load_n)
-        if load_n.size and apart.max() > self.tolerance_n:
-            at = int(np.argmax(apart))
-            raise DeviceError(
-                f"{self.recording.label} was pressed with {recorded_n[at]:.1f} N at {time_s[at]:.3f} s, not with"
-                f" {load_n[at]:.1f} N: a recording answers only its own load"
-            )
-        self._elapsed_s += load_n.size / sample_rate_hz
-        pressure_pa: Array = np.interp(time_s, self.recording.time_s, self._pressure_pa)
-        return pressure_pa
 
 
 class _ReplayProvider:

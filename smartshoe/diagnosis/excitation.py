@@ -21,15 +21,13 @@ STANDARD = Thresholds()
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles; times of the longest hold and rest.
+    """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
     ``present`` holds the words of `Effect.exposed_by` that apply.
     """
 
     rates_per_s: tuple[float, ...]
     peaks: tuple[float, ...]
-    longest_hold_s: float
-    longest_rest_s: float
     repeats: int
     present: frozenset[str]
     thresholds: Thresholds = STANDARD
@@ -85,7 +83,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
-    return Excitation(tuple(rates), tuple(peaks), hold_s, rest_s, repeats, present, thresholds)
+    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds)
 
 
 class _Rise(NamedTuple):

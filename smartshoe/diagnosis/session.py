@@ -33,7 +33,6 @@ HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
 REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
 LOWEST_SHARE = 0.02
-FEWEST_FOR_NOISE = 200  # samples: the noise is then known to 5 %
 REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
 
 
@@ -62,7 +61,6 @@ class Session:
     ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
     kept from every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
-    ``measured_load`` (n,) is the load with its noise, ``load_noise`` (n,) a draw of noise like it; None at full rate.
     """
 
     recording: Recording
@@ -75,8 +73,6 @@ class Session:
     resting: Mask
     thinned: int
     displacement: Array | None = None
-    measured_load: Array | None = None
-    load_noise: Array | None = None
 
     @property
     def fitted(self) -> Mask:
@@ -223,11 +219,6 @@ def _session(
         neighbour=beside.get("neighbour"),
         before=before,
     )
-    measured = drawn = None
-    if like is None:
-        white = np.random.default_rng(index).standard_normal(raw.size)
-        measured = smoothed(raw, weights, factor)
-        drawn = smoothed(_sd_at_rest(raw, load < base + REST_SHARE, raw_noise) * white, weights, factor)
     kept = smoothed(good.astype(float), weights, factor) > 0.7
     load = conditions.load
     if like is None:
@@ -246,14 +237,7 @@ def _session(
         np.abs(load - base) < REST_SHARE,
         factor,
         smoothed(displacement, weights, factor) if displacement is not None else None,
-        measured,
-        drawn,
     )
-
-
-def _sd_at_rest(load: Array, resting: Mask, everywhere: float) -> float:
-    """Noise of the load where it rests, if less than ``everywhere``: a load full of corners passes for a noisy one."""
-    return min(noise_sd(load[resting]), everywhere) if resting.sum() >= FEWEST_FOR_NOISE else everywhere
 
 
 def _rests_levelled(load: Array, level: float, noise: float) -> Array:

@@ -27,7 +27,6 @@ LEAST_LOOKED_S, LOOKED_S = 5.0, 60.0
 ALIKE = 0.2  # of the heavier foot's peak: a shoe that bears less was not worn
 QUIETER = 0.2  # of the time, both feet together
 FEWEST = 5
-WRONG_PHASE = 0.5
 APART_S = 0.03  # what a gait's own asymmetry seldom makes of its two double supports
 SURE_S = 0.01
 DRIFT_S, DRIFT_SDS = 0.02, 6.0

@@ -75,21 +75,6 @@ class CycleGroup:
         return inside
 
 
-@dataclass(frozen=True, eq=False)
-class MeanCycle:
-    """A signal over the cycle: places ``time_s`` (m,), ``mean`` (m,), each repeat's ``deviations`` (repeats, m)."""
-
-    group: CycleGroup
-    time_s: Array
-    mean: Array
-    deviations: Array
-
-    @property
-    def repeats(self) -> int:
-        """How many cycles were averaged."""
-        return len(self.group.repeats)
-
-
 def repeated_cycles(recordings: Sequence[Recording], *, skip_first: int = 0) -> list[CycleGroup]:
     """The kinds of load cycle that occur twice at least, by rate; rests between cycles may vary.
 
@@ -107,19 +92,6 @@ def repeated_cycles(recordings: Sequence[Recording], *, skip_first: int = 0) -> 
             kinds.append([repeat])
     groups = (_group(kind, recordings) for kind in kinds if len(kind) > 1)
     return [group for group in groups if group.last_s > group.first_s]
-
-
-def mean_cycle(group: CycleGroup, recordings: Sequence[Recording], signals: Sequence[Array]) -> MeanCycle:
-    """The mean over a group's repeats of one signal (n,) per recording, NaN where it is missing.
-
-    Resampled by straight lines between neighbours, at the median step of the first repeat's recording.
-    """
-    step_s = recordings[group.repeats[0].recording].sample_time_s
-    count = int((group.last_s - group.first_s) / step_s) + 1
-    time_s: Array = np.asarray(group.first_s + step_s * np.arange(count), dtype=np.float64)
-    rows = np.stack([_at(group, repeat, recordings, signals, time_s) for repeat in group.repeats])
-    mean = _mean_of_finite(rows)
-    return MeanCycle(group, time_s, mean, rows - mean)
 
 
 def averaged_reading(recordings: Sequence[Recording], *, skip_first: int = 0) -> list[Array]:

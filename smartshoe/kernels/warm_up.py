@@ -7,10 +7,12 @@ one core before the first fit: by then a second core has the kernels ready.
 from __future__ import annotations
 
 import atexit
-import contextlib
+import os
 import subprocess
 import sys
 from pathlib import Path
+
+from smartshoe.kernels.once import compile_each_kernel_once
 
 CACHE = Path(__file__).parent / "__pycache__"
 KERNELS = ("first_order", "shift", "srivc", "residual", "linear_filter")
@@ -50,15 +52,12 @@ def compile_all() -> None:
 
 
 def compile_alone() -> bool:
-    """Compile, unless another process is at it or nothing can be kept here; whether it was done."""
-    with contextlib.suppress(OSError), (CACHE / "warm_up.lock").open("a") as lock:
-        with contextlib.suppress(ImportError):  # no such locks on Windows
-            import fcntl
-
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        compile_all()
-        return True
-    return False
+    """Compile, each kernel once whoever else is at it, unless nothing can be kept here; whether it was done."""
+    if not os.access(CACHE, os.W_OK):
+        return False
+    compile_each_kernel_once()
+    compile_all()
+    return True
 
 
 if __name__ == "__main__":

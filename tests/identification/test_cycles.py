@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from presses import press
 
 from smartshoe.identification import identify
-from smartshoe.identification.cycles import averaged_reading, mean_cycle, repeated_cycles
+from smartshoe.identification.cycles import averaged_reading, repeated_cycles
 from smartshoe.recording import Recording
 
 
@@ -41,14 +41,6 @@ def test_repeats_lie_on_each_other_for_any_rests_and_sampling_phase(
     assert group.rate_n_per_s == pytest.approx(rate, rel=1e-9)
     # The level half-way to the highest sample, which may lie half a step from the peak.
     assert group.duration_s == pytest.approx(800.0 / rate, abs=0.005)
-    mean = mean_cycle(group, [recording], [recording.force_n])
-    # Away from the three corners straight lines are resampled without error.
-    middle_s = 0.5 * group.duration_s
-    corners = middle_s + np.array([-1.0, 0.0, 1.0]) * 800.0 / rate
-    away = (np.abs(mean.time_s[:, np.newaxis] - corners) > 0.0201).all(axis=1)
-    assert np.max(np.abs(mean.deviations[:, away])) < 1e-6
-    expected = np.maximum(800.0 - np.abs(mean.time_s - middle_s) * rate, 0.0)
-    assert mean.mean[away] == pytest.approx(expected[away], abs=1e-6)
 
 
 def test_rates_and_peaks_are_told_apart() -> None:

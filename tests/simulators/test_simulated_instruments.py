@@ -232,8 +232,3 @@ def test_unknown_targets_and_units_are_refused():
         provider.open_shoe("walk", {"units": {"left_thumb": {}}}, rng())
     with pytest.raises(pydantic.ValidationError, match="side"):
         provider.open_shoe("walk", {"side": "middle"}, rng())
-
-
-def test_options_schema_lists_the_options():
-    assert {"unit", "bladder", "sensor", "daq"} <= set(provider.options_schema("machine")["properties"])
-    assert "cadence_steps_per_min" in provider.options_schema("shoe")["properties"]

@@ -163,12 +163,6 @@ class CalibrationStore:
         events.sort(key=lambda event: (event.date, event.order))
         return entries, events
 
-    def rebuild_index(self) -> int:
-        """Throw the index away and write it anew from the files; returns how many it holds."""
-        (self.folder / files.INDEX).unlink(missing_ok=True)
-        entries, events = self._read()
-        return len(entries) + len(events)
-
     def entries(self) -> tuple[Entry, ...]:
         """Every calibration, by serial number and date."""
         return tuple(self._read()[0])

@@ -59,11 +59,6 @@ class Ordering:
         self._doubts = 0
         self._recent = np.full(REMEMBERED, -1, dtype=np.int64)
 
-    @property
-    def period_us(self) -> float | None:
-        """Time between samples on the device's clock, None before two frames agreed."""
-        return self._period_us
-
     def place(self, counts: Integers, clocks: Integers) -> Placed:
         """Place frames of ``counts`` and ``clocks`` (n,), as sent and in order of arrival."""
         return _Placing(self, counts, clocks).run()

@@ -12,8 +12,6 @@ from smartshoe.models.effects._wall_memory import Undone
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
-TURBULENT_PLACES = (0.003, 0.02)
-
 
 class OrificeLeak(Effect):
     """w' = lambda p/sqrt(|p|), laminar below a small pressure; p = P - w is what is left.

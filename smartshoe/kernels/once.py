@@ -1,8 +1,7 @@
-"""On a fresh checkout every worker needs the same kernels: one compiles each, the others take it from the disk."""
+"""Processes that need the same kernels at once: one compiles each, the others take it from the disk."""
 
 from __future__ import annotations
 
-import fcntl
 import functools
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,12 @@ def compile_each_kernel_once() -> None:
     """Make numba, in this process, wait while another one that does the same compiles a kernel of the same file.
 
     numba looks on the disk before it compiles, but two that begin at once both compile. Modules import in one
-    direction, so that no two workers wait for each other; numba's own lock comes first, so that no two threads do.
+    direction, so that no two processes wait for each other; numba's own lock comes first, so that no two threads do.
     """
+    try:
+        import fcntl
+    except ImportError:  # no such locks on Windows
+        return
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher
 
@@ -34,4 +37,4 @@ def compile_each_kernel_once() -> None:
                 finally:
                     held.discard(source)
 
-    Dispatcher.compile = one_at_a_time
+    Dispatcher.compile = one_at_a_time  # type: ignore[method-assign]
