@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,7 +20,8 @@ from smartshoe.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from smartshoe.devices.base import Block
+    from smartshoe.devices.base import Block, Shoe
+    from smartshoe.live.guide import PageOperator
     from smartshoe.runs.session import SessionFolder, SessionPlan
     from smartshoe.runs.session.checks import PressingFault
 
@@ -46,9 +50,18 @@ if TYPE_CHECKING:
               help="How long a log is waited for, beyond the test's duration.")  # fmt: skip
 @click.option("--diagnose/--no-diagnose", "diagnosed", default=True, show_default=True,
               help="Say what the model gets wrong.")  # fmt: skip
+@click.option("--live", is_flag=True, help="Readings, instructions, progress and answers on a page as well.")
+@click.option("--port", type=click.IntRange(1, 65535), help="The port of --live's page (default: a free one).")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 def command(
-    out_folder: str | None, resume: str | None, replay: str | None, yes: bool, json_path: str | None, **options: Any
+    out_folder: str | None,
+    resume: str | None,
+    replay: str | None,
+    yes: bool,
+    live: bool,
+    port: int | None,
+    json_path: str | None,
+    **options: Any,
 ) -> None:
     """Calibrate a unit: a shoe streams while a machine presses, and what comes out is judged and stored."""
     from smartshoe.kernels import warm_up
@@ -68,10 +81,11 @@ def command(
         for said in folder.notes:
             note(f"{folder.path}: {said}")
         if replay is None:
-            asks = not yes and sys.stdin.isatty() and not folder.plan.machine.startswith("sim:")
+            asks = not yes and not folder.plan.machine.startswith("sim:")
             try:
-                with _at_the_machine(asks) as operator:
-                    conduct(folder, operator)
+                with _at_the_machine(asks and sys.stdin.isatty()) as operator, ExitStack() as page:
+                    shown = page.enter_context(_page(operator, folder, asks, port)) if live else operator
+                    conduct(folder, shown)
             except (KeyboardInterrupt, click.Abort):
                 click.echo(
                     f"what was recorded is kept; go on with smartshoe calibrate --resume {folder.path}", err=True
@@ -165,19 +179,35 @@ def _plan(options: dict[str, Any]) -> SessionPlan:
     )
 
 
+def _page(operator: _AtTheMachine, folder: SessionFolder, asks: bool, port: int | None) -> PageOperator:
+    """The same session on a page; raises `UsageError` where the extra ``live`` is not installed."""
+    try:
+        from smartshoe.live.guide import PageOperator
+    except ImportError as error:
+        raise UsageError(f"--live needs {error.name}, which is not installed: pip install 'smartshoe[live]'") from error
+    return PageOperator(
+        operator, folder.plan, lambda url: operator.tell(f"live: {url}"),
+        asks=asks, keyboard=operator.asks, port=port or 0,
+    )  # fmt: skip
+
+
 class _AtTheMachine:
     """Instructions on stderr; Enter confirms; live readings where stderr is a terminal."""
 
     def __init__(self, asks: bool, table: Any = None) -> None:
-        self._asks, self._table = asks, table
+        self.asks, self._table = asks, table
+        self._keyboard = _Keyboard()
+
+    def streams(self, shoe: Shoe) -> None:
+        """Its readings come with `show`."""
 
     def tell(self, sentence: str) -> None:
         self._print(sentence)
 
     def confirm(self, sentence: str, meanwhile: Callable[[], None]) -> None:
-        self._print(f"{sentence}{'; then press Enter' if self._asks else ''}")
-        if self._asks:
-            _answer(meanwhile)
+        self._print(f"{sentence}{'; then press Enter' if self.asks else ''}")
+        if self.asks:
+            self._keyboard.answer(meanwhile)
 
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
         if self._table is not None:
@@ -187,11 +217,11 @@ class _AtTheMachine:
         self._print(finding.says)
         if repeats_left == 0:
             return False
-        if not self._asks:
+        if not self.asks:
             self._print(f"pressed again; {repeats_left} repeats are left")
             return True
         self._print(f"press again? [Y/n] ({repeats_left} repeats are left)")
-        return not _answer(lambda: None).strip().casefold().startswith("n")
+        return not self._keyboard.answer(_waiting).strip().casefold().startswith("n")
 
     def _print(self, sentence: str) -> None:
         if self._table is not None:
@@ -200,18 +230,35 @@ class _AtTheMachine:
             click.echo(sentence, err=True)
 
 
-def _answer(meanwhile: Callable[[], None]) -> str:
-    """A line from the keyboard; ``meanwhile`` is called until it comes."""
-    from threading import Thread
+def _waiting() -> None:
+    time.sleep(0.05)
 
-    lines: list[str] = []
-    reader = Thread(target=lambda: lines.append(sys.stdin.readline()), daemon=True)
-    reader.start()
-    while reader.is_alive():
-        meanwhile()
-    if not lines or lines[0] == "":
-        raise click.Abort
-    return lines[0]
+
+class _Keyboard:
+    """Lines as they are typed, read by one thread: an answer that came from elsewhere leaves none behind that reads."""
+
+    def __init__(self) -> None:
+        self._lines: SimpleQueue[str] = SimpleQueue()
+        self._thread: Thread | None = None
+
+    def answer(self, meanwhile: Callable[[], None]) -> str:
+        """The next line; ``meanwhile`` is called until it comes. Raises `click.Abort` at the input's end."""
+        if self._thread is None:
+            self._thread = Thread(target=self._read, daemon=True)
+            self._thread.start()
+        while self._lines.empty():
+            meanwhile()
+        line = self._lines.get()
+        if not line:
+            raise click.Abort
+        return line
+
+    def _read(self) -> None:
+        while True:
+            line = sys.stdin.readline()
+            self._lines.put(line)
+            if not line:
+                return
 
 
 @contextmanager

@@ -25,6 +25,7 @@ class Client:
         self.answers: deque[dict[str, Any]] = deque(maxlen=MOST_ANSWERS)
         self.is_paused = False
         self._number = 0
+        self._tasked = -1
         self._places = [ALL] * len(self._session.shoes)
         self._zeros = [live.zero for live in self._session.shoes]
         self._noted, self._stepped, self._state = self._session.noted, self._session.stepped, ""
@@ -43,6 +44,10 @@ class Client:
         if notes or steps:
             self._noted, self._stepped = self._session.noted, self._session.stepped
             told.append(json.dumps({"type": "news", "notes": notes, "steps": steps}, allow_nan=False))
+        task = self._session.task
+        if task is not None and task.version != self._tasked:
+            self._tasked = task.version
+            told.append(json.dumps(task.to_dict(), allow_nan=False))
         state = self._desk.state()
         if state is not self._state:
             self._state = state
@@ -92,6 +97,10 @@ class Client:
                 word, age_s = asked.get("word"), asked.get("age_s")
                 age_s = float(age_s) if isinstance(age_s, (int, float)) and age_s == age_s else 0.0
                 self._session.mark(word if isinstance(word, str) else "", age_s)
+            case "answer":
+                task = self._session.task
+                if task is None or not task.take(asked.get("question"), asked.get("answer")):
+                    return {"type": "refused", "says": "nobody waits for that answer any more"}
             case "zero":
                 self._session.set_zero()
             case "record":
@@ -100,5 +109,5 @@ class Client:
                 else:
                     self._session.start_recording()
             case _:
-                return {"type": "refused", "says": "do is view, pause, mark, zero or record"}
+                return {"type": "refused", "says": "do is view, pause, mark, zero, record or answer"}
         return None

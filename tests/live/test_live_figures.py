@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import subprocess
 import sys
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 from live_browser import PROGRAM, Browser
 from serving import health, page, serving, until, walk_table
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
 
 from smartshoe.live.client import Client
 from smartshoe.live.server import LiveServer
@@ -135,12 +138,20 @@ def _watched(server: LiveServer, session: LiveSession, arrived: dict[int, float]
 
 @pytest.mark.benchmark
 def test_half_an_hour_more_in_no_more_memory(tmp_path: Path) -> None:
-    walk = walk_table(tmp_path / "walk.csv", 2400.0)
-    with serving(f"replay:{walk}", speed=1000.0) as (server, session), page(server) as client:
-        stop = threading.Event()
-        threading.Thread(target=lambda: [client.recv(timeout=60) for _ in iter(stop.is_set, True)], daemon=True).start()
-        until(lambda: session.now_s() > 600.0, 600.0)
-        first = memory_kb()
-        until(lambda: session.shoes[0].state == "over", 1200.0)
-        print(f"\nserver's memory from minute 10 to 40: {memory_kb() - first} kB; samples {session.shoes[0].samples}")
-        stop.set()
+    walk = walk_table(tmp_path / "walk.csv", 2460.0)
+    with serving(f"replay:{walk}", speed=100.0) as (server, session), page(server) as client:
+        thread = threading.Thread(target=_read_on, args=(client,), daemon=True)
+        thread.start()
+        found = []
+        for minutes in (10, 20, 30, 40):
+            until(lambda now_s=60.0 * minutes: session.now_s() > now_s, 600.0)
+            found.append(memory_kb())
+        grown = ", ".join(f"{after - found[0]:+} kB" for after in found[1:])
+        print(f"\nserver's memory after minute 10, at 20, 30, 40: {grown}; samples {session.shoes[0].samples}")
+    thread.join(60.0)
+
+
+def _read_on(client: ClientConnection) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        while True:
+            client.recv(timeout=60)

@@ -30,6 +30,7 @@ function ask(what) {
 function told(message) {
   if (message.type === "hello") begin(message);
   else if (message.type === "state") { live.state = message; words(); }
+  else if (message.type === "task") task(message);
   else if (message.type === "news") {
     live.notes.push(...message.notes); live.steps.push(...message.steps);
     live.notes.splice(0, live.notes.length - MOST_NOTES); live.steps.splice(0, live.steps.length - MOST_STEPS);
@@ -41,6 +42,22 @@ function told(message) {
     live.columns = live.hello.shoes.map((shoe) => new Columns(shoe.names.length, live.count + 8));
     for (const button of by("windows").children) button.setAttribute("aria-pressed", String(Number(button.dataset.seconds) === live.seconds));
   } else if (message.type === "refused") banner(message.says, 8000);
+}
+
+// A calibration session's page: what is to be done, how far the pressing is, and what it waits for.
+function task(now) {
+  for (const name of ["record", "mark", "zero", "weight", "weight-title"]) by(name).hidden = true;
+  by("task").hidden = false;
+  by("task-says").textContent = now.says;
+  by("task-progress").parentElement.hidden = !now.experiment;
+  by("task-progress").value = now.duration_s ? now.elapsed_s / now.duration_s : 0;
+  by("task-progress-says").textContent = now.experiment + ": " + now.elapsed_s.toFixed(0) + " of " + now.duration_s.toFixed(0) + " s";
+  by("task-answers").replaceChildren(...now.answers.map((answer) => {
+    const button = document.createElement("button");
+    button.type = "button"; button.textContent = answer;
+    button.onclick = () => ask({ do: "answer", question: now.question, answer });
+    return button;
+  }));
 }
 
 function begin(hello) {
@@ -112,7 +129,7 @@ const STATES = { streaming: "", opening: "opening", silent: "silent", away: "awa
 function words() {
   const state = live.state, ill = state.shoes.filter((shoe) => STATES[shoe.state]);
   const rate = state.rate_hz.toFixed(state.rate_hz % 1 ? 1 : 0) + " Hz";
-  const recording = state.recording ? "recording " + state.recording.file + ", " + counted(state.recording.samples) + " samples on disk" : "not recording";
+  const recording = state.recording ? "recording " + state.recording.file + ", " + counted(state.recording.samples) + " samples on disk" : (by("task").hidden ? "not recording" : "every sample is kept in the session's folder");
   by("status").textContent = ill.length
     ? ill.map((shoe) => shoe.shoe + " is " + STATES[shoe.state]).join("; ") + " · " + recording
     : rate + (live.hello.speed === 1 ? "" : ", " + live.hello.speed + " times as fast") + " · " + recording;
@@ -206,6 +223,7 @@ for (const button of by("windows").children) button.onclick = () => show(Number(
 const KEYS = { r: record, m: () => marking(true), z: () => ask({ do: "zero" }), " ": () => pause(!live.paused), 1: () => show(5), 2: () => show(20), 3: () => show(60) };
 document.addEventListener("keydown", (event) => {
   if (event.key === "Escape" && live.marked !== null) return marking(false);
+  if (!by("task").hidden && "rmz".includes(event.key)) return;
   if (event.target === by("word") || event.ctrlKey || event.metaKey || event.altKey || event.repeat || !KEYS[event.key]) return;
   event.preventDefault();
   KEYS[event.key]();

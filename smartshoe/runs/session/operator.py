@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol as Interface
 
-from smartshoe.devices.base import Block
+from smartshoe.devices.base import Block, Shoe
 from smartshoe.runs.session.checks import PressingFault
 
 
 class Operator(Interface):
     """What a session asks of a person; all but `confirm` return at once."""
+
+    def streams(self, shoe: Shoe) -> None:
+        """The shoe is open, and read from here on."""
 
     def tell(self, sentence: str) -> None:
         """Say what happens, or what is to be done."""
@@ -27,6 +30,9 @@ class Operator(Interface):
 
 class Unattended:
     """Nobody is there: everything is confirmed, and what can be repeated is repeated."""
+
+    def streams(self, shoe: Shoe) -> None:
+        """Nobody looks."""
 
     def tell(self, sentence: str) -> None:
         """Nobody hears it."""

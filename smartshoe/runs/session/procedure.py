@@ -52,6 +52,7 @@ def conduct(folder: SessionFolder, operator: Operator | None = None) -> None:
             _check_limits(machine, missing)
             _check_range(plan, shoe, missing, operator)
             folder.note_stream(shoe)
+            operator.streams(shoe)
             stream = _Stream(shoe, folder, operator)
             stream.record("", 0.0)
             if stream.time_s is None:

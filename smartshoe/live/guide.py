@@ -1,0 +1,134 @@
+"""`PageOperator`: a calibration session's instructions, progress and readings on the live page, answers from it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from smartshoe.devices.base import Block, Shoe
+from smartshoe.live.relay import RelayedShoe
+from smartshoe.live.server import LiveServer
+from smartshoe.live.session import LiveSession
+from smartshoe.live.task import Task
+from smartshoe.runs.session.checks import PressingFault
+from smartshoe.runs.session.operator import Operator
+from smartshoe.runs.session.plan import SessionPlan
+
+DONE, AGAIN, STOP = "Done", "Press again", "Stop"
+LOOK_EVERY_S = 0.05
+JOIN_S = 10.0
+
+
+class _AnsweredError(Exception):
+    """The page has answered what the keyboard is waited for."""
+
+
+class PageOperator:
+    """What ``other`` is told and shown, a page is as well; who ``asks`` takes the answer that comes first.
+
+    ``keyboard`` says that ``other`` waits for a person too. The page is there from the first sample on: ``ready`` is
+    called with its address. Use it in a with block.
+    """
+
+    def __init__(
+        self, other: Operator, plan: SessionPlan, ready: Callable[[str], None], *,
+        asks: bool, keyboard: bool, port: int = 0,
+    ) -> None:  # fmt: skip
+        self._other, self._ready = other, ready
+        self._asks, self._keyboard, self._port = asks, keyboard, port
+        self._durations_s = {protocol.name: protocol.duration_s for protocol in plan.protocols}
+        self._relay: RelayedShoe | None = None
+        self._session: LiveSession | None = None
+        self._server: LiveServer | None = None
+        self._thread: threading.Thread | None = None
+        self.task = Task()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def streams(self, shoe: Shoe) -> None:
+        """From here on ``shoe`` is read."""
+        self._other.streams(shoe)
+        self._relay = RelayedShoe(shoe).open()
+
+    def tell(self, sentence: str) -> None:
+        """On the page it stands until the next."""
+        self._other.tell(sentence)
+        self._say(sentence)
+
+    def confirm(self, sentence: str, meanwhile: Callable[[], None]) -> None:
+        """By the page's button or at the keyboard, whichever comes first."""
+        self._say(sentence)
+        if not self._asks:
+            self._other.confirm(sentence, meanwhile)
+            return
+        self.task.ask(sentence, (DONE,))
+
+        def until_answered() -> None:
+            meanwhile()
+            if self.task.answer is not None:
+                raise _AnsweredError
+
+        try:
+            self._other.confirm(sentence, until_answered)
+            while not self._keyboard:
+                until_answered()
+        except _AnsweredError:
+            pass
+        finally:
+            self.task.settle()
+
+    def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
+        """The traces, and how far the pressing is."""
+        self._other.show(block, experiment, elapsed_s)
+        if self._relay is None:
+            return
+        self._relay.give(block)
+        if self._server is None:
+            self._begin(self._relay)
+        self.task.progress(experiment, elapsed_s, self._durations_s.get(experiment, 0.0))
+        if self._session is not None:
+            self._session.changed()
+
+    def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
+        """By the page's buttons where nobody is at the keyboard."""
+        self._say(finding.says)
+        if not self._asks or self._keyboard or repeats_left == 0:
+            return self._other.wants_repeat(finding, repeats_left)
+        self.task.ask(f"{finding.says}: press again? ({repeats_left} repeats are left)", (AGAIN, STOP))
+        while self.task.answer is None:
+            time.sleep(LOOK_EVERY_S)
+        wanted = self.task.answer == AGAIN
+        self.task.settle()
+        return wanted
+
+    def close(self) -> None:
+        """End the page."""
+        if self._server is not None and self._thread is not None:
+            self._server.stop()
+            self._thread.join(JOIN_S)
+            self._server.desk.close()
+        if self._session is not None:
+            self._session.close()
+        self._server = self._session = None
+
+    def _begin(self, relay: RelayedShoe) -> None:
+        self._session = LiveSession({str(relay): relay}, clock=relay.clock_s)
+        self._session.task = self.task
+        self._server = LiveServer(self._session, port=self._port)
+        self._session.start()
+        self._server.desk.start()
+        self._thread = threading.Thread(target=self._server.run, name="page", daemon=True)
+        self._thread.start()
+        self._ready(self._server.url)
+
+    def _say(self, sentence: str) -> None:
+        self.task.tell(sentence)
+        if self._session is not None:
+            self._session.note("instruction", sentence)
