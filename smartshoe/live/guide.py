@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Self
 
 from smartshoe.devices.base import Block, Shoe
+from smartshoe.live.guidance import Guidance
 from smartshoe.live.relay import RelayedShoe
 from smartshoe.live.server import LiveServer
 from smartshoe.live.session import LiveSession
-from smartshoe.live.task import Task
 from smartshoe.runs.session.checks import PressingFault
 from smartshoe.runs.session.operator import Operator
 from smartshoe.runs.session.plan import SessionPlan
@@ -44,7 +44,7 @@ class PageOperator:
         self._session: LiveSession | None = None
         self._server: LiveServer | None = None
         self._thread: threading.Thread | None = None
-        self.task = Task()
+        self.task = Guidance()
 
     def __enter__(self) -> Self:
         return self

@@ -18,11 +18,11 @@ from smartshoe.devices.base import Block, Shoe
 from smartshoe.devices.events import ShoeEvent
 from smartshoe.errors import UsageError
 from smartshoe.live import recorder
+from smartshoe.live.guidance import Guidance
 from smartshoe.live.lsl import Outlet
 from smartshoe.live.pace import Pace
 from smartshoe.live.shoe import LiveShoe, lost_in
 from smartshoe.live.source import Source
-from smartshoe.live.task import Task
 from smartshoe.live.zeroing import zeros_of
 
 NOTES_KEPT, STEPS_KEPT = 500, 400
@@ -58,7 +58,7 @@ class LiveSession:
         _require_distinct(self.shoes)
         self.recording: recorder.LiveRecording | None = None
         self.recorded: str | None = None  # what the last recording came to
-        self.task: Task | None = None  # of a calibration session that this page shows
+        self.task: Guidance | None = None  # of a calibration session that this page shows
         self._file = record
         self._outlets = [Outlet(live, clock()) for live in self.shoes] if lsl else []
         self._lock = RLock()

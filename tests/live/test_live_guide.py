@@ -11,8 +11,8 @@ from serving import told, walk_table
 from websockets.sync.client import connect
 
 from smartshoe.devices import open_shoe
+from smartshoe.live.guidance import Guidance
 from smartshoe.live.guide import AGAIN, DONE, PageOperator
-from smartshoe.live.task import Task
 from smartshoe.protocol import Protocol, dynamic_protocol
 from smartshoe.runs.session import SessionPlan
 from smartshoe.runs.session.checks import PressingFault
@@ -76,7 +76,7 @@ def test_the_page_shows_what_is_to_be_done_and_its_button_is_the_answer(tmp_path
 
 
 def test_only_the_first_answer_to_the_question_that_stands_is_taken() -> None:
-    task = Task()
+    task = Guidance()
     assert not task.take(0, DONE)
     task.ask("now?", (DONE, AGAIN))
     assert not task.take(0, DONE)

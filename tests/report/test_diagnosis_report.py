@@ -358,14 +358,19 @@ def test_a_page_of_unusual_data_is_written_all_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_terminal_says_the_verdict_first_and_everything_after(
+def test_the_terminal_says_the_size_first_then_the_verdict_and_everything_after(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "240")  # wide enough that no number is folded
     made = case(name)
     print_diagnosis(made, "left_toe")
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == f"left_toe: {HEADINGS[made.verdict]}"
+    verdict = f"{HEADINGS[made.verdict]}."
+    if made.verdict == "refused":
+        assert lines[0] == f"left_toe: {verdict}"
+    else:
+        assert lines[0].startswith("left_toe: On data that was not fitted, the simulated reading is off by ")
+        assert lines[1] == verdict
     said = "\n".join(lines)
     assert not re.search(r"\b(nan|inf|None)\b", said)
     for cause in made.causes:

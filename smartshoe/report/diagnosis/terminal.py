@@ -1,4 +1,4 @@
-"""A diagnosis on a terminal: the verdict first, then causes, faults, before and after, limits, what to do next."""
+"""A diagnosis on a terminal: how far off first, then the verdict, causes, faults, limits, what to do next."""
 
 from __future__ import annotations
 
@@ -31,12 +31,11 @@ MOST_FAULTS = 12
 def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     """The whole diagnosis as a person reads it; the page of ``--out`` says more."""
     console = new_console()
-    heading = f"{title}: {HEADINGS[diagnosis.verdict]}" if title else HEADINGS[diagnosis.verdict]
-    console.print(heading, style="bold", soft_wrap=True)
-    _line(console, sentence(diagnosis.says))
-    said = how_much(diagnosis)
-    if said is not None:
-        _line(console, said)
+    # How far off it is, before whether that is good or bad: what is bad for one purpose is good for another.
+    said = [text for text in (how_much(diagnosis), f"{HEADINGS[diagnosis.verdict]}.") if text is not None]
+    console.print(f"{title}: {said[0]}" if title else said[0], style="bold", soft_wrap=True)
+    for text in (*said[1:], sentence(diagnosis.says)):
+        _line(console, text)
     if diagnosis.causes:
         _causes(console, diagnosis)
     if diagnosis.minor:

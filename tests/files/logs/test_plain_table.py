@@ -177,3 +177,19 @@ def test_a_refused_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest
         smartshoe.write(recording, path)
     assert path.read_text() == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["walk.csv"]
+
+
+@pytest.mark.parametrize("moment", ["2024-01-01T10:00:00.{}0", "10:00:00.{}"])
+def test_dates_beside_the_time_are_left_out_with_a_note(tmp_path: Path, moment: str) -> None:
+    rows = [f"{moment.format(k) if k != 1 else ''},{k / 10},{k},{2 * k}" for k in range(5)]
+    (tmp_path / "a.csv").write_text("\n".join(["timestamp,time_s,force_n,pressure_mbar", *rows]) + "\n")
+    found = smartshoe.read(tmp_path / "a.csv")
+    assert found.time_s.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert list(found.channels) == ["force", "pressure"]
+    assert any("timestamp" in note for note in found.notes)
+
+
+def test_a_time_that_is_a_date_is_refused_where_seconds_are_promised(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time_s,force_n\n2024-01-01T10:00:00,1\n2024-01-01T10:00:01,2\n")
+    with pytest.raises(FormatError, match="line 2"):
+        smartshoe.read(tmp_path / "a.csv")

@@ -16,7 +16,8 @@ from smartshoe.arrays import Array
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
 from smartshoe.files.logs.columns import roles_of
-from smartshoe.files.logs.numbers import numbers_of
+from smartshoe.files.logs.moments import is_moment
+from smartshoe.files.logs.numbers import is_missing, numbers_of
 from smartshoe.files.logs.sheet import Column, Format, Sheet
 from smartshoe.files.logs.text import head_lines, is_text, read_lines
 from smartshoe.recording import Recording, Role, column_name, split_column
@@ -133,8 +134,12 @@ def _data_lines(path: Path, header_line: int) -> tuple[list[str], list[int]]:
     return [line for _, line in rows], [number for number, _ in rows]
 
 
-def _read_slowly(path: Path, header: list[str], header_line: int) -> Array:
-    """The same by way of every cell, raising `FormatError` at the first one that is at fault."""
+def _read_slowly(path: Path, header: list[str], header_line: int) -> tuple[Array, list[int]]:
+    """The same by way of every cell, raising `FormatError` at the first one that is at fault.
+
+    And which columns (indices into ``header``) it has: those of dates or times of day, which loggers write beside
+    ``time_s``, are left out.
+    """
     lines, numbers = _data_lines(path, header_line)
     rows = [[cell.strip() for cell in line.split(",")] for line in lines]
     for row, number in zip(rows, numbers, strict=True):
@@ -143,7 +148,14 @@ def _read_slowly(path: Path, header: list[str], header_line: int) -> Array:
                 f"{path}, line {number} has {len(row)} cells where the header names {len(header)} columns: mend or"
                 " remove that line"
             )
-    return np.column_stack(numbers_of(path, header, rows, numbers).columns)
+    kept = [
+        index
+        for index, name in enumerate(header)
+        if name == "time_s" or not is_moment(next((row[index] for row in rows if not is_missing(row[index])), ""))
+    ]
+    names = [header[index] for index in kept]
+    cells = [[row[index] for index in kept] for row in rows] if len(kept) < len(header) else rows
+    return np.column_stack(numbers_of(path, names, cells, numbers).columns), kept
 
 
 def read(path: Path) -> Sheet:
@@ -155,8 +167,13 @@ def read(path: Path) -> Sheet:
         raise FormatError(f"{path}, line {header_line} names column {twice[0]!r} twice: rename one")
     commas, line_count = _marks(path, header_line)
     values = _read_fast(path, header, header_line)
+    notes = []
     if values is None or commas != values.shape[0] * (len(header) - 1):
-        values = _read_slowly(path, header, header_line)
+        values, kept = _read_slowly(path, header, header_line)
+        left_out = [name for index, name in enumerate(header) if index not in kept]
+        if left_out:
+            header = [header[index] for index in kept]
+            notes = [f"time_s is the time: {', '.join(left_out)}, dates or times of day, left out"]
     if values.shape[0] == 0:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
     numbers = None
@@ -183,7 +200,7 @@ def read(path: Path) -> Sheet:
         "plain",
         columns,
         metadata,
-        notes=said.get("note", []),
+        notes=[*said.get("note", []), *notes],
         first_line=header_line + 1,
         recording_name=said.get("name", [None])[0],
         unit_name=said.get("unit", [None])[0],

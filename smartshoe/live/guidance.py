@@ -9,7 +9,7 @@ from typing import Any
 PROGRESS_STEP_S = 0.2
 
 
-class Task:
+class Guidance:
     """The sentence that stands, how far the pressing is, and an answer where one is waited for; for any thread.
 
     ``version`` rises with each change that a page is to be told.
