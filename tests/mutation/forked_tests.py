@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-WALL = 20.0  # times the processor time that is let pass by the clock, for tests that wait and a machine that is busy
+WALL = 6.0  # times the processor time that is let pass by the clock, for tests that wait and a machine that is busy
 
 
 @dataclass(frozen=True, slots=True)
