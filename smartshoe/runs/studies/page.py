@@ -10,6 +10,7 @@ import numpy as np
 from smartshoe.report.charts import Chart, Line, Panel
 from smartshoe.report.document import write_document
 from smartshoe.report.numbers import plain
+from smartshoe.runs.studies.norms import Compared
 from smartshoe.runs.studies.statistics import Agreement, Mean
 from smartshoe.runs.studies.trials import TrialFigures
 from smartshoe.version import __version__
@@ -67,6 +68,7 @@ def write_page(path: Path, result: StudyResult, source: Path) -> None:
             "figures": [SHOWN[name] for name in figures],
             "trials": [_trial_row(trial, figures) for trial in result.trials],
             "bands": _band_chart(result),
+            "norms": [_norm_row(each) for each in result.norms],
             "agreement": [_agreement_row(name, each) for name, each in result.agreement.items()],
             "bland_altman": [_bland_altman(name, result) for name in result.agreement],
             "command": f"smartshoe study {source} --out {path.parent}",
@@ -165,6 +167,14 @@ def _band_chart(result: StudyResult) -> Chart | None:
     sources = "; ".join(f"{condition}: {band.source}" for condition, band in result.bands.items())
     says = f"From {sources}. A band is where a further subject lies with 95 %, if subjects spread normally."
     return Chart("Force of a foot over a stride", says, "stride (%)", x, [Panel("force (% of body weight)", lines)])
+
+
+def _norm_row(each: Compared) -> tuple[str, list[str]]:
+    norm = each.norm
+    within = f"{each.subjects - len(each.outside)} of {each.subjects}"
+    outside = _some(list(each.outside), 0) or "–"
+    cells = [each.condition, f"{plain(norm.low)} … {plain(norm.high)}", within, outside, norm.source]
+    return SHOWN.get(norm.figure, norm.figure), cells
 
 
 def _agreement_row(name: str, each: Agreement) -> tuple[str, list[str]]:

@@ -29,12 +29,13 @@ class TrialEntry(BaseModel):
 
 
 class StudyPlan(BaseModel):
-    """A study's file. Paths are relative to its folder."""
+    """A study's file. Paths are relative to its folder; ``norms`` is a table of ranges with their source."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     title: str = "Study"
     about: str = ""
     calibrations: str | None = None
+    norms: str | None = None
     trial: tuple[TrialEntry, ...] = Field(min_length=1)
 
     @property
@@ -52,6 +53,8 @@ def read_study(path: Path | str) -> tuple[StudyPlan, ScenarioText]:
         raise source.from_validation(error) from error
     if plan.calibrations is not None and not (source.path.parent / plan.calibrations).exists():
         raise source.error(("calibrations",), f"{plan.calibrations} does not exist: give a folder of calibrations")
+    if plan.norms is not None and not (source.path.parent / plan.norms).is_file():
+        raise source.error(("norms",), f"{plan.norms} does not exist: give a table of norms")
     seen: dict[str, int] = {}
     for index, entry in enumerate(plan.trial):
         if entry.file in seen:

@@ -13,6 +13,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import RefusedError, UsageError
 from smartshoe.files.atomic import json_text, make_folder, write_text
+from smartshoe.runs.studies.norms import Compared, Norm, compared, read_norms
 from smartshoe.runs.studies.plan import StudyPlan, read_study
 from smartshoe.runs.studies.statistics import (
     Agreement,
@@ -84,7 +85,8 @@ class StudyResult:
     """A study: the ``trials`` that were used, and those ``left_out``; means by condition and figure, ``differences``.
 
     ``agreement`` with the trials' references is by figure. ``bands`` maps a condition to the usual course of a
-    stride; ``flags`` says what concerns a study and not a trial alone: of which trials to be careful.
+    stride; ``norms`` are those that the study brought, with who lies outside; ``flags`` says what concerns a study and
+    not a trial alone: of which trials to be careful.
     """
 
     plan: StudyPlan
@@ -93,6 +95,7 @@ class StudyResult:
     differences: Sequence[Difference]
     agreement: Mapping[str, Agreement]
     bands: Mapping[str, Band]
+    norms: Sequence[Compared]
     left_out: Sequence[TrialFigures]
     flags: Sequence[tuple[str, str]]
     report: Path | None = None
@@ -121,6 +124,7 @@ class StudyResult:
             "differences": [difference.to_dict() for difference in self.differences],
             "agreement": {name: agreement.to_dict() for name, agreement in self.agreement.items()},
             "bands": {condition: band.to_dict() for condition, band in self.bands.items()},
+            "norms": [each.to_dict() for each in self.norms],
             "left_out": [{"file": trial.entry.file, "says": trial.left_out} for trial in self.left_out],
             "flags": [{"file": file, "says": says} for file, says in self.flags],
         }
@@ -170,6 +174,8 @@ def study(
     ------
     ScenarioError
         The study's file is wrong.
+    InputError
+        A table of norms that cannot be read, or names a condition that no trial has.
     RefusedError
         No trial could be used; one that cannot is left out and stops nothing.
     """
@@ -178,12 +184,14 @@ def study(
         raise UsageError("C3D files need a folder: give out as well")
     folder = None if out is None else make_folder(out)
     c3d_folder = make_folder(folder / "c3d") if folder is not None and c3d else None
-    analysed = _analysed(plan, source.path.resolve().parent, c3d_folder, jobs, progress)
-    result = _concluded(plan, analysed)
-    if not result.trials:
+    base = source.path.resolve().parent
+    norms = [] if plan.norms is None else read_norms(base / plan.norms, plan.conditions)
+    analysed = _analysed(plan, base, c3d_folder, jobs, progress)
+    if all(trial.left_out is not None for trial in analysed):
         raise RefusedError(
             f"{source.path}: none of {len(analysed)} trials can be used; the first: {analysed[0].left_out}"
         )
+    result = _concluded(plan, analysed, norms)
     return result if folder is None else _written(result, folder, source.path)
 
 
@@ -207,7 +215,7 @@ def _analysed(
     return found
 
 
-def _concluded(plan: StudyPlan, analysed: Sequence[TrialFigures]) -> StudyResult:
+def _concluded(plan: StudyPlan, analysed: Sequence[TrialFigures], norms: Sequence[Norm]) -> StudyResult:
     used = [trial for trial in analysed if trial.left_out is None]
     means: dict[str, dict[str, dict[str, float]]] = {}  # condition, figure, subject
     for condition in plan.conditions:
@@ -230,6 +238,12 @@ def _concluded(plan: StudyPlan, analysed: Sequence[TrialFigures]) -> StudyResult
         )
         for trial in swapped_trials(used)
     ]
+    beside = compared(norms, means)
+    unmet = [
+        (str(plan.norms), f"no trial has figure {each.norm.figure!r}: use the names of trials.csv")
+        for each in beside
+        if not each.subjects
+    ]
     return StudyResult(
         plan,
         used,
@@ -237,8 +251,9 @@ def _concluded(plan: StudyPlan, analysed: Sequence[TrialFigures]) -> StudyResult
         _differences(plan, means),
         agreement,
         _bands(plan, used),
+        beside,
         [trial for trial in analysed if trial.left_out is not None],
-        swapped,
+        [*swapped, *unmet],
     )
 
 

@@ -12,8 +12,10 @@ import pytest
 import smartshoe
 from simulators.people import Person, Walk, trial
 from smartshoe.cli import run_command
+from smartshoe.errors import InputError
 from smartshoe.files.logs import write
 from smartshoe.recording import Recording
+from smartshoe.runs.studies.norms import read_norms
 from smartshoe.runs.studies.page import careful
 
 SPEEDS = {"slow": 1.0, "fast": 1.5}
@@ -53,6 +55,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     for name in ("triangles.csv", "nowhere.csv"):
         entries.append(f'[[trial]]\nfile = "{name}"\nsubject = "Anna"\ncondition = "slow"\n')
+    (folder / "norms.csv").write_text(
+        'figure,low,high,source,condition\ncadence_steps_per_min,60,115,"One, 2001",slow\n'
+        "stance_percent,0,1,Two 2002,\nstep_count,1,2,Three 2003,\n"
+    )
+    entries.insert(1, 'norms = "norms.csv"\n')
     (folder / "study.toml").write_text("\n".join(entries))
     return folder
 
@@ -199,3 +206,32 @@ def test_calibrations_come_from_a_folder_or_a_store(tmp_path: Path) -> None:
         (found,) = calibrations_for(recording, tmp_path / place, entry)
         assert (found.unit, found.b1) == ("left_toe", made.b1)
     assert calibrations_for(recording, None, entry) == []
+
+
+def test_norms_stand_beside_the_subjects_with_their_source(folder: Path, result: dict[str, object]) -> None:
+    cadence, *stance, nobody = result["norms"]
+    assert (cadence["condition"], cadence["source"]) == ("slow", "One, 2001")
+    assert (cadence["subjects"], cadence["within"], cadence["outside"]) == (3, 3, [])
+    assert [(each["condition"], each["within"]) for each in stance] == [("slow", 0), ("fast", 0)]
+    assert stance[0]["outside"] == ["Anna", "Ben", "Carl"]
+    assert nobody["subjects"] == 0
+    assert any("no trial has figure 'step_count'" in flag["says"] for flag in result["flags"])
+    page = (folder / "out" / "study.html").read_text(encoding="utf-8")
+    assert "Two 2002" in page
+    assert "0 of 3" in page
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("figure,low,high\n", "lacks column source"),
+        ("figure,low,high,source\na,1,x,S\n", "line 2: low and high are '1' and 'x'"),
+        ("figure,low,high,source\na,2,1,S\n", "line 2: from 2 to 1 is no range"),
+        ("figure,low,high,source\na,1,2,\n", "line 2: source is empty"),
+        ("figure,low,high,source,condition\na,1,2,S,fasst\n", "no trial has condition 'fasst'; there are slow, fast"),
+    ],
+)
+def test_norms_that_are_none_are_told_with_their_line(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "norms.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=says):
+        read_norms(tmp_path / "norms.csv", ["slow", "fast"])
