@@ -46,15 +46,19 @@ def command(
     Each FILE is a trial of one or two shoes; two FILES of one shoe each are weighed together. A rest of two seconds
     before the first step lets the zero be checked.
     """
-    from smartshoe.calibration.folder import load_calibrations
-    from smartshoe.cli.inputs import read_all
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli.output import emit_json, progress
     from smartshoe.errors import RefusedError
-    from smartshoe.gait.field.examination import examine_trial
 
-    calibrations = load_calibrations(calibration_paths)
-    recordings = read_all(files, time=time, force=None, sensors=(), unit=None)
-    found = examine_trial(recordings, calibrations, body_weight_n=body_weight_n, coverage=coverage)
+    with progress(2) as step:
+        step("reading")
+        from smartshoe.calibration.folder import load_calibrations
+        from smartshoe.cli.inputs import read_all
+        from smartshoe.gait.field.examination import examine_trial
+
+        calibrations = load_calibrations(calibration_paths)
+        recordings = read_all(files, time=time, force=None, sensors=(), unit=None)
+        step("checking")
+        found = examine_trial(recordings, calibrations, body_weight_n=body_weight_n, coverage=coverage)
     verdicts = {item.verdict for item in found}
     verdict = next(said for said in ("fault", "warning", "ok", "unknown") if said in verdicts)
     result = {"schema": "smartshoe.check/1", "verdict": verdict, "recordings": [item.to_dict() for item in found]}

@@ -66,7 +66,6 @@ def command(
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
     from smartshoe.cli.output import emit_json, note, progress
-    from smartshoe.diagnosis import diagnose
     from smartshoe.errors import NotIdentifiableError, UsageError
     from smartshoe.files.atomic import make_folder
 
@@ -80,10 +79,13 @@ def command(
     if figures is not None and out_folder is None:
         raise UsageError("--figures writes into --out DIR: give --out as well")
     _check(files, held_out)
-    recordings = read_all(files, unit=unit, **columns)
-    others = read_all(held_out, unit=unit, **columns) if held_out else []
-    folder = make_folder(out_folder) if out_folder is not None else None
     with progress() as step:
+        step("reading")
+        from smartshoe.diagnosis import diagnose
+
+        recordings = read_all(files, unit=unit, **columns)
+        others = read_all(held_out, unit=unit, **columns) if held_out else []
+        folder = make_folder(out_folder) if out_folder is not None else None
         found = diagnose(recordings, hold_out=others, material=material / 100.0, progress=step)
         title = _title(recordings, unit)
         written: dict[str, Path] = {}

@@ -88,13 +88,16 @@ def command(
     sensors: tuple[str, ...],
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
-    from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
-    from smartshoe.cli.inputs import say_what_strikes, units_of, with_units
     from smartshoe.cli.output import emit_json, note, progress, show_notes
-    from smartshoe.files.atomic import make_folder
-    from smartshoe.files.logs import read
-    from smartshoe.gait.analysis import analyse
-    from smartshoe.gait.coverage import Coverage
+
+    with progress() as step:
+        step("starting")
+        from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
+        from smartshoe.cli.inputs import say_what_strikes, units_of, with_units
+        from smartshoe.files.atomic import make_folder
+        from smartshoe.files.logs import read
+        from smartshoe.gait.analysis import analyse
+        from smartshoe.gait.coverage import Coverage
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
@@ -117,7 +120,11 @@ def command(
         if stream is None:
             note("a large recording goes through as a stream (--whole takes it into memory)")
     chosen = units_of(sensors)
-    recordings = [] if streamed else [with_units(read(file, time=time), chosen) for file in files]
+    recordings = []
+    with progress(len(files)) as step:
+        for file in () if streamed else files:
+            step(f"reading {Path(file).name}")
+            recordings.append(with_units(read(file, time=time), chosen))
     show_notes(recordings)
     say_what_strikes(recordings)
     calibrations = []
@@ -134,7 +141,7 @@ def command(
         gait_of_stream(files, calibrations, body_weight_n, covered, time, json_path, folder, estimator)
         return
     written: dict[str, Path] = {}
-    with progress() as step:
+    with progress(1 + (folder is not None)) as step:
         step("events, strides, forces")
         wanted = None
         if reference is not None:

@@ -10,6 +10,8 @@ from smartshoe.cli.inputs import column_options, read_all
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from smartshoe.identification import Identification
     from smartshoe.recording import Recording
 
@@ -84,11 +86,9 @@ def command(
     **choices: Any,
 ) -> None:
     """Identify one unit from one or more experiments (one FILE each)."""
-    from smartshoe.cli.output import emit_json
-    from smartshoe.identification import identify
+    from smartshoe.cli.output import emit_json, progress
     from smartshoe.report.tables import print_identification
 
-    recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
     options: dict[str, Any] = {
         "offset": "estimate" if offset is None else _number("--offset", offset),
         "delay": "estimate" if delay is None else _number("--delay", delay),
@@ -98,15 +98,21 @@ def command(
         },
         **choices,
     }
-    found = identify(recordings, **options)
+    with progress(2 + 2 * checks) as step:
+        step("reading")
+        from smartshoe.identification import identify
+
+        recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
+        step("fitting")
+        found = identify(recordings, **options)
+        result = found.to_dict()
+        if checks:
+            result |= _checks(found, recordings, options, step)
     if calibration_path is not None:
         import datetime
 
         today = datetime.datetime.now(datetime.UTC).date().isoformat()
         found.calibration(created=today).save(calibration_path)
-    result = found.to_dict()
-    if checks:
-        result |= _checks(found, recordings, options)
     if not emit_json(result, json_path):
         print_identification(result)
         if calibration_path is not None:
@@ -142,7 +148,9 @@ def _range(option: str, name: str, text: str) -> tuple[float, float]:
     )
 
 
-def _checks(found: Identification, recordings: list[Recording], options: dict[str, Any]) -> dict[str, Any]:
+def _checks(
+    found: Identification, recordings: list[Recording], options: dict[str, Any], step: Callable[[str], None]
+) -> dict[str, Any]:
     """Lack of fit and leave-one-rate-out as JSON objects; where the data cannot tell, the reason."""
     from smartshoe.errors import NotIdentifiableError
     from smartshoe.identification.lack_of_fit import lack_of_fit
@@ -153,6 +161,7 @@ def _checks(found: Identification, recordings: list[Recording], options: dict[st
         ("lack_of_fit", lambda: lack_of_fit(found, recordings)),
         ("leave_one_rate_out", lambda: leave_one_rate_out(recordings, **options)),
     ):
+        step("testing for lack of fit" if name == "lack_of_fit" else "fitting without each loading rate")
         try:
             result[name] = check().to_dict()
         except NotIdentifiableError as reason:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
@@ -50,33 +51,55 @@ def note(text: str) -> None:
         click.echo(f"note: {text}", err=True)
 
 
+def _nothing(_: object) -> None:
+    """Nobody is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShownSteps:
+    """``show`` is told the name of each step; ``of`` how many are still to come, for the time that is left."""
+
+    show: Callable[[str], None] = _nothing
+    of: Callable[[int], None] = _nothing
+
+    def __call__(self, text: str) -> None:
+        """A step begins."""
+        self.show(text)
+
+
 @contextmanager
-def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
+def progress(total: int | None = None) -> Iterator[ShownSteps]:
     """A bar with the step's name on a terminal, and the time left where the ``total`` of steps is known.
 
-    Elsewhere nothing, or with ``--verbose`` a line a step with the seconds since the command began.
+    Elsewhere nothing, or with ``--verbose`` a line a step with the seconds since the command began. It is there at
+    once: what a command imports for its work belongs inside.
     """
     if talk.get() == "verbose":
         began = time.monotonic()
-        yield lambda text: click.echo(f"{time.monotonic() - began:6.1f} s  {text}", err=True)
+        yield ShownSteps(lambda text: click.echo(f"{time.monotonic() - began:6.1f} s  {text}", err=True))
         return
     if talk.get() == "quiet" or not sys.stderr.isatty():
-        yield lambda _: None
+        yield ShownSteps()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    known = (BarColumn(20), TextColumn("left"), TimeRemainingColumn()) if total else ()
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn(), *known,
-        console=Console(stderr=True), transient=True,
-    ) as bar:  # fmt: skip
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    left = (BarColumn(20), TextColumn("left"), TimeRemainingColumn())
+    with Progress(*columns, *(left if total else ()), console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("starting", total=total)
         done = -1
 
-        def step(text: str) -> None:
+        def show(text: str) -> None:
             nonlocal done
             done += 1
             bar.update(task, description=text, completed=done, total=max(total, done + 1) if total else None)
 
-        yield step
+        def of(whole: int) -> None:
+            nonlocal total
+            if not total:
+                bar.columns = (*columns, *left)
+            total = done + 1 + whole
+            bar.update(task, total=total)
+
+        yield ShownSteps(show, of)

@@ -29,23 +29,26 @@ def command(
     figures: str | None,
 ) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
-    from smartshoe.kernels import warm_up
-
-    warm_up.begin()
     from smartshoe.cli.output import emit_json, progress
-    from smartshoe.files.atomic import json_text, make_folder
-    from smartshoe.report.tables import print_summary
-    from smartshoe.runs.scenario import load, run, steps_of
-    from smartshoe.runs.scenario.keys import parse_assignments
-    from smartshoe.runs.scenario.publish import judged, publish
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
-    loaded, source = load(scenario, parse_assignments(assignments))
-    if seed is not None:
-        loaded = loaded.model_copy(update={"seed": seed})
-    folder = make_folder(out_folder) if out_folder is not None else None
-    with progress(steps_of(loaded) + (folder is not None)) as step:
+    with progress() as step:
+        step("reading the scenario")
+        from smartshoe.kernels import warm_up
+
+        warm_up.begin()
+        from smartshoe.files.atomic import json_text, make_folder
+        from smartshoe.report.tables import print_summary
+        from smartshoe.runs.scenario import load, run, steps_of
+        from smartshoe.runs.scenario.keys import parse_assignments
+        from smartshoe.runs.scenario.publish import judged, publish
+
+        loaded, source = load(scenario, parse_assignments(assignments))
+        if seed is not None:
+            loaded = loaded.model_copy(update={"seed": seed})
+        folder = make_folder(out_folder) if out_folder is not None else None
+        step.of(steps_of(loaded) + (folder is not None))
         result = run(loaded, source, step)
         whole = result.to_dict()
         report = None

@@ -15,15 +15,19 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
     Of a simulated trial the true loads are written too, as NAME_truth.csv.
     """
     from smartshoe.cli.output import progress
-    from smartshoe.files.atomic import make_folder
-    from smartshoe.files.logs import write
-    from smartshoe.runs.scenario import load, simulate, simulate_trial
 
-    loaded, source = load(scenario)
-    if seed is not None:
-        loaded = loaded.model_copy(update={"seed": seed})
-    folder = make_folder(out_folder)
     with progress() as step:
+        step("reading the scenario")
+        from smartshoe.files.atomic import make_folder
+        from smartshoe.files.logs import write
+        from smartshoe.runs.scenario import load, simulate, simulate_trial
+
+        loaded, source = load(scenario)
+        if seed is not None:
+            loaded = loaded.model_copy(update={"seed": seed})
+        folder = make_folder(out_folder)
+        pressed = sum(len(unit.recordings) or len(loaded.protocol) for unit in loaded.unit)
+        step.of(2 * pressed + 2 * (loaded.trial is not None))  # made and written
         made = simulate(loaded, source, step)
         for unit, recordings in made.items():
             for name, recording in recordings.items():

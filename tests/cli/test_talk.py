@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,3 +47,22 @@ def test_steps_are_lines_with_verbose_and_nothing_in_a_pipe_without(
     told = capsys.readouterr().err.splitlines()
     assert len(told) == lines
     assert all(line.endswith(word) for line, word in zip(told, ("one", "two"), strict=False))
+
+
+def test_a_number_of_steps_that_is_known_late_brings_the_time_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
+    with progress() as step:
+        step("reading the scenario")
+        step.of(2)
+        step("one")
+        step("two")
+    shown = terminal.getvalue()
+    assert "two" in shown
+    assert "left" in shown
