@@ -15,7 +15,7 @@ from smartshoe.errors import InputError, UnitError
 from smartshoe.recording import Recording
 from smartshoe.units import Unit
 
-LONGEST_HOLE_S = 10.0  # a longer one ends a stretch of recording; straight lines stand for shorter ones
+LONGEST_HOLE_S = 10.0  # a longer one ends a run of recording; straight lines stand for shorter ones
 ON_GRID = 0.02  # of a step, by which a sample may be off the even times
 HOLE_STEPS = 1.5
 PIECE_S = 20.0

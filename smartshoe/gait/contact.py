@@ -177,8 +177,8 @@ class ContactDetector:
     def _step(self, core_end: int) -> Contacts:
         """Tell the edges up to the place ``core_end`` and let go of what is no longer needed."""
         held = self._waiting[0] if len(self._waiting) == 1 else np.concatenate(self._waiting)
-        stretch = held[: core_end + self._margin - self._first]
-        contacts = self._told(stretch, core_end)
+        window = held[: core_end + self._margin - self._first]
+        contacts = self._found_in(window, core_end)
         self._done = core_end
         keep = max(0, core_end - self._margin - self._first)
         self._waiting = [held[keep:]]
@@ -186,13 +186,13 @@ class ContactDetector:
         self._first += keep
         return contacts
 
-    def _told(self, stretch: Array, core_end: int) -> Contacts:
-        found = cut(stretch.sum(axis=1), self.sample_rate_hz, self.least_load, self._scale, self._floor)
+    def _found_in(self, window: Array, core_end: int) -> Contacts:
+        found = cut(window.sum(axis=1), self.sample_rate_hz, self.least_load, self._scale, self._floor)
         if found is None:
             return self._none()
-        floors = floors_of(stretch, found, self.sample_rate_hz)
-        edges = find_edges(stretch, found, floors, self.sample_rate_hz, self._shapes)
-        parts = [self._floors_told(floors, core_end)]
+        floors = floors_of(window, found, self.sample_rate_hz)
+        edges = find_edges(window, found, floors, self.sample_rate_hz, self._shapes)
+        parts = [self._new_floors(floors, core_end)]
         parts += self._paired(edges, core_end)
         if edges.scale > 0.0:
             self._scale = edges.scale
@@ -204,7 +204,7 @@ class ContactDetector:
     def _time(self, place: Array | float) -> Array:
         return np.asarray(self.start_s + (np.asarray(place) + self._first) / self.sample_rate_hz)
 
-    def _floors_told(self, floors: tuple[Floors, Floors], core_end: int) -> Contacts:
+    def _new_floors(self, floors: tuple[Floors, Floors], core_end: int) -> Contacts:
         place = np.column_stack([floors[0].place, floors[1].place]).ravel()
         load = np.stack([floors[0].load, floors[1].load], axis=1).reshape(-1, len(self.regions))
         new = (place + self._first > self._last_floor + 1.0) & (place + self._first < core_end)
@@ -217,7 +217,7 @@ class ContactDetector:
         )
 
     def _paired(self, edges: Edges, core_end: int) -> list[Contacts]:
-        told: list[Contacts] = []
+        ended: list[Contacts] = []
         place_s, unit_s = self._time(edges.place), self._time(edges.units)
         nowhere = np.full(len(self.regions), np.nan)
         for k in range(edges.coarse.size):
@@ -231,6 +231,6 @@ class ContactDetector:
                 self._open = (float(place_s[k]), unit_s[k])
             else:
                 strike_s, onset_s = self._open if self._open is not None else (np.nan, nowhere)
-                told.append(self._contact(strike_s, onset_s, float(place_s[k]), unit_s[k]))
+                ended.append(self._contact(strike_s, onset_s, float(place_s[k]), unit_s[k]))
                 self._open = None
-        return told
+        return ended

@@ -119,7 +119,7 @@ class _Day:
         self._peaks: dict[str, deque[Array]] = {name: deque(maxlen=PEAKS) for name in feet}
         self._streams: dict[str, FootStream] = {}
         self._settled_s = self._run_s = 0.0
-        self._events: list[Event] = []  # waiting for their stretch
+        self._events: list[Event] = []  # waiting for their window
         self._listed_events: list[Event] = []
         self._listed: list[Stride] = []
         self.event_count = self.stride_count = 0

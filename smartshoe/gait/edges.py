@@ -1,4 +1,4 @@
-"""Edges of contact in a stretch of a foot's loads: heel strikes and toe offs, and when each unit comes and goes."""
+"""Edges of contact in a window of a foot's loads: heel strikes and toe offs, and when each unit comes and goes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Shapes:
 
 
 def floors_of(loads: Array, found: Cut, rate_hz: float) -> tuple[Floors, Floors]:
-    """The early and the late floor (k, r) of each swing; NaN where the stretch's end cuts it short."""
+    """The early and the late floor (k, r) of each swing; NaN where the window's end cuts it short."""
     total = np.concatenate([np.zeros((1, loads.shape[1])), np.cumsum(loads, axis=0)])
     length = (found.stop - found.start).astype(float)
     used = np.minimum(length, LONGEST_FLOOR_S * rate_hz)
@@ -87,11 +87,11 @@ def _filled(values: Array, other: Array) -> Array:
 
 
 def find_edges(loads: Array, found: Cut, floors: tuple[Floors, Floors], rate_hz: float, shapes: Shapes) -> Edges:
-    """The edges of all contacts in a stretch of loads (n, r); ``shapes`` are renewed by what is seen."""
+    """The edges of all contacts in a window of loads (n, r); ``shapes`` are renewed by what is seen."""
     size = loads.shape[0]
     early, late = _filled(floors[0].load, floors[1].load), _filled(floors[1].load, floors[0].load)
     inner_start, inner_stop = found.start > 0, found.stop < size
-    # Contact j lies between swing j - 1 and swing j; those at the stretch's ends are open.
+    # Contact j lies between swing j - 1 and swing j; those at the window's ends are open.
     begins = np.concatenate([[0], found.stop])
     ends = np.concatenate([found.start, [size]])
     before, after = np.vstack([late[:1] if late.size else early[:1], late]), np.vstack([early, early[-1:]])

@@ -13,7 +13,7 @@ from smartshoe.gait.estimate import BEYOND, UnitLoad, on_the_rail
 from smartshoe.gait.trial import Foot
 from smartshoe.recording import Channel
 
-BACK_S, AHEAD_S = 8.0, 8.0  # beside a stretch: two of the longest strides
+BACK_S, AHEAD_S = 8.0, 8.0  # beside a window: two of the longest strides
 HORIZON_S = 600.0  # so long a load waits for the next swing to tell its zero
 
 

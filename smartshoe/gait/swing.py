@@ -50,9 +50,9 @@ def boxcar(signal: Array, count: int) -> Array:
 
 
 def cut(load: Array, rate_hz: float, least_load: float, scale: float | None, floor: float | None) -> Cut | None:
-    """The swings in a stretch of a foot's whole load (n,); None where the load does not vary as a swing makes it.
+    """The swings in a window of a foot's whole load (n,); None where the load does not vary as a swing makes it.
 
-    ``scale`` and ``floor`` are those of the stretch before, None where nothing is known.
+    ``scale`` and ``floor`` are those of the window before, None where nothing is known.
     """
     found = _cut_level(load, rate_hz, least_load, scale, floor)
     for _ in range(MOST_TRENDS):
@@ -69,7 +69,7 @@ def cut(load: Array, rate_hz: float, least_load: float, scale: float | None, flo
 
 
 def _trend(load: Array, found: Cut) -> Array:
-    """The straight line (n,) that the floor follows, nought in the middle: the median of all slopes between swings."""
+    """The straight line (n,) that the floor follows, zero in the middle: the median of all slopes between swings."""
     total = np.concatenate([[0.0], np.cumsum(load)])
     level = (total[found.stop] - total[found.start]) / (found.stop - found.start)
     place = 0.5 * (found.stop + found.start)
@@ -114,7 +114,7 @@ def _low_runs(smooth: Array, off: float, on: float) -> tuple[Index, Index]:
 
 
 def _without_short(start: Index, stop: Index, size: int, rate_hz: float) -> tuple[Index, Index]:
-    """Short swings filled, then short contacts removed; those that touch the stretch's ends may be longer outside."""
+    """Short swings filled, then short contacts removed; those that touch the window's ends may be longer outside."""
     keep = ((stop - start) >= LEAST_SWING_S * rate_hz) | (start == 0) | (stop == size)
     start, stop = start[keep], stop[keep]
     return _joined(start, stop, (start[1:] - stop[:-1]) >= LEAST_CONTACT_S * rate_hz)

@@ -57,7 +57,7 @@ def total_of(feet: Mapping[str, Foot], forces: Mapping[str, Array]) -> TotalForc
 def standing_spans(
     feet: Mapping[str, Foot], contacts: Mapping[str, Contacts], loaded: Mapping[str, bool]
 ) -> list[tuple[float, float]]:
-    """Begin and end in s of the stretches in which every foot stays down for 2 s or more."""
+    """Begin and end in s of the spells in which every foot stays down for 2 s or more."""
     spans: list[tuple[float, float]] | None = None
     for name, foot in feet.items():
         own = [

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FEET = ("left", "right")
 GAP_STEPS = 2.5
-NEGATIVE = 10.0  # times further below nought than above it, loads count tension
+NEGATIVE = 10.0  # times further below zero than above it, loads count tension
 FEWEST_STEPS_PER_S = 0.2
 CALM_S, CALM_SHARE = 0.1, 0.2  # a fifth of the time at least a foot is in the air
 LEAST_RATE_HZ = 40.0
@@ -137,14 +137,14 @@ def _sides(
     bare = [(region, named[region]) for region in REGIONS if region in named]
     if not bare:
         return sides, []
-    told = _told_side(recording)
-    foot = told or next((side for side in FEET if side not in taken and side not in sides), FEET[number % 2])
+    named_side = _side_named(recording)
+    foot = named_side or next((side for side in FEET if side not in taken and side not in sides), FEET[number % 2])
     if foot in sides:
         raise InputError(
             f"{recording.label} holds {bare[0][0]} and {sides[foot][0][0]}: put left_ or right_ before the columns"
         )
     sides[foot] = [(f"{foot}_{region}", channel) for region, channel in bare]
-    if told is not None:
+    if named_side is not None:
         return sides, []
     return sides, [
         Flag(
@@ -156,7 +156,7 @@ def _sides(
     ]
 
 
-def _told_side(recording: Recording) -> str | None:
+def _side_named(recording: Recording) -> str | None:
     for text in (recording.unit or "", recording.metadata.get("side", ""), recording.name, recording.source):
         found = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", text.casefold())}
         if len(found) == 1:

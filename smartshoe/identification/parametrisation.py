@@ -43,7 +43,7 @@ class FreeForm:
 
     @property
     def size(self) -> int:
-        """Three."""
+        """How many parameters it has: three."""
         return 3
 
     def bounds(self) -> tuple[Array, Array]:

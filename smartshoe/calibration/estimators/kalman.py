@@ -50,9 +50,9 @@ def filter_of(model: StateSpace, calibration: Calibration, first: float, largest
 class KalmanEstimator(Estimator):
     """Estimators over the state of `smartshoe.calibration.estimators.state_space`.
 
-    The reading's noise and the spectral ``density`` of the load's wandering in N²/s³ are found from the readings where
-    they are None. A missing reading is a step without an update: the error bar grows. The delay that the calibration
-    found between load and reading is undone (`ahead`), which the paper's filter leaves in.
+    The reading's noise and the spectral ``density`` of the load's random walk in N²/s³ are found from the readings
+    where they are None. A missing reading is a step without an update: the error bar grows. The delay that the
+    calibration found between load and reading is undone (`ahead`), which the paper's filter leaves in.
     """
 
     def __init__(

@@ -16,21 +16,21 @@ ROUNDS = 20
 
 
 def reading_noise_sd(readings: Array, missing: Mask | None = None) -> float:
-    """The standard deviation of white noise on ``readings`` (n,), in their unit, at least the lattice's own.
+    """The standard deviation of white noise on ``readings`` (n,), in their unit, at least that of its quantisation.
 
-    Second differences take a level and a slope out; of short blocks those are kept that differ by no
-    more than noise does, from the calmest fifth on. A lattice of step d is a noise of d/sqrt(12).
+    Second differences take a level and a slope out; of short blocks those count that differ by no
+    more than noise does, from the calmest fifth on. Quantisation by steps of d is a noise of d/sqrt(12).
     """
-    kept = readings if missing is None else readings[~missing]
-    steps = np.abs(np.diff(kept))
+    there = readings if missing is None else readings[~missing]
+    steps = np.abs(np.diff(there))
     steps = steps[steps > 0]
     if steps.size == 0:
         return 0.0
-    lattice = float(np.quantile(steps, 0.01) / np.sqrt(12.0))
-    curvature = np.diff(kept, 2)
+    quantised = float(np.quantile(steps, 0.01) / np.sqrt(12.0))
+    curvature = np.diff(there, 2)
     count = curvature.size // BLOCK
     if count == 0:
-        return lattice
+        return quantised
     power = np.mean(curvature[: count * BLOCK].reshape(count, BLOCK) ** 2, axis=1)
     level = float(np.mean(np.sort(power)[: max(1, round(CALM * count))])) / LOWEST_FIFTH
     for _ in range(ROUNDS):
@@ -38,4 +38,4 @@ def reading_noise_sd(readings: Array, missing: Mask | None = None) -> float:
         if level == before:
             break
     # The variance of a second difference of white noise is six times the noise's.
-    return max(float(np.sqrt(level / 6.0)), lattice)
+    return max(float(np.sqrt(level / 6.0)), quantised)

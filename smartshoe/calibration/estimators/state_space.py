@@ -1,7 +1,7 @@
 """The unit and the load on it as a state: what the Kalman filters share.
 
 The state is (load F in N, its rate in N/s, the solid's slow strain w in N). The reading follows from Chinimilli 2016
-(13), turned round: reading = offset + F/b0 + (a1/b1 - 1/b0) w with w' = (b1/b0) (F - w). The load's rate wanders as
+(13), turned round: reading = offset + F/b0 + (a1/b1 - 1/b0) w with w' = (b1/b0) (F - w). The load's rate is
 integrated white noise of spectral density q in N²/s³ (a "nearly constant rate", Bar-Shalom, Li and Kirubarajan 2001,
 section 6.2.2); nothing is assumed of feet.
 """
@@ -35,7 +35,7 @@ class StateSpace:
 
 
 def contact_model(calibration: Calibration, sample_rate_hz: float, density: float, noise_sd: float) -> StateSpace:
-    """A load that wanders with spectral density ``density`` in N²/s³; ``noise_sd`` in the reading's unit."""
+    """A load whose rate is a random walk of ``density`` in N²/s³; ``noise_sd`` in the reading's unit."""
     flow = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     return _discretised(calibration, sample_rate_hz, flow, np.array([[0.0], [np.sqrt(density)], [0.0]]), noise_sd)
 

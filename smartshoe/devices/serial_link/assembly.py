@@ -29,7 +29,7 @@ class Assembler:
 
     ``first`` are samples of the stream, for their names and unit; ``to`` is the unit of the blocks, the samples' own
     where it is None. ``counts_samples`` is False where the device has no counter of its own (text lines): gaps are
-    then told from the time alone. A restarted device counts from nought: its time goes on where the host's clock says
+    then told from the time alone. A restarted device counts from zero: its time goes on where the host's clock says
     that it must be, and the clock is fitted anew.
     """
 

@@ -1,4 +1,4 @@
-"""A curve that rises everywhere and is free otherwise: its slope is straight between knots, and never nought."""
+"""A curve that rises everywhere and is free otherwise: its slope is straight between knots, and never zero."""
 
 from __future__ import annotations
 

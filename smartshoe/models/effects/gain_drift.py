@@ -1,4 +1,4 @@
-"""A gain that wanders with the clock or the temperature."""
+"""A gain that drifts with the clock or the temperature."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A zero that wanders with the clock or the temperature."""
+"""A zero that drifts with the clock or the temperature."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from smartshoe.calibration.estimators.state_space import contact_model
 
 
 class Kalman(KalmanEstimator):
-    """A load that wanders, seen through the solid."""
+    """A load whose rate is a random walk, seen through the solid."""
 
     def _run(self, density: float, noise_sd: float, largest: float) -> KalmanRun:
         model = contact_model(self.calibration, self.sample_rate_hz, density, noise_sd)
