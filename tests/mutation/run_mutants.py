@@ -104,7 +104,7 @@ class Checkout:
             if ended.status != 0:
                 raise SystemExit(f"{test} fails as the source is:\n{(self.path / 'said.txt').read_text()[-3000:]}")
             about = {"name": test, "digest": digest, "cost_s": round(ended.cpu_s, 2)}
-            self._kept.add({**about, "calls": sorted(ended.calls)})
+            self._kept.add({**about, "calls": [list(call) for call in sorted(ended.calls)]})
         return self._kept.tests[test]
 
     def tried(self, mutant: Mutant) -> Result:
