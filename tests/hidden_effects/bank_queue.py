@@ -47,6 +47,8 @@ class BankCases:
         found = hashlib.sha256()
         for room in rooms:
             for file in sorted(room.rglob("*.py")):
+                if file.name == "_version.py":  # made anew by each installation
+                    continue
                 found.update(file.relative_to(room).as_posix().encode() + b"\0" + file.read_bytes())
         return found.hexdigest()
 
@@ -74,14 +76,18 @@ def rows_over(
     folder: Path,
     workers: int,
     shard: tuple[int, int] = (1, 1),
+    scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
     compute: Callable[[BankCase], str] = computed,
 ) -> Iterator[dict[str, Any]]:
-    """Compute what the folder does not have of this shard, then give the rows of all jobs that are there, in order."""
+    """Compute what the folder does not have of this shard, then give the rows of all jobs that are there, in order.
+
+    ``scheduler`` is the address of a Dask scheduler; it and its workers need this folder on their PYTHONPATH.
+    """
     cases, queue = BankCases(jobs), SweepFolder(folder)
     queue.cases.mkdir(parents=True, exist_ok=True)
     mine = shard_of(len(jobs), shard)
-    compute_all(cases, queue, mine, place_of(workers, None, len(mine)), compute, progress)
+    compute_all(cases, queue, mine, place_of(workers, scheduler, len(mine)), compute, progress)
     for number in range(len(jobs)):
         name = cases.name(number)
         if queue.holds(name):

@@ -9,7 +9,8 @@
 
 The first index is included, the last is not. A run that was interrupted goes on where it stopped: rows that are in
 the file are not run again. With --queue the cases lie in a folder, one file each, as those of `smartshoe sweep`: it
-takes any number of workers and of job arrays (--shard K/N), and any number of kills.
+takes any number of workers and of job arrays (--shard K/N), the workers of a Dask cluster (--scheduler ADDRESS), and
+any number of kills.
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ def _over_the_queue(jobs: list[Job], given: argparse.Namespace) -> list[dict[str
         print(f"\r{done} of {to_do}", end="", file=sys.stderr, flush=True)
 
     shard = int(part), int(parts)
-    rows = list(rows_over(jobs, given.queue, given.workers, shard, tell))
+    rows = list(rows_over(jobs, given.queue, given.workers, shard, given.scheduler, tell))
     print(f"\n{len(rows)} of {len(jobs)} cases are there", file=sys.stderr)
     if given.rows:
         given.rows.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
@@ -113,6 +114,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, help="append every row here, and go on from what is there")
     parser.add_argument("--queue", type=Path, help="a folder that takes the cases, and goes on from there")
     parser.add_argument("--shard", default="1/1", metavar="K/N", help="with --queue: only the K-th of N parts")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="with --queue: a Dask scheduler whose workers compute")
     parser.add_argument("--again", type=Path, nargs="+", help="judge these rows instead of running anything")
     parser.add_argument("--by", choices=("effect", "law", "condition"), default="effect")
     given = parser.parse_args()
