@@ -121,6 +121,7 @@ for _symbol, _suffix, _quantity, _scale, _offset, _words in _TABLE:
     _BY_WORD.setdefault(unicodedata.normalize("NFKC", _symbol).casefold(), _unit)
     for _word in _words:
         _BY_WORD.setdefault(unicodedata.normalize("NFKC", _word).casefold(), _unit)
+_BY_SUFFIX["kg"] = _BY_SUFFIX["kgf"]  # as of a header's "(kg)": nothing here has a mass
 
 
 def find_unit(text: str) -> Unit | None:

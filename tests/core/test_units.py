@@ -27,6 +27,10 @@ def test_unknown_text_is_refused_by_name() -> None:
     assert declared("furlong").quantity == "unknown"
 
 
+def test_a_load_in_kilograms_is_one_in_kilograms_force() -> None:
+    assert unit_of_suffix("kg") == find_unit("(kg)") == unit("kgf")
+
+
 def test_each_suffix_leads_back_to_its_own_unit() -> None:
     for symbol, suffix, *_ in _TABLE:
         found = unit_of_suffix(suffix)
