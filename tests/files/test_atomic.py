@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.errors import UsageError
-from smartshoe.files.atomic import json_text, make_folder, replacing, write_text
+from smartshoe.files.atomic import json_text, make_folder, replacing, sync_folder, write_text
 from smartshoe.files.journal import AppendedFile
 
 
@@ -205,6 +205,21 @@ def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
         fill_the_disk()
     assert (tmp_path / "x.json").read_text() == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["x.json"]
+
+
+@pytest.mark.parametrize(("number", "is_told"), [(errno.EIO, True), (errno.EINVAL, False), (errno.ENOTSUP, False)])
+def test_a_folder_that_cannot_be_synced_is_told_but_where_the_file_system_knows_no_such_thing(
+    number: int, is_told: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(handle: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", failing)
+    if is_told:
+        with pytest.raises(OSError, match=os.strerror(number)):
+            sync_folder(tmp_path)
+    else:
+        sync_folder(tmp_path)
 
 
 def test_the_content_reaches_the_disk_before_its_name_and_the_name_before_the_return(
