@@ -1,7 +1,8 @@
 """Measured vertical forces in the place of simulated ones: plates' files, spread over the regions of two feet.
 
 Read are BMClab's files (Duarte, CC BY 4.0): ``.forces`` (several plates, whose vertical axis is FY), OpenSim's ``.mot``
-(``R_`` and ``L_ground_force_vy``) and two columns ``Time[s]  GRF[N]`` (both feet on one plate, half for each).
+(``R_`` and ``L_ground_force_vy``), C3D (plates of types 2 and 4) and two columns ``Time[s]  GRF[N]`` (both feet on one
+plate, half for each).
 
 *Left out:* which region truly bore what, as plates do not tell: regions follow the shares of
 `simulators.people.shape`. A plate that two feet met is not taken apart.
@@ -107,6 +108,8 @@ def measured(
 
 def _read(path: Path) -> tuple[Array, Array, bool]:
     """Time (n,), vertical forces (n, plates), and whether the columns are left and right."""
+    if path.suffix == ".c3d":
+        return *_of_c3d(path), False
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
@@ -130,7 +133,35 @@ def _read(path: Path) -> tuple[Array, Array, bool]:
             return rows[:, 0], np.maximum(rows[:, 1:2], 0.0), False
     except (ValueError, StopIteration, IndexError) as error:
         raise InputError(f"{path} is cut off or has other columns than its kind: {error}") from error
-    raise InputError(f"{path} is no plates' file that is known: give a .forces, a .mot, or columns Time[s] and GRF[N]")
+    raise InputError(
+        f"{path} is no plates' file that is known: give a .forces, a .mot, a .c3d, or columns Time[s] and GRF[N]"
+    )
+
+
+def _of_c3d(path: Path) -> tuple[Array, Array]:
+    """Time (n,) and vertical forces (n, plates) of a C3D file's plates of types 2 and 4; needs the extra ``c3d``."""
+    try:
+        import ezc3d
+    except ImportError as error:
+        raise InputError(f"{path} needs the package ezc3d: install smartshoe[c3d]") from error
+    try:
+        file = ezc3d.c3d(str(path))
+        platform, analog = file["parameters"]["FORCE_PLATFORM"], file["data"]["analogs"][0]
+        rate_hz = float(file["parameters"]["ANALOG"]["RATE"]["value"][0])
+        vertical = []
+        for plate, kind in enumerate(platform["TYPE"]["value"]):
+            channels = analog[np.asarray(platform["CHANNEL"]["value"])[:6, plate].astype(int) - 1]
+            if kind == 4:
+                channels = np.asarray(platform["CAL_MATRIX"]["value"])[:, :, plate] @ channels
+            elif kind != 2:
+                raise InputError(f"{path} has a plate of type {kind}: 2 and 4 are read")
+            first, last = (int(one) for one in platform["ZERO"]["value"])
+            # What the person does to the plate is the other way round of what the plate does to him.
+            vertical.append(np.median(channels[2, first - 1 : last]) - channels[2])
+    except (OSError, RuntimeError, KeyError, IndexError, ValueError) as error:
+        raise InputError(f"{path} is no C3D file with force plates: {error}") from error
+    force_n = np.stack(vertical, axis=1)
+    return np.arange(force_n.shape[0]) / rate_hz, np.maximum(force_n, 0.0)
 
 
 def _stances(force_n: Array, time_s: Array) -> list[tuple[int, int]]:

@@ -34,7 +34,7 @@ TRUTH_HZ = 1800.0  # of which the plates' rates are parts
 REPEATS = 12  # of a plates' recording, which holds a few stances
 REST_S = 0.6  # between the repeats
 OURS = "smartshoe"
-PLATES = ("walk1.forces", "walk2.forces", "grf_run.mot", "jump1.txt", "jump2.txt")
+PLATES = ("walk1.forces", "walk2.forces", "Gait.c3d", "grf_run.mot", "jump1.txt", "jump2.txt")
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +273,8 @@ def page(results: dict[str, dict[str, EventScore]]) -> str:
         " here by their names. Jumps are no gait: our detector tells contacts by the swings between them, and takes a"
         " flight that lasts less than a swing for none. They stand here because the plates do."
         " A stance that begins before the plates' recording or ends after it counts as *false* for every"
-        " algorithm alike.",
+        " algorithm alike. Of the other files that came with these, one holds a single stance, which does not tell body"
+        " weight (`BiomecII2018_gait_n.txt`), two have no times (`GRFZjump`), and one no load (`kistler_fp_data.txt`).",
     ]
     for case, scores in results.items():
         sound = [s for s in scores.values() if s.missed_percent <= 2.0 and s.false_percent <= 2.0] or [*scores.values()]

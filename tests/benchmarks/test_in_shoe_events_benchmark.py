@@ -19,7 +19,8 @@ def test_events_beside_the_seven(table: FigureTable, measured: Path, request: py
     code = measured.parent / "peers" / "in_shoe_events" / "Algorithms.py"
     if not code.is_file():
         pytest.skip(f"no peers at {code}")
-    pytest.importorskip("matplotlib")
+    for package in ("matplotlib", "ezc3d"):
+        pytest.importorskip(package)
     peers = load_peers(code)
     results = {case.name: scores_of(case, peers) for case in cases(measured / "grf_walking_running")}
     for case, scores in results.items():
