@@ -167,6 +167,16 @@ def test_no_effect_gets_no_wrong_name(protocol):
     assert not one.false_faults, told("no effect", diagnosis, one)
 
 
+@pytest.mark.parametrize(("name", "percent"), [("gas_heat", 0.8), ("warm_up", 1.5)])
+def test_what_only_a_convention_tells_apart_is_one_effect(name, percent):
+    """Heat is no second relaxation of a baseline that falls; what warms up is not off by its first second too."""
+    case = hide({name: percent}, protocol="shuffled", seed=5, recordings=2)
+    diagnosis, one = diagnosed(case)
+    assert [cause.name for cause in diagnosis.causes] == [name], told(name, diagnosis, one)
+    assert diagnosis.model.relaxing_share > 0.0
+    assert diagnosis.causes[0].kind_confidence >= diagnosis.causes[0].confidence
+
+
 OUTSIDE = [name for name in EFFECTS if not EFFECTS[name].inside]
 
 
