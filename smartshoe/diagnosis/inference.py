@@ -104,10 +104,10 @@ def infer(
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         again = _settled(_with_another_pole(state, sessions, thresholds), sessions, thresholds, progress)
-        state = _simpler(state, again, sessions)
+        state = again if _is_simpler(again.fit, state, sessions) else state
     if state.fit.model.relaxing_share < 0.0:
         again = _settled(_with_an_arm_that_creeps(state, sessions, thresholds), sessions, thresholds, progress)
-        state = _simpler(state, again, sessions)
+        state = again if _is_simpler(again.fit, state, sessions) else state
     state = _with_laws(state, sessions, thresholds)
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     refused: list[str] = []
@@ -163,22 +163,22 @@ class _State:
         """The candidates of the best set."""
         return tuple(self.given.candidates[m] for m in self.best.members)
 
-    def total(self, likelihood: Likelihood) -> float:
-        """-2 log likelihood of the fit, and of the odds against its effects."""
-        return likelihood.cost(self.fit.model) + self.evidence.odds * _effects(self.fit.model)
 
+def _is_simpler(other: Fit, state: _State, sessions: Sequence[Session]) -> bool:
+    """Whether ``other`` is likelier than the fit of ``state``, odds against effects counted; or has fewer of them.
 
-def _simpler(first: _State, second: _State, sessions: Sequence[Session]) -> _State:
-    """The likelier of two, odds against their members counted; that with fewer where they hardly read differently.
-
-    What is immaterial counts for nothing, however sure it is: an arm that imitates a lag of a millisecond needs another
-    one in its own place.
+    The number decides where the two hardly read differently: what is immaterial counts for nothing, however sure it is.
+    An arm that imitates a lag of a millisecond needs another one in its own place.
     """
-    thresholds = first.given.thresholds
-    likelihood = Likelihood(sessions, first.evidence.noise_sd, first.fit.model, thresholds)
-    if apart(likelihood.sessions, first.fit.model, second.fit.model) < thresholds.alike * thresholds.material:
-        return min(first, second, key=lambda one: (_effects(one.fit.model), one.total(likelihood)))
-    return min(first, second, key=lambda one: one.total(likelihood))
+    thresholds = state.given.thresholds
+    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    new, old = (
+        (likelihood.cost(one.model) + state.evidence.odds * _effects(one.model), _effects(one.model))
+        for one in (other, state.fit)
+    )
+    if apart(likelihood.sessions, state.fit.model, other.model) < thresholds.alike * thresholds.material:
+        return (new[1], new[0]) < (old[1], old[0])
+    return new[0] < old[0]
 
 
 def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> _State:
@@ -202,7 +202,8 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
     for name, arm in _arms(state.fit.model):
         likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = fit(likelihood, _with_arm(state.fit.model.without(name), arm))
-        state = _simpler(state, _State(*_searched(found.model, sessions, thresholds), found), sessions)
+        if _is_simpler(found, state, sessions):
+            state = _State(*_searched(found.model, sessions, thresholds), found)
     return state
 
 
@@ -273,10 +274,7 @@ def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: T
     An effect that bent the baseline's rate at first leaves the true rate to be found as a second arm.
     """
     likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
-    bare = state.fit.model
-    for part in bare.parts:
-        if isinstance(part.effect, CoreEffect):
-            bare = bare.without(part.name)
+    bare = _without_core_effects(state.fit.model)
     share = USUAL.relaxing_share
     starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in thresholds.memory_s]
     best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
@@ -289,10 +287,7 @@ def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresho
     Which of two exponentials is the baseline's is a convention: of a wall it is the one that creeps under load, and
     what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls.
     """
-    bare = state.fit.model
-    for part in bare.parts:
-        if isinstance(part.effect, CoreEffect):
-            bare = bare.without(part.name)
+    bare = _without_core_effects(state.fit.model)
     arms = [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in thresholds.memory_s]
     likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
     found = []
@@ -301,6 +296,13 @@ def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresho
         found.append(fit(likelihood, _with(given, best, start), FEW_STEPS))
     nearest = min(found, key=lambda one: one.cost + state.evidence.odds * _effects(one.model))
     return _State(*_searched(nearest.model, sessions, thresholds), nearest)
+
+
+def _without_core_effects(model: ExtendedModel) -> ExtendedModel:
+    for part in model.parts:
+        if isinstance(part.effect, CoreEffect):
+            model = model.without(part.name)
+    return model
 
 
 def _arms(model: ExtendedModel) -> list[tuple[str, Arm]]:
