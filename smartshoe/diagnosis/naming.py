@@ -13,15 +13,16 @@ from smartshoe.models.effects import Effect, catalogue
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """``kind``: probability of its family; ``confidence`` of the name; ``equivalents`` that nothing tells from it.
+    """``confidence`` that it is this effect or one of ``equivalents``, which nothing tells from it; ``law`` of the two.
 
-    ``kind_only``: its family is what was found; its equation follows no better than others of the family.
+    ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
+    family is what was found; its equation follows no better than others of the family.
     """
 
     member: Member
     effect: Effect
-    kind: float
     confidence: float
+    law: float
     equivalents: tuple[str, ...]
     kind_only: bool = False
 
@@ -31,24 +32,20 @@ def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> 
 
     A flexible block is named by the law of its family that comes nearest.
     """
-    made = [
-        _named(one, probability_of_kind(one, left, thresholds), thresholds)
-        for one in members
-        if one.size >= thresholds.material
-    ]
-    return tuple(one for one in made if one.kind >= thresholds.least_confidence)
+    likely = ((one, probability_of_kind(one, left, thresholds)) for one in members if one.size >= thresholds.material)
+    return tuple(_named(one, kind, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
 
 
 def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
-        return Name(one, one.effect, kind, kind * law, equivalents)
+        return Name(one, one.effect, kind, law, equivalents)
     family = [e for e in catalogue().values() if e.family == one.effect.family]
     margins = {a.effect: a.margin for a in one.laws}
     nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
-    # Whatever its law is, another one of the family follows as well.
-    return Name(one, nearest, kind, kind / 2.0 if others else kind, others, True)
+    # That none of the family follows better than another speaks for one that the catalogue does not have.
+    return Name(one, nearest, kind / 2.0, 1.0 / len(family), others, True)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:

@@ -313,7 +313,7 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
             Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")
         )
     values = parameters_of(found.fit, member.name, given.scale)
-    sure = name.confidence, name.kind
+    sure = name.confidence, name.law
     return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals)
 
 
@@ -353,9 +353,9 @@ def _zero_cause(
         thresholds.zero_deviations,
         f"it is {deviations:.3g} standard deviations from nothing",
     )
-    sure = 1.0 / (1.0 + len(zero.alternatives)) if zero.alternatives else thresholds.seen_confidence
+    sure = thresholds.seen_confidence, 1.0 / (1.0 + len(zero.alternatives))
     evidence = (seen, *_held_out_evidence(zero.size, won))
-    return Cause(zero.effect, sure, sure, zero.alternatives, values, evidence, won, zero.size)
+    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
 
 
 def _with_offset(

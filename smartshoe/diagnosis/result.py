@@ -58,13 +58,13 @@ class Rival:
 class Cause:
     """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale.
 
-    ``confidence`` that it is this very effect, one half in a dead heat of two laws; ``kind_confidence`` that it is one
-    of its family.
+    ``confidence`` that it is this effect or one of its ``equivalents``, which this data cannot tell from it;
+    ``law_confidence`` that, if so, it is this one and not its nearest rival: one half in a dead heat.
     """
 
     effect: Effect
     confidence: float
-    kind_confidence: float
+    law_confidence: float
     equivalents: tuple[str, ...]
     parameters: dict[str, Parameter]
     evidence: tuple[Statement, ...]
@@ -84,7 +84,7 @@ class Cause:
             "family": self.effect.family,
             "stage": self.effect.stage,
             "confidence": self.confidence,
-            "kind_confidence": self.kind_confidence,
+            "law_confidence": self.law_confidence,
             "equivalents": list(self.equivalents),
             "parameters": {
                 name: {key: value for key, value in parameter.to_dict().items() if key != "sd"}

@@ -71,12 +71,17 @@ def test_a_rival_that_leaves_as_much_as_laws_usually_depart_is_one_standard_devi
 
 
 @given(st.floats(0.0, 1e4))
-def test_a_names_confidence_is_that_of_its_kind_shared_with_its_rivals(margin: float) -> None:
+def test_a_name_is_as_sure_as_its_kind_and_its_law_shared_with_the_nearest_rival(margin: float) -> None:
     one = member(size=0.1, laws=(("orifice_leak", margin),))
     name = only(names_of([one], 0.0, STANDARD))
-    assert name.kind == probability_of_kind(one, 0.0, STANDARD)
-    assert name.confidence == pytest.approx(name.kind * probability_of_law(one, STANDARD)[0])
-    assert name.kind / 2.0 <= name.confidence <= name.kind
+    assert name.confidence == probability_of_kind(one, 0.0, STANDARD)
+    assert (name.law, name.equivalents) == probability_of_law(one, STANDARD)
+    assert 0.5 <= name.law <= 1.0
+
+
+def test_a_dead_heat_of_two_laws_is_one_half() -> None:
+    name = only(names_of([member(size=0.1, laws=(("orifice_leak", 0.0),))], 0.0, STANDARD))
+    assert (name.law, name.equivalents) == (0.5, ("orifice_leak",))
 
 
 def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
@@ -109,7 +114,8 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family
-    assert name.confidence == pytest.approx(name.kind / 2.0)
+    assert name.confidence == pytest.approx(probability_of_kind(name.member, 0.0, STANDARD) / 2.0)
+    assert name.law == pytest.approx(1.0 / len(family))
 
 
 # -- what each number decides -----------------------------------------------------------------------------------

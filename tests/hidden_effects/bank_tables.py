@@ -129,7 +129,7 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
         return Figure(name, value, "%", len(of), wilson(hits, len(of)), *asked.get(key, (None, None)), not down, key)
 
     names = [pair for _, j in cases for pair in j.names]
-    kinds = [pair for _, j in cases for pair in j.kinds]
+    laws = [pair for _, j in cases for pair in j.laws]
     explained = [j.explained for _, j in hidden if j.explained is not None]
     held = [j for r, j in cases if "verdict" in r["found"]]
     cpu = sorted(r["cpu_s"] for r, _ in cases)
@@ -151,8 +151,8 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
         share("cases with a false name", "", [*one, *two, *three], lambda j: bool(j.false), down=True),
         plain("calibration error of the confidence", "calibration", calibration_error(names), "", len(names), True),
         plain("area under its curve", "area", area_under_curve(names), "", len(names), False),
-        plain("the same of the kind's: error", "calibration", calibration_error(kinds), "", len(kinds), True),
-        plain("the same of the kind's: area", "area", area_under_curve(kinds), "", len(kinds), False),
+        plain("the same of the law's: error", "", calibration_error(laws), "", len(laws), True),
+        plain("the same of the law's: area", "", area_under_curve(laws), "", len(laws), False),
         plain("held-out variance explained, of what could be (mean)", "explained",
               100.0 * float(np.mean(np.clip(explained, -1, 1))) if explained else float("nan"), "%",
               len(explained), False),

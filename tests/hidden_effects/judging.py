@@ -11,9 +11,8 @@
   what is there, and it must be that where a tare or an offset of 0.15 % and more is there.
 - *false names*: causes that are neither hidden nor a nuisance or condition, by effect or family. A second name in the
   hidden family is a *companion*, counted apart.
-- *confidence*: right is a cause that is the very effect that is there, hidden or not, or cannot be told from it and has
-  it among its equivalents; one half in a dead heat of two laws is right half of the time. That of the *kind*: right is
-  a cause of a family that is there.
+- *confidence*: right is a cause that is neither false nor a companion. That of the *law*, of the causes that are right:
+  it is the very effect that is there, hidden or not.
 - *explained*: of the held-out variance that could be explained, 1 - (extended^2 - noise^2)/(baseline^2 - noise^2).
 """
 
@@ -40,7 +39,7 @@ Found = Mapping[str, Any]
 
 @dataclass
 class Judgement:
-    """One answer judged; ``names`` are (confidence, right) of each cause, ``kinds`` those of its family."""
+    """One answer judged; ``names`` are (confidence, right) of each cause, ``laws`` those of its law."""
 
     exact: bool = False
     all_named: bool = False
@@ -52,7 +51,7 @@ class Judgement:
     false_faults: list[str] = field(default_factory=list)
     hedges: int = 0
     names: list[tuple[float, bool]] = field(default_factory=list)
-    kinds: list[tuple[float, bool]] = field(default_factory=list)
+    laws: list[tuple[float, bool]] = field(default_factory=list)
     explained: float | None = None
     worse: bool = False
     raised: bool = False
@@ -125,17 +124,17 @@ def _hits(asked: list[Found], causes: list[Found], meant: set[str]) -> list[Foun
 
 
 def _sort_in(out: Judgement, cause: Found, real: list[Found], names: set[str], families: set[str]) -> None:
-    itself = any(is_it(cause, e) for e in real) or cause["effect"] in names
-    right = itself or cause["family"] in families
+    there = names | {e["id"] for e in real}
+    right = any(is_it(cause, e) for e in real) or cause["effect"] in names or cause["family"] in families
     if not right and cause["family"] in {e["family"] for e in real}:
         out.companions.append(cause["effect"])
     elif not right and cause["family"] != "noise":
         out.false.append(cause["effect"])
         if cause["confidence"] > SURE:
             out.sure_false.append(cause["effect"])
-    out.names.append((float(cause["confidence"]), itself))
-    if "kind_confidence" in cause:
-        out.kinds.append((float(cause["kind_confidence"]), right or cause["family"] in {e["family"] for e in real}))
+    out.names.append((float(cause["confidence"]), right))
+    if right and "law_confidence" in cause:
+        out.laws.append((float(cause["law_confidence"]), cause["effect"] in there))
     for effect in real:
         if cause["effect"] == effect["id"]:
             out.hedges += sum(q not in effect["cannot_be_told_from"] for q in cause.get("equivalents") or ())

@@ -174,7 +174,6 @@ def test_what_only_a_convention_tells_apart_is_one_effect(name, percent):
     diagnosis, one = diagnosed(case)
     assert [cause.name for cause in diagnosis.causes] == [name], told(name, diagnosis, one)
     assert diagnosis.model.relaxing_share > 0.0
-    assert diagnosis.causes[0].kind_confidence >= diagnosis.causes[0].confidence
 
 
 OUTSIDE = [name for name in EFFECTS if not EFFECTS[name].inside]

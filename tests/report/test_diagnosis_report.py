@@ -101,7 +101,7 @@ def _goodness(trace: Trace, simulated: np.ndarray, structure: float) -> Goodness
 LEAK_CAUSE = Cause(
     LEAK[0],
     0.9931,
-    0.9931,
+    1.0,
     (),
     {"leak_rate": Parameter.from_sd(0.002, 0.00003, "1/s")},
     (Statement("fall", 1234.0, 30.0, "without it the fit is worse by 1234 where 30 would do"),),
@@ -111,8 +111,8 @@ LEAK_CAUSE = Cause(
 )
 PLAY_CAUSE = Cause(
     PLAY[0],
-    0.62,
     0.95,
+    0.62,
     ("bouc_wen_hysteresis",),
     {"half_height": Parameter.from_sd(9.6, 0.4, "N"), "width": Parameter.from_sd(80.0, math.nan, "N")},
     (Statement("fall", 321.0, 30.0, "without it the fit is worse by 321 where 30 would do"),),
@@ -282,7 +282,7 @@ def test_pointing_at_the_error_reads_it_and_dragging_zooms(browser: Browser, pag
 def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be() -> None:
     text = plain_text(page("two causes"))
     assert "1. Linear leak: over 99 % sure" in text
-    assert "2. Play hysteresis: 62 % sure, of its kind 95 %; or it is bouc wen hysteresis" in text
+    assert "2. Play hysteresis: 95 % sure that it is this or bouc wen hysteresis, 62 % for this one" in text
     assert LEAK[0].says[1:] in text
     assert "0.002000 [0.001941, 0.002059] 1/s" in text
     assert "9.60 [8.82, 10.38] N" in text

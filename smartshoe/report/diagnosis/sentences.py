@@ -41,9 +41,10 @@ def sure(confidence: float) -> str:
 
 
 def how_sure(cause: Cause) -> str:
-    """The confidence of a cause's name, and that of its kind where it is another."""
-    name, kind = sure(cause.confidence), sure(cause.kind_confidence)
-    return f"{name} sure" if name == kind else f"{name} sure, of its kind {kind}"
+    """The confidence of a cause, and where others may be meant how far it is this one."""
+    said = f"{sure(cause.confidence)} sure"
+    meant = listed(("this", *cause.equivalents))
+    return f"{said} that it is {meant}, {sure(cause.law_confidence)} for this one" if cause.equivalents else said
 
 
 def unit_of(symbol: str) -> str:
