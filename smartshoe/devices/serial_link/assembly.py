@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array, Integers
 from smartshoe.devices.base import Block
@@ -55,10 +56,11 @@ class Assembler:
         self._shift_s = 0.0
         self._last: tuple[int, int, float, float] | None = None  # boot, sequence, time and arrival of the last sample
 
-    def take(self, samples: Samples, arrival_s: float) -> tuple[Block, list[ShoeEvent]]:
-        """One block of ``samples`` (one at least), which came at ``arrival_s``, and what befell the stream before."""
+    def take(self, samples: Samples, arrival_s: ArrayLike) -> tuple[Block, list[ShoeEvent]]:
+        """One block of ``samples`` (one at least), come at ``arrival_s`` (n,), and what befell the stream before."""
         events: list[ShoeEvent] = []
         scaled = self._scaled(samples)
+        arrivals_s = np.array(np.broadcast_to(np.asarray(arrival_s, dtype=np.float64), len(scaled)))
         if scaled.unit != self.comes_in:
             raise DeviceError(
                 f"the shoe's readings changed from {self.comes_in.symbol} to {scaled.unit.symbol}: open it again, or"
@@ -67,7 +69,7 @@ class Assembler:
         boots = np.flatnonzero(np.diff(scaled.boot)) + 1
         ends = [*boots.tolist(), len(scaled)]
         blocks = [
-            self._take_boot(scaled, slice(start, end), arrival_s, events)
+            self._take_boot(scaled, slice(start, end), arrivals_s[start:end], events)
             for start, end in zip([0, *ends], ends, strict=False)
         ]
         return joined(blocks), events
@@ -75,35 +77,36 @@ class Assembler:
     def _scaled(self, samples: Samples) -> Samples:
         return samples if self._information is None else self._information.scale(samples)
 
-    def _take_boot(self, samples: Samples, part: slice, arrival_s: float, events: list[ShoeEvent]) -> Block:
+    def _take_boot(self, samples: Samples, part: slice, arrival_s: Array, events: list[ShoeEvent]) -> Block:
         """Samples of one boot."""
         sequence, device_s, boot = samples.sequence[part], samples.device_time_s[part], int(samples.boot[part][0])
         if self._last is not None and boot != self._last[0]:
             # A restart within one arrival still has to move on: time increases, if by a microsecond.
-            resumes_s = self._last[2] + max(arrival_s - self._last[3], 1e-6)
+            resumes_s = self._last[2] + max(float(arrival_s[0]) - self._last[3], 1e-6)
             self._shift_s = resumes_s - float(device_s[0])
             self._last = None
             self.clock = DeviceClock()
-            events.append(Restarted(arrival_s, resumes_s))
+            events.append(Restarted(float(arrival_s[0]), resumes_s))
         time_s = device_s + self._shift_s
-        self._require_seconds(float(time_s[-1]), arrival_s)
+        self._require_seconds(float(time_s[-1]), float(arrival_s[-1]))
         self._find_gaps(sequence, time_s, arrival_s, events)
-        self._last = (boot, int(sequence[-1]), float(time_s[-1]), arrival_s)
-        arrivals_s = np.full(time_s.size, arrival_s)
-        self.clock.update(time_s, arrivals_s)
+        self._last = (boot, int(sequence[-1]), float(time_s[-1]), float(arrival_s[-1]))
+        self.clock.update(time_s, arrival_s)
         readings = self.comes_in.convert(samples.readings[part], self.unit)
         return Block(
-            time_s, readings, samples.missing[part], self.names, self.unit, self.clock.host_time(time_s), arrivals_s
+            time_s, readings, samples.missing[part], self.names, self.unit, self.clock.host_time(time_s), arrival_s
         )
 
-    def _find_gaps(self, sequence: Integers, time_s: Array, arrival_s: float, events: list[ShoeEvent]) -> None:
+    def _find_gaps(self, sequence: Integers, time_s: Array, arrival_s: Array, events: list[ShoeEvent]) -> None:
         if self._last is not None:
             sequence, time_s = np.append(self._last[1], sequence), np.append(self._last[2], time_s)
+            arrival_s = np.append(self._last[3], arrival_s)
         if time_s.size < 2:
             return
         steps = self._steps(sequence, time_s)
         events += [
-            Gap(arrival_s, int(steps[i]) - 1, float(time_s[i]), float(time_s[i + 1])) for i in np.flatnonzero(steps > 1)
+            Gap(float(arrival_s[i + 1]), int(steps[i]) - 1, float(time_s[i]), float(time_s[i + 1]))
+            for i in np.flatnonzero(steps > 1)
         ]
         if not self._is_rated:
             self._steps_s += (np.diff(time_s) / steps).tolist()

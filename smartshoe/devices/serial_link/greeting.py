@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from smartshoe.arrays import Array
+from smartshoe.devices.serial_link.arrivals import Arrivals
 from smartshoe.devices.serial_link.port import Port
 from smartshoe.devices.serial_link.settings import SerialSettings
 from smartshoe.devices.wire.frames import Command, FrameDecoder, encode_command
@@ -28,10 +30,11 @@ Decoder = FrameDecoder | LineDecoder
 
 @dataclass(eq=False)
 class Greeting:
-    """How the shoe talks: its decoder, its information where it has any, the samples so far with their arrival."""
+    """How the shoe talks: its decoder, its information where it has any, the samples so far and when they came."""
 
     decoder: Decoder
-    first: list[tuple[Samples, float]] = field(default_factory=list)
+    first: list[tuple[Samples, Array]] = field(default_factory=list)
+    arrivals: Arrivals = field(default_factory=Arrivals)
 
     @property
     def takes_commands(self) -> bool:
@@ -42,7 +45,7 @@ class Greeting:
         """Whether samples came, and what they do not say: frames' information, lines' rate; each is waited for."""
         if not self.first:
             return False
-        waited_s = now_s - self.first[0][1]
+        waited_s = now_s - float(self.first[0][1][0])
         if self.takes_commands:
             return self.information is not None or waited_s > INFORMATION_WAIT_S
         first, last = self.first[0][0], self.first[-1][0]
@@ -101,12 +104,13 @@ def greet(name: str, port: Port, settings: SerialSettings, clock: Callable[[], f
             if format_ is None:
                 continue
             greeting, data = Greeting(decoder_for(format_, settings)), seen
+        greeting.arrivals.note(len(data), arrival_s)
         samples = greeting.decoder.feed(data)
         if greeting.has_other_channels(samples):
             greeting = Greeting(decoder_for("frames", settings, greeting.information))
             continue
         if len(samples):
-            greeting.first.append((samples, arrival_s))
+            greeting.first.append((samples, greeting.arrivals.of(samples.end)))
         if greeting.is_complete(arrival_s):
             return greeting
     raise DeviceTimeoutError(

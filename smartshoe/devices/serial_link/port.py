@@ -8,6 +8,7 @@ is neither: all three become `DeviceError` here.
 from __future__ import annotations
 
 import errno
+import select
 import sys
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,8 +22,8 @@ WRITE_WAIT_S = 0.5
 class Port(Protocol):
     """What `SerialShoe` needs of a port; every method raises `DeviceError` once the peer is gone."""
 
-    def read(self) -> bytes:
-        """What has come, waiting `READ_WAIT_S` at most for the first byte; empty where nothing came."""
+    def read(self, wait_s: float = READ_WAIT_S) -> bytes:
+        """What has come, waiting ``wait_s`` at most for the first byte; empty where nothing came."""
 
     def write(self, data: bytes) -> None:
         """Send ``data`` within `WRITE_WAIT_S`."""
@@ -56,13 +57,23 @@ class SerialPort:
         except self._errors as error:
             raise DeviceError(why_not_open(path, error)) from error
 
-    def read(self) -> bytes:
+    def read(self, wait_s: float = READ_WAIT_S) -> bytes:
         """See `Port.read`."""
         try:
+            if not self._is_ready(wait_s):
+                return b""
             data: bytes = self._serial.read(max(1, self._serial.in_waiting))
         except self._errors as error:
             raise DeviceError(f"port {self._path} was lost ({_short(error)})") from error
         return data
+
+    def _is_ready(self, wait_s: float) -> bool:
+        """Whether there is something to read, within ``wait_s``; on Windows the reading itself waits."""
+        if sys.platform == "win32":
+            self._serial.timeout = wait_s
+            return True
+        # pyserial would set up the whole port anew for each other time to wait.
+        return bool(select.select([self._serial.fileno()], [], [], wait_s)[0])
 
     def write(self, data: bytes) -> None:
         """See `Port.write`."""

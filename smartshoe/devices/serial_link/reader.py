@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from smartshoe.arrays import Array
 from smartshoe.devices.events import Disconnected, EventLog, Reconnected, Silence, ToldLate
 from smartshoe.devices.serial_link.assembly import Assembler
 from smartshoe.devices.serial_link.greeting import Decoder, Greeting, farewell, hello
 from smartshoe.devices.serial_link.inbox import Inbox
-from smartshoe.devices.serial_link.port import Port
+from smartshoe.devices.serial_link.port import READ_WAIT_S, Port
 from smartshoe.devices.serial_link.reconnect import Backoff
 from smartshoe.devices.serial_link.settings import SerialSettings
 from smartshoe.devices.wire.samples import Samples
@@ -19,6 +20,9 @@ from smartshoe.errors import DeviceError, DeviceTimeoutError
 JOIN_S = 2.0
 MOST_DOUBLINGS = 3
 PAUSE_SAMPLES = 5.0
+# What comes within this time of a first byte is decoded together: the work is by the call, not by the sample. Each
+# piece is read, and its time taken, as it comes.
+GATHER_S = 0.012
 
 
 class SerialReader:
@@ -95,18 +99,35 @@ class SerialReader:
         port = self._port
         if port is None:
             raise _LostError(self._reason)
-        try:
-            data = port.read()
-        except DeviceError as error:
-            raise _LostError(str(error)) from error
+        data, lost = self._gathered(port)
         now_s = self._clock()
         samples = self.decoder.feed(data) if data else None
         self._require_the_same_shoe()
-        if samples is None or not len(samples):
+        if samples is not None and len(samples):
+            self._valid(now_s)
+            self._hand_on(samples, self.greeting.arrivals.of(samples.end))
+        elif lost is None:
             self._watch(now_s)
-            return
-        self._valid(now_s)
-        self._hand_on(samples, now_s)
+        if lost is not None:
+            raise _LostError(str(lost)) from lost
+
+    def _gathered(self, port: Port) -> tuple[bytes, DeviceError | None]:
+        """What came within `GATHER_S` of the first byte, if any did, and the error that ended the port meanwhile."""
+        pieces: list[bytes] = []
+        wait_s, until_s = READ_WAIT_S, 0.0
+        while wait_s > 0.0 and not self._closing.is_set():
+            try:
+                piece = port.read(wait_s)
+            except DeviceError as error:
+                return b"".join(pieces), error
+            now_s = self._clock()
+            if not piece:
+                break
+            until_s = until_s if pieces else now_s + GATHER_S
+            wait_s = until_s - now_s
+            self.greeting.arrivals.note(len(piece), now_s)
+            pieces.append(piece)
+        return b"".join(pieces), None
 
     def _require_the_same_shoe(self) -> None:
         said = self.greeting.information
@@ -122,7 +143,7 @@ class SerialReader:
                 " bring that one back, or open again to go on with this one"
             )
 
-    def _hand_on(self, samples: Samples, arrival_s: float) -> None:
+    def _hand_on(self, samples: Samples, arrival_s: Array) -> None:
         block, events = self.assembler.take(samples, arrival_s)
         self.log.add(*events)
         self.inbox.put(block)

@@ -58,6 +58,7 @@ class FrameDecoder:
             ]
         )
         self._held = np.zeros((1, len(self._names)), dtype="<u2")
+        self._held_end = np.zeros(1, dtype=np.int64)
         self._scanner = FrameScanner(self._form.itemsize, self.counters)
         self._present = np.zeros(len(self._names))
 
@@ -79,8 +80,10 @@ class FrameDecoder:
         frames = np.ascontiguousarray(payloads.T).view(self._form)[:, 0]
         readings = np.concatenate([self._held, frames["readings"]])
         placed = self._ordering.place(frames["count"].astype(np.int64), frames["clock"].astype(np.int64))
+        end = np.concatenate([self._held_end, scanned.end])
         if placed.held is not None:
             self._held = readings[placed.held : placed.held + 1].copy()
+            self._held_end = end[placed.held : placed.held + 1]
         if not placed.rows.size:
             return Samples.empty(self._names)
         values = readings[placed.rows].astype(np.float64)
@@ -93,6 +96,7 @@ class FrameDecoder:
             self._names,
             COUNTS,
             placed.boot.copy(),
+            end[placed.rows],
         )
 
     def _carried(self, values: Array, missing: Mask) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from statistics import median
 from typing import Literal
@@ -21,11 +21,15 @@ REMEMBERED = 64
 
 @dataclass(frozen=True, slots=True)
 class ReadingLine:
-    """A line's ``time`` (as written, or in s once placed) and readings (channels,), NaN where there is none."""
+    """A line's ``time`` (as written, or in s once placed) and readings (channels,), NaN where there is none.
+
+    ``end`` is how many bytes of the stream had come when the line was whole; a line sent twice is the same line.
+    """
 
     time: float
     readings: tuple[float, ...]
     boot: int = 0
+    end: int = field(default=0, compare=False)
 
 
 class LineClock:

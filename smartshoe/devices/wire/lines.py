@@ -87,14 +87,17 @@ class LineDecoder:
     def feed(self, data: bytes) -> Samples:
         """The samples that became sure with ``data``, maybe none."""
         self.counters.bytes += len(data)
-        *whole, rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
+        data = self._rest + data
+        *whole, rest = data.replace(b"\r", b"\n").split(b"\n")
         lines: list[ReadingLine] = []
+        end = self.counters.bytes - len(data)
         for line in whole:
+            end += len(line) + 1
             was_cut, self._is_cut = self._is_cut, False
             if was_cut or len(line) > LONGEST_LINE:
                 self._blame()
             elif line:
-                self._read(line, lines)
+                self._read(line, end, lines)
         self._is_cut |= len(rest) > LONGEST_LINE
         self._rest = rest[:1] if self._is_cut else rest
         return self._samples(lines)
@@ -106,8 +109,8 @@ class LineDecoder:
             self.counters.malformed += 1
         self._is_lost = True
 
-    def _read(self, line: bytes, lines: list[ReadingLine]) -> None:
-        """One line: a sample onto ``lines`` (as soon as its clock is sure), a header, a comment, garbage."""
+    def _read(self, line: bytes, end: int, lines: list[ReadingLine]) -> None:
+        """One line, whole at byte ``end``: a sample onto ``lines`` (once it is sure), a header, a comment, garbage."""
         try:
             text = line.decode("utf-8").strip().lstrip("\ufeff\0")
         except UnicodeDecodeError:
@@ -128,7 +131,7 @@ class LineDecoder:
             self._blame()
             return
         fields = split_fields(text)
-        sample = self._sample(fields)
+        sample = self._sample(fields, end)
         if sample is None:
             if self._take_header(fields):
                 self.counters.information += 1
@@ -141,7 +144,7 @@ class LineDecoder:
             self.counters.resynchronisations += 1
         lines.extend(self._clock.place(sample))
 
-    def _sample(self, fields: list[str]) -> ReadingLine | None:
+    def _sample(self, fields: list[str], end: int) -> ReadingLine | None:
         layout = self._layout
         if len(fields) == layout.fields + 1 and not fields[-1]:
             fields = fields[:-1]  # a sketch's loop prints a separator behind every number
@@ -157,7 +160,7 @@ class LineDecoder:
             if value is None or math.isinf(value):
                 return None
             readings.append(value)
-        return ReadingLine(time, tuple(readings))
+        return ReadingLine(time, tuple(readings), end=end)
 
     def _take_header(self, fields: list[str]) -> bool:
         """Whether the fields are a header with this decoder's columns; if so it holds from here."""
@@ -214,6 +217,7 @@ class LineDecoder:
             self._names,
             self._unit,
             np.array([line.boot for line in lines], dtype=np.int64),
+            np.array([line.end for line in lines], dtype=np.int64),
         )
 
 

@@ -20,7 +20,8 @@ class Samples:
     ``sequence`` (n,) counts samples and ``device_time_s`` (n,) is the device's clock, both unwrapped over the wire's
     16 and 32 bits and over loss; ``boot`` (n,) counts how often the device had restarted by then: sequence and time
     start anew with each. ``readings`` (n, channels) in ``unit``; where ``missing`` (n, channels), the last reading
-    that was there, or 0.
+    that was there, or 0. ``end`` (n,) is how many bytes of the stream had come when each was whole: whoever knows when
+    bytes came knows by it when each sample did, however many were decoded together.
     """
 
     sequence: Integers
@@ -30,6 +31,7 @@ class Samples:
     names: tuple[str, ...]
     unit: Unit
     boot: Integers
+    end: Integers
 
     def __len__(self) -> int:
         return int(self.sequence.size)
@@ -39,7 +41,7 @@ class Samples:
         """No samples."""
         none = np.zeros(0, dtype=np.int64)
         shape = (0, len(names))
-        return cls(none, np.zeros(0), np.zeros(shape), np.zeros(shape, dtype=bool), names, unit, none)
+        return cls(none, np.zeros(0), np.zeros(shape), np.zeros(shape, dtype=bool), names, unit, none, none)
 
 
 def join_samples(parts: Sequence[Samples]) -> Samples:
@@ -53,4 +55,5 @@ def join_samples(parts: Sequence[Samples]) -> Samples:
         readings=np.concatenate([part.readings for part in parts]),
         missing=np.concatenate([part.missing for part in parts]),
         boot=np.concatenate([part.boot for part in parts]),
+        end=np.concatenate([part.end for part in parts]),
     )

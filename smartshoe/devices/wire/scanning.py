@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.arrays import Index, Mask
+from smartshoe.arrays import Index, Integers, Mask
 from smartshoe.devices.wire.checksums import Bytes, checksums
 from smartshoe.devices.wire.counters import Counters
 from smartshoe.devices.wire.framing import is_intact, unframed
@@ -26,9 +26,13 @@ _PRINTABLE = frozenset(range(0x20, 0x7F))
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """``payloads`` (length, n): the bytes of n sample frames, type first, checksum last; ``information`` the newest."""
+    """``payloads`` (length, n): the bytes of n sample frames, type first, checksum last; ``information`` the newest.
+
+    ``end`` (n,) is how many bytes of the stream had come when each frame was whole.
+    """
 
     payloads: Bytes
+    end: Integers
     information: Information | None
 
 
@@ -54,7 +58,7 @@ class FrameScanner:
         if 0 not in data:
             self._is_cut |= len(data) > LONGEST_ENCODED
             self._rest = data[-LONGEST_ENCODED:]
-            return Scanned(np.zeros((self._length - 1, 0), dtype=np.uint8), None)
+            return Scanned(np.zeros((self._length - 1, 0), dtype=np.uint8), np.zeros(0, dtype=np.int64), None)
         buffer = np.frombuffer(data, dtype=np.uint8)
         ends = np.flatnonzero(buffer == 0)
         rest = data[int(ends[-1]) + 1 :]
@@ -89,7 +93,8 @@ class FrameScanner:
         was_lost = np.concatenate([[self._is_lost], ~is_good[:-1]]) | has_prefix if ends.size else has_prefix
         self._counters.resynchronisations += int((was_lost & is_good).sum())
         self._is_lost = not is_good[-1] if ends.size else self._is_lost
-        return Scanned(payloads[:, is_whole], information)
+        before = self._counters.bytes - buffer.size  # the stream's bytes before the buffer's first
+        return Scanned(payloads[:, is_whole], ends[may_be[is_whole]] + (before + 1), information)
 
     def _decode(self, buffer: Bytes, ends: Index) -> tuple[Bytes, Mask]:
         """Payloads (length, n) of the frames that would end at ``ends``, and which of them are sample frames."""

@@ -59,7 +59,7 @@ def _feed(data: bytes, cuts: list[int] | None = None) -> tuple[Samples, FrameDec
 def _same(one: Samples, other: Samples) -> bool:
     return all(
         np.array_equal(getattr(one, name), getattr(other, name))
-        for name in ("sequence", "device_time_s", "readings", "missing", "boot")
+        for name in ("sequence", "device_time_s", "readings", "missing", "boot", "end")
     )
 
 
@@ -301,3 +301,11 @@ def test_readings_beyond_the_wire_are_refused() -> None:
         encode_samples([0], [0], [[0, 0, 0, 65535]])
     with pytest.raises(UsageError, match="different names"):
         FrameDecoder(["toe", "toe"])
+
+
+@given(st.lists(st.integers(0, 5000), max_size=12), st.integers(0, 30))
+def test_each_sample_says_with_which_byte_it_was_whole(cuts: list[int], garbage: int) -> None:
+    frames, _ = _stream(60)
+    data = b"\xaa" * garbage + b"\0" + b"".join(frames)
+    got, _ = _feed(data, cuts)
+    assert got.end.tolist() == [garbage + 1 + FRAME * (k + 1) for k in range(60)]

@@ -208,3 +208,13 @@ def test_once_a_line_had_a_checksum_one_without_is_refused() -> None:
     got, decoder = _feed(b"".join(lines), time="ms")
     assert got.readings[:, 0].tolist() == [4.0 * k for k in range(20) if k != 10]
     assert (decoder.counters.bad_crc, decoder.counters.malformed) == (0, 1)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.integers(0, 1000), max_size=12), st.sampled_from([b"\n", b"\r\n"]))
+def test_each_sample_says_with_which_byte_its_line_was_whole(cuts: list[int], ends: bytes) -> None:
+    data = b"t,toe,meta1,meta4,heel\n" + _lines(30)[0]
+    data = data.replace(b"\n", ends)
+    got, _ = _feed(data, cuts, unit="mbar")
+    first_of_end = [at + 1 for at in range(len(data)) if data[at : at + 1] == ends[:1]]
+    assert got.end.tolist() == first_of_end[1:]
