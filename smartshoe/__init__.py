@@ -36,7 +36,7 @@ _HOME = {
     "stack": "smartshoe.calibration",
     "validate": "smartshoe.calibration.validation",
     "Validation": "smartshoe.calibration.validation",
-    "GaitResult": "smartshoe.gait.result",
+    "GaitResult": "smartshoe.gait._result",
     "diagnose": "smartshoe.diagnosis",
     "Diagnosis": "smartshoe.diagnosis",
     "ExtendedModel": "smartshoe.models.extended",
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis, diagnose
     from smartshoe.errors import SmartShoeError
     from smartshoe.files.logs import read, write
-    from smartshoe.gait.result import GaitResult
+    from smartshoe.gait import GaitResult
     from smartshoe.identification import Identification, identify
     from smartshoe.identification.lack_of_fit import lack_of_fit
     from smartshoe.identification.leave_out import leave_one_rate_out

@@ -47,7 +47,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):  # of one process, or the one that starts the workers
         _require_unique_names(ROOT / "tests")
     else:
-        from smartshoe.kernels.once import compile_each_kernel_once
+        from smartshoe.kernels._once import compile_each_kernel_once
 
         compile_each_kernel_once()
 

@@ -16,7 +16,7 @@ from simulators.instruments.daq import MyRioParameters, SimulatedMyRio, sampled
 from simulators.instruments.sensing_unit import SensingUnit
 from simulators.plant.bladder_parameters import TUBE_DIAMETER_M
 from smartshoe.arrays import Array
-from smartshoe.devices.base import ChannelDescription, Shoe, TestMachine
+from smartshoe.devices import ChannelDescription, Shoe, TestMachine
 from smartshoe.errors import LimitError
 from smartshoe.files.gate import limits
 from smartshoe.protocol import MachineLimits, Protocol
@@ -24,7 +24,7 @@ from smartshoe.recording import Channel, Recording, Role
 from smartshoe.units import MILLIBAR, NEWTON, VOLT, unit
 
 if TYPE_CHECKING:
-    from simulators.benches.bench import Bench
+    from simulators.benches._bench import Bench
 
 
 LOAD_LIMIT_N = 2000.0  # Instron 5944
@@ -107,8 +107,8 @@ class SimulatedInstron(TestMachine):
         return True
 
     def under(self, shoe: Shoe, unit: str) -> None:
-        """Press that unit of a simulated shoe from now on, while the shoe streams (`simulators.benches.bench`)."""
-        from simulators.benches.bench import Bench
+        """Press that unit of a simulated shoe from now on, while the shoe streams (`simulators.benches._bench`)."""
+        from simulators.benches._bench import Bench
         from simulators.benches.shoe import SimulatedShoe
 
         if isinstance(shoe, SimulatedShoe):

@@ -19,12 +19,12 @@ from simulators.people.profiles import PROFILES, Gait
 from simulators.people.sensing import Sampler
 from simulators.people.shape import COLUMNS
 from smartshoe.arrays import Array
-from smartshoe.devices.base import Block, ChannelDescription, Shoe
+from smartshoe.devices import Block, ChannelDescription, Shoe
 from smartshoe.errors import UsageError
 from smartshoe.units import MILLIBAR
 
 if TYPE_CHECKING:
-    from simulators.benches.bench import Bench
+    from simulators.benches._bench import Bench
 
 
 FINEST_STEP_HZ = 1000.0
@@ -36,7 +36,7 @@ LONGEST_TRUTH_S = 3600.0  # longer streams are for those who keep nothing
 class ShoeParameters:
     """The stream: ``block_samples`` a block; ``adc_bits`` over 0-5 V for each unit.
 
-    On a bench (`simulators.benches.bench`) its clock is ``clock_skew_ppm`` and ``clock_offset_s`` off the world's,
+    On a bench (`simulators.benches._bench`) its clock is ``clock_skew_ppm`` and ``clock_offset_s`` off the world's,
     drawn where they are None.
     """
 

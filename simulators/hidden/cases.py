@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from simulators.hidden import protocols
-from simulators.hidden.baseline import lagged, left_over
+from simulators.hidden import _protocols as protocols
+from simulators.hidden._baseline import lagged, left_over
+from simulators.hidden._machine import Chain, Departed, Given, lawful_machine, logged, recorded
+from simulators.hidden._scaling import SILENT, HiddenEffect, clipped_at_an_end, search
 from simulators.hidden.effects import SHARE_OF_RANGE, Hideable, Options, Subject, Warp, merged
-from simulators.hidden.machine import Chain, Departed, Given, lawful_machine, logged, recorded
 from simulators.hidden.plans import ALL, Plan, plan, seeded
 from simulators.hidden.recordings import drawn_subject, noise_options, small_effects
-from simulators.hidden.scaling import SILENT, HiddenEffect, clipped_at_an_end, search
 from smartshoe.arrays import Array
 from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording

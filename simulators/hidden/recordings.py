@@ -1,8 +1,8 @@
 """Hidden-effect cases: recordings of a unit that has exactly the asked effects, at an asked strength.
 
-*Strength* is what an effect leaves behind once the first-order baseline is fitted again (`simulators.hidden.baseline`),
-on the noise-free reading: its root mean square in percent of the reading at full-scale load. Each effect is scaled
-alone, on the unit without the other effects and the nuisances.
+*Strength* is what an effect leaves behind once the first-order baseline is fitted again
+(`simulators.hidden._baseline`), on the noise-free reading: its root mean square in percent of the reading at full-scale
+load. Each effect is scaled alone, on the unit without the other effects and the nuisances.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from simulators.hidden import protocols
+from simulators.hidden import _protocols as protocols
+from simulators.hidden._machine import machine_of
+from simulators.hidden._scaling import SILENT, HiddenEffect, scaled
 from simulators.hidden.effects import EFFECTS, SHARE_OF_RANGE, Hideable, Options, Subject, merged
-from simulators.hidden.machine import machine_of
-from simulators.hidden.scaling import SILENT, HiddenEffect, scaled
 from simulators.instruments import presets
 from smartshoe.errors import UsageError
 from smartshoe.protocol import Protocol
@@ -80,7 +80,7 @@ def hide(  # noqa: PLR0913 - a public verb
     """Recordings of a unit that has the named effects (`simulators.hidden.effects.EFFECTS`), and what is true of it.
 
     ``effects`` maps names to strengths in percent of full scale, or lists names of which ``strength_percent_fs``
-    gives the strength. ``protocol`` is a name of `simulators.hidden.protocols` or a protocol. What is None is drawn
+    gives the strength. ``protocol`` is a name of `simulators.hidden._protocols` or a protocol. What is None is drawn
     from ``seed``: 0.1 to 0.3 % of noise, up to half of its variance coloured, two or three recordings, a unit of the
     paper with its constants varied by a third and its arm up to eight times as strong. ``nuisances`` small
     imperfections (0.03 to 0.08 %) are of no family that is hidden. ``hold_out`` recordings come last, with the

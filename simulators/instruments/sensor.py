@@ -13,7 +13,7 @@ import numpy as np
 from simulators.effects.outside import SensorOddities
 from simulators.effects.sensing import Curve, Limit, Noise, OutputDrift
 from smartshoe.arrays import Array
-from smartshoe.devices.base import ChannelDescription, Sensor
+from smartshoe.devices import ChannelDescription, Sensor
 from smartshoe.units import VOLT
 
 LOW_V, SPAN_V = 0.5, 4.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration
-from smartshoe.devices.base import Bladder
+from smartshoe.devices import Bladder
 from smartshoe.errors import InputError, UsageError
 from smartshoe.models.twin import TwinBladder
 

@@ -6,11 +6,11 @@
 'left_heel'
 """
 
+from simulators.people._plates import Measured, measured
+from simulators.people._trial import Trial, blocks, trial
 from simulators.people.events import TrueEvent
 from simulators.people.person import Person, Run, Stand, Tiptoe, Walk, move_at
 from simulators.people.plan import GaitPlan, plan
-from simulators.people.plates import Measured, measured
-from simulators.people.trial import Trial, blocks, trial
 
 __all__ = [
     "Measured",

@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
+from simulators.people._trial import blocks, trial
 from simulators.people.person import Person, move_at
-from simulators.people.trial import blocks, trial
 
 SPEEDS_M_PER_S = (0.8, 1.0, 1.3, 1.6, 2.0, 2.68, 3.5)
 DURATION_S = 1200.0

@@ -1,13 +1,13 @@
 """Who moves, and how: a person and the activities of a trial, with what a speed implies where nothing else is said.
 
-Speeds are in m/s over the ground or the belt. Sources of the laws: `simulators.people.speed`.
+Speeds are in m/s over the ground or the belt. Sources of the laws: `simulators.people._speed`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from simulators.people import speed
+from simulators.people import _speed as speed
 from smartshoe.errors import UsageError
 
 BODY_WEIGHT_N = 519.4  # 53 kg, Chinimilli 2016, Section VI

@@ -15,11 +15,11 @@ from itertools import groupby
 
 import numpy as np
 
-from simulators.people.moving import contacts, steps
+from simulators.people._moving import contacts, steps
+from simulators.people._stances import Stances
+from simulators.people._standing import Lift, StandingStay, Sway
 from simulators.people.person import Activity, Move, Part, Person, Stand, Tiptoe
 from simulators.people.shape import COLUMNS, COVERAGE, Outside
-from simulators.people.stances import Stances
-from simulators.people.standing import Lift, StandingStay, Sway
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 

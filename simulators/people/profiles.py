@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simulators.people._speed import WALK_RATIO_M_MIN
 from simulators.people.person import BODY_WEIGHT_N, Activity, Part, Person, Run, Stand, Tiptoe, Walk
 from simulators.people.plan import GaitPlan, plan
 from simulators.people.shape import Outside
-from simulators.people.speed import WALK_RATIO_M_MIN
 
 FLAT_BEFORE_S, FLAT_AFTER_S = 2.0, 2.0
 TIPTOE_S = 10.0

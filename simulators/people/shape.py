@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from simulators.people import speed
+from simulators.people import _speed as speed
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.recording import REGIONS

@@ -16,7 +16,7 @@ The scheme is exact for a deformation that is linear within a step (the arm, the
 the slow leak, and a safeguarded Newton iteration for the balance: second order, stable at any step for the wall.
 
 More of the wall, the air and the contact stands in `simulators.effects`, one file a family, and is stepped by
-`simulators.plant.wall_stepping` once a unit has any of it.
+`simulators.plant._wall_stepping` once a unit has any of it.
 
 *Left out:* inertia and the tube's acoustics (both far above 1 kHz), buckling and contact of the tube's own walls
 (bottoming out), temperature of the wall, humidity, shear.
@@ -30,7 +30,7 @@ import numpy as np
 
 from simulators.plant.bladder_parameters import AMBIENT_PA, BladderParameters
 from smartshoe.arrays import Array
-from smartshoe.devices.base import Bladder
+from smartshoe.devices import Bladder
 from smartshoe.errors import UsageError
 
 LOWEST_STEP_HZ = 1000.0
@@ -40,7 +40,7 @@ class SimulatedBladder(Bladder):
     """A bladder that keeps its memory from one `press` to the next; see the module for what it leaves out."""
 
     def __init__(self, parameters: BladderParameters) -> None:
-        from simulators.plant.steppers import stepper
+        from simulators.plant._steppers import stepper
 
         self.parameters = parameters
         self._stepper = stepper(parameters)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from simulators.plant._stepping import cycle_at
 from simulators.plant.preisach import mean_curve, relays_up
-from simulators.plant.stepping import cycle_at
 from smartshoe.arrays import Array
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.arrays import Array
-from smartshoe.devices.base import Shoe
+from smartshoe.devices import Shoe
 from smartshoe.devices.wire.frames import CommandDecoder, encode_information, encode_samples
 from smartshoe.devices.wire.information import ChannelInformation, Information
 from smartshoe.devices.wire.lines import encode_header, encode_lines

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias, Union
 
-from smartshoe.calibration.calibration import Calibration, calibration_from
+from smartshoe.calibration._calibration import Calibration, calibration_from
 from smartshoe.errors import InputError
 
 CalibrationsLike: TypeAlias = Union[Calibration, str, "os.PathLike[str]"]

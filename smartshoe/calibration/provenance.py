@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from smartshoe.calibration.calibration import Calibration
+from smartshoe.calibration._calibration import Calibration
 from smartshoe.signals.loading import rate_range
 
 if TYPE_CHECKING:

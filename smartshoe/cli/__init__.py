@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from smartshoe.cli.output import Talk, talk
+from smartshoe.cli._output import Talk, talk
 from smartshoe.errors import SmartShoeError
 from smartshoe.files.gate.limits import raise_limits
 

@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from smartshoe.cli.ranges import FiniteRange
+from smartshoe.cli._ranges import FiniteRange
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from smartshoe.devices.base import Block, Shoe
+    from smartshoe.devices import Block, Shoe
     from smartshoe.live.guide import PageOperator
-    from smartshoe.runs.session import SessionFolder, SessionPlan
-    from smartshoe.runs.session.checks import PressingFault
+    from smartshoe.runs.session import PressingFault, SessionFolder, SessionPlan
 
 
 @click.command(
@@ -67,7 +66,7 @@ def command(
     from smartshoe.kernels import warm_up
 
     warm_up.begin()
-    from smartshoe.cli.output import emit_json, note, progress
+    from smartshoe.cli._output import emit_json, note, progress
     from smartshoe.runs.session import analyse, conduct, publish
 
     if replay is not None:
@@ -266,7 +265,7 @@ def _at_the_machine(asks: bool) -> Iterator[_AtTheMachine]:
     if not sys.stderr.isatty():
         yield _AtTheMachine(asks)
         return
-    from smartshoe.cli.readings import LiveReadings
+    from smartshoe.cli._readings import LiveReadings
 
     with LiveReadings() as table:
         yield _AtTheMachine(asks, table)

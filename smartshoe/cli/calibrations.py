@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from smartshoe.cli.output import figures_option
+from smartshoe.cli._output import figures_option
 
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
@@ -66,7 +66,7 @@ def command() -> None:
 def list_command(unit: str | None, date: str | None, store_folder: str | None, json_path: str | None) -> None:
     """Units, their calibrations, where they sit, what has expired."""
     from smartshoe.calibration.store.dates import days_between, iso, moment
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
     from smartshoe.report.tables import new_console, table_of
 
     store, at = _opened(store_folder), moment(date or _today(), "--date")
@@ -114,7 +114,7 @@ def show_command(
 ) -> None:
     """One calibration: its parameters, its file, whether it holds."""
     from smartshoe.calibration.store.quantities import quantities
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
     from smartshoe.report.numbers import with_sd
     from smartshoe.report.tables import new_console, table_of
 
@@ -153,7 +153,7 @@ def compare_command(
 ) -> None:
     """Two calibrations: what differs, by how many sd, and how many newtons it means."""
     from smartshoe.calibration.store.compare import RATES_N_PER_S, compare
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
 
     store = _opened(store_folder)
     (one, _, ours), (other, _, theirs) = (_one(store, name, None, False) for name in (first, second))
@@ -176,7 +176,7 @@ def drift_command(
 ) -> None:
     """How a unit's parameters move over its life: trend, repairs, jumps."""
     from smartshoe.calibration.store.drift import drift
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
 
     store = _opened(store_folder)
     found = drift(store, _serial(store, unit, _today()))
@@ -214,7 +214,7 @@ def add_command(
 ) -> None:
     """Take calibrations (files that identify or diagnose wrote) into the store."""
     from smartshoe.calibration import Calibration
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
     from smartshoe.errors import UsageError
 
     if len(files) > 1 and (serial_number or position):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from smartshoe.cli.ranges import FiniteRange
+from smartshoe.cli._ranges import FiniteRange
 
 if TYPE_CHECKING:
     from smartshoe.gait.field import CheckResult
@@ -46,13 +46,13 @@ def command(
     Each FILE is a trial of one or two shoes; two FILES of one shoe each are weighed together. A rest of two seconds
     before the first step lets the zero be checked.
     """
-    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress
     from smartshoe.errors import RefusedError
 
     with progress(2) as step:
         step("reading")
         from smartshoe.calibration.folder import load_calibrations
-        from smartshoe.cli.inputs import read_all
+        from smartshoe.cli._inputs import read_all
         from smartshoe.gait.field.examination import examine_trial
 
         calibrations = load_calibrations(calibration_paths)

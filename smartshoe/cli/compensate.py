@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all, warn_of_another_unit
+from smartshoe.cli._inputs import column_options, read_all, warn_of_another_unit
 
 
 @click.command(
@@ -26,7 +26,7 @@ def command(
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
     from smartshoe.calibration import Calibration, compensated
-    from smartshoe.cli.output import note
+    from smartshoe.cli._output import note
     from smartshoe.files.logs import write
 
     calibration = Calibration.load(calibration_path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all
+from smartshoe.cli._inputs import column_options, read_all
 
 if TYPE_CHECKING:
     from smartshoe.recording import Recording

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all
-from smartshoe.cli.output import figures_option
-from smartshoe.cli.ranges import FiniteRange
+from smartshoe.cli._inputs import column_options, read_all
+from smartshoe.cli._output import figures_option
+from smartshoe.cli._ranges import FiniteRange
 
 if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
@@ -65,7 +65,7 @@ def command(
     **columns: Any,
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
-    from smartshoe.cli.output import emit_json, note, progress
+    from smartshoe.cli._output import emit_json, note, progress
     from smartshoe.errors import NotIdentifiableError, UsageError
     from smartshoe.files.atomic import make_folder
 
@@ -114,7 +114,7 @@ def command(
 
 
 def _design(path: str, json_path: str | None) -> None:
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
     from smartshoe.diagnosis.design import design
     from smartshoe.report.diagnosis.terminal import print_design
     from smartshoe.runs.scenario import load, protocols_of

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from smartshoe.cli.output import figures_option
+from smartshoe.cli._output import figures_option
 
 LEAST_WEIGHT_N = 150.0  # of a person who walks: below, it is more likely in kg
 
@@ -88,16 +88,15 @@ def command(
     sensors: tuple[str, ...],
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
-    from smartshoe.cli.output import emit_json, note, progress, show_notes
+    from smartshoe.cli._output import emit_json, note, progress, show_notes
 
     with progress() as step:
         step("starting")
-        from smartshoe.cli.gait_stream import gait_of_stream, is_streamed, refuse_with
-        from smartshoe.cli.inputs import say_what_strikes, units_of, with_units
+        from smartshoe.cli._gait_stream import gait_of_stream, is_streamed, refuse_with
+        from smartshoe.cli._inputs import say_what_strikes, units_of, with_units
         from smartshoe.files.atomic import make_folder
         from smartshoe.files.logs import read
-        from smartshoe.gait.analysis import analyse
-        from smartshoe.gait.coverage import Coverage
+        from smartshoe.gait import Coverage, analyse
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
@@ -156,7 +155,7 @@ def command(
                 folder, found, title, {"files": ", ".join(Path(file).name for file in files)}, figures
             )
         if c3d_path is not None:
-            from smartshoe.gait.c3d import write_c3d
+            from smartshoe.gait import write_c3d
 
             write_c3d(c3d_path, found)
             written["c3d"] = Path(c3d_path)

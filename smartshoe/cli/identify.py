@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all
+from smartshoe.cli._inputs import column_options, read_all
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def command(
     **choices: Any,
 ) -> None:
     """Identify one unit from one or more experiments (one FILE each)."""
-    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress
     from smartshoe.report.tables import print_identification
 
     options: dict[str, Any] = {

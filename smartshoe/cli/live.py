@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from smartshoe.cli.ranges import FiniteRange
+from smartshoe.cli._ranges import FiniteRange
 from smartshoe.errors import UsageError
 
 LONG_S = 4 * 3600.0  # of a simulated walk, where its address does not say

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli.output import figures_option
+from smartshoe.cli._output import figures_option
 
 
 @click.command("run", epilog="Example: smartshoe run scenarios/calibration.toml --out out/calibration")
@@ -29,7 +29,7 @@ def command(
     figures: str | None,
 ) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
-    from smartshoe.cli.output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
@@ -40,8 +40,7 @@ def command(
         warm_up.begin()
         from smartshoe.files.atomic import json_text, make_folder
         from smartshoe.report.tables import print_summary
-        from smartshoe.runs.scenario import load, run, steps_of
-        from smartshoe.runs.scenario.keys import parse_assignments
+        from smartshoe.runs.scenario import load, parse_assignments, run, steps_of
         from smartshoe.runs.scenario.publish import judged, publish
 
         loaded, source = load(scenario, parse_assignments(assignments))

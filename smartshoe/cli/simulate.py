@@ -14,7 +14,7 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
 
     Of a simulated trial the true loads are written too, as NAME_truth.csv.
     """
-    from smartshoe.cli.output import progress
+    from smartshoe.cli._output import progress
 
     with progress() as step:
         step("reading the scenario")

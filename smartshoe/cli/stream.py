@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from smartshoe.cli.output import note
-from smartshoe.cli.ranges import FiniteRange
+from smartshoe.cli._output import note
+from smartshoe.cli._ranges import FiniteRange
 
 if TYPE_CHECKING:
-    from smartshoe.devices.base import Shoe
+    from smartshoe.devices import Shoe
     from smartshoe.runs.session.streaming import StreamedForces
 
 
@@ -120,7 +120,7 @@ class _StreamRun:
 
     @staticmethod
     def _lost(shoe: Shoe) -> int:
-        from smartshoe.devices.events import Dropped, Gap
+        from smartshoe.devices import Dropped, Gap
 
         events = shoe.events
         lost = sum(event.lost for event in events if isinstance(event, Gap))

@@ -13,8 +13,8 @@ import click
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")
 def command(study_file: str, out_folder: str, jobs: int | None, c3d: bool, json_path: str | None) -> None:
     """Analyse the trials of STUDY by subject and condition, and compare conditions within subjects."""
-    from smartshoe.cli.counting import counting
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._counting import counting
+    from smartshoe.cli._output import emit_json
     from smartshoe.runs.studies import study
 
     with counting("trials") as progress:

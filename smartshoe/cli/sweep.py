@@ -30,8 +30,8 @@ def command(
     json_path: str | None,
 ) -> None:
     """Run SCENARIO for each case of its [sweep]: values of keys, and seeds. Each case is computed once."""
-    from smartshoe.cli.counting import counting
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._counting import counting
+    from smartshoe.cli._output import emit_json
     from smartshoe.runs.sweeps import sweep
 
     with counting("cases") as progress:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli.inputs import column_options, read_all, warn_of_another_unit
+from smartshoe.cli._inputs import column_options, read_all, warn_of_another_unit
 
 
 @click.command(
@@ -27,7 +27,7 @@ def command(
     """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
     from smartshoe.calibration import Calibration
     from smartshoe.calibration.validation import validate
-    from smartshoe.cli.output import emit_json
+    from smartshoe.cli._output import emit_json
     from smartshoe.report.tables import print_validation
 
     calibration = Calibration.load(calibration_path)

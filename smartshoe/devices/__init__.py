@@ -1,7 +1,8 @@
 """The hardware seam: abstract devices and their backends, opened by URL."""
 
-from smartshoe.devices.base import Bladder, Block, ChannelDescription, Device, Sensor, Shoe, TestMachine
-from smartshoe.devices.registry import open_machine, open_shoe
+from smartshoe.devices._base import Bladder, Block, ChannelDescription, Device, Sensor, Shoe, TestMachine
+from smartshoe.devices._events import Disconnected, Dropped, Gap, Reconnected, Restarted, ShoeEvent
+from smartshoe.devices._registry import open_machine, open_shoe, split_url
 
 __all__ = [
     "Bladder",
@@ -13,4 +14,11 @@ __all__ = [
     "TestMachine",
     "open_machine",
     "open_shoe",
+    "split_url",
+    "Disconnected",
+    "Dropped",
+    "Gap",
+    "Reconnected",
+    "Restarted",
+    "ShoeEvent",
 ]

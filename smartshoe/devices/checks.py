@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smartshoe.devices.base import Device, Shoe, TestMachine
+from smartshoe.devices._base import Device, Shoe, TestMachine
 from smartshoe.errors import DeviceError, LimitError
 from smartshoe.protocol import Protocol, Segment
 
 
 class DeviceContractError(DeviceError):
-    """A backend breaks a promise of `smartshoe.devices.base`."""
+    """A backend breaks a promise of `smartshoe.devices._base`."""
 
 
 def _require(holds: bool, device: Device, promise: str) -> None:

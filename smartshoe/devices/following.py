@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.devices.corners import slope_of
+from smartshoe.devices._corners import slope_of
 
 TILT_OVER_S = 0.05  # a slope from two samples is mostly noise
 SLOW_S, QUICK_S = 0.5, 0.05

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.devices.corners import follow_corners
+from smartshoe.devices._corners import follow_corners
 from smartshoe.devices.following import follow
 from smartshoe.errors import InputError
 from smartshoe.kernels.blas import on_one_thread

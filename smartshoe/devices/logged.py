@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.devices.base import ChannelDescription, TestMachine
+from smartshoe.devices._base import ChannelDescription, TestMachine
 from smartshoe.devices.joining import join
 from smartshoe.errors import DeviceError, UsageError
 from smartshoe.files.logs import read

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.devices.base import Block, ChannelDescription, Shoe
+from smartshoe.devices._base import Block, ChannelDescription, Shoe
 from smartshoe.errors import MissingChannelError, UnitError, UsageError
 from smartshoe.files.logs import read
 from smartshoe.recording import Recording

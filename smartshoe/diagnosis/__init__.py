@@ -1,7 +1,17 @@
 """What a simulation gets wrong, why, and what mending it gains: `diagnose`."""
 
-from smartshoe.diagnosis.procedure import diagnose
-from smartshoe.diagnosis.result import Cause, Diagnosis
-from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.diagnosis._held_out import Gain
+from smartshoe.diagnosis._procedure import diagnose
+from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Trace
+from smartshoe.diagnosis._thresholds import Thresholds, described
 
-__all__ = ["Cause", "Diagnosis", "Thresholds", "diagnose"]
+__all__ = [
+    "Cause",
+    "Diagnosis",
+    "Thresholds",
+    "diagnose",
+    "GoodnessOfFit",
+    "Trace",
+    "Gain",
+    "described",
+]

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.diagnosis._thresholds import Thresholds
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95, white_noise_sd
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis.baseline import USUAL
-from smartshoe.diagnosis.sensitivity import Linearised, linearised
-from smartshoe.diagnosis.session import Scale, prepare, thinning
-from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.diagnosis._baseline import USUAL
+from smartshoe.diagnosis._sensitivity import Linearised, linearised
+from smartshoe.diagnosis._session import Scale, prepare, thinning
+from smartshoe.diagnosis._thresholds import Thresholds
 from smartshoe.errors import UsageError
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Conditions

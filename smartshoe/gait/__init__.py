@@ -6,26 +6,38 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 _HOME = {
-    "analyse": "smartshoe.gait.analysis",
-    "analyse_stream": "smartshoe.gait.day",
-    "GaitResult": "smartshoe.gait.result",
-    "DayResult": "smartshoe.gait.result",
-    "Contacts": "smartshoe.gait.contact",
-    "ContactDetector": "smartshoe.gait.contact",
+    "GaitFindings": "smartshoe.gait._result",
+    "Event": "smartshoe.gait._events",
+    "Flag": "smartshoe.gait._flag",
+    "FootSeries": "smartshoe.gait._series",
+    "Stride": "smartshoe.gait._strides",
+    "write_c3d": "smartshoe.gait._c3d",
+    "LEAST_LOAD_N": "smartshoe.gait._contact",
+    "analyse": "smartshoe.gait._analysis",
+    "analyse_stream": "smartshoe.gait._day",
+    "GaitResult": "smartshoe.gait._result",
+    "DayResult": "smartshoe.gait._result",
+    "Contacts": "smartshoe.gait._contact",
+    "ContactDetector": "smartshoe.gait._contact",
     "memberships": "smartshoe.gait.membership",
-    "Coverage": "smartshoe.gait.coverage",
-    "learn_coverage": "smartshoe.gait.coverage",
+    "Coverage": "smartshoe.gait._coverage",
+    "learn_coverage": "smartshoe.gait._coverage",
     "centre_of_pressure": "smartshoe.gait.insole",
 }
 
 if TYPE_CHECKING:
-    from smartshoe.gait.analysis import analyse
-    from smartshoe.gait.contact import ContactDetector, Contacts
-    from smartshoe.gait.coverage import Coverage, learn_coverage
-    from smartshoe.gait.day import analyse_stream
+    from smartshoe.gait._analysis import analyse
+    from smartshoe.gait._c3d import write_c3d
+    from smartshoe.gait._contact import LEAST_LOAD_N, ContactDetector, Contacts
+    from smartshoe.gait._coverage import Coverage, learn_coverage
+    from smartshoe.gait._day import analyse_stream
+    from smartshoe.gait._events import Event
+    from smartshoe.gait._flag import Flag
+    from smartshoe.gait._result import DayResult, GaitFindings, GaitResult
+    from smartshoe.gait._series import FootSeries
+    from smartshoe.gait._strides import Stride
     from smartshoe.gait.insole import centre_of_pressure
     from smartshoe.gait.membership import memberships
-    from smartshoe.gait.result import DayResult, GaitResult
 
 __all__ = [
     "ContactDetector",
@@ -38,6 +50,13 @@ __all__ = [
     "centre_of_pressure",
     "learn_coverage",
     "memberships",
+    "GaitFindings",
+    "Event",
+    "Flag",
+    "FootSeries",
+    "Stride",
+    "write_c3d",
+    "LEAST_LOAD_N",
 ]
 
 

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from smartshoe.files.atomic import replacing
-from smartshoe.gait.events import Event
-from smartshoe.gait.strides import Stride
+from smartshoe.gait._events import Event
+from smartshoe.gait._strides import Stride
 
 DIGITS = 9  # of a number, as in the tables of a short trial
 
 
 @contextmanager
 def tables(folder: Path) -> Iterator[Callable[[Sequence[Event], Sequence[Stride]], None]]:
-    """What `smartshoe.gait.day.analyse_stream` tells, as ``events.csv`` and ``strides.csv`` in ``folder``.
+    """What `smartshoe.gait._day.analyse_stream` tells, as ``events.csv`` and ``strides.csv`` in ``folder``.
 
     Yields the function to hand to ``told``. The files are there when the block ends without an error, whole.
     """

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.gait.contact import Contacts
-from smartshoe.gait.strides import Stride
+from smartshoe.gait._contact import Contacts
+from smartshoe.gait._strides import Stride
 
 POINTS = 101  # of a stride, 0 to 100 %
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.arrays import Array
-from smartshoe.gait.contact import Contacts
+from smartshoe.gait._contact import Contacts
 
 States = NDArray[np.int8]
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.gait.contact import Contacts
-from smartshoe.gait.strides import Stride
+from smartshoe.gait._contact import Contacts
+from smartshoe.gait._strides import Stride
 
 Activity = Literal["walking", "running", "standing", "mixed"]
 

@@ -11,8 +11,8 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
-from smartshoe.identification.cycles import CycleGroup, repeated_cycles
-from smartshoe.identification.identification import Identification
+from smartshoe.identification._cycles import CycleGroup, repeated_cycles
+from smartshoe.identification._identification import Identification
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Recording
 

@@ -11,9 +11,9 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.errors import NotConvergedError, NotIdentifiableError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
-from smartshoe.identification.experiment import Experiment, prepare
-from smartshoe.identification.identification import Identification
-from smartshoe.identification.identifier import identify
+from smartshoe.identification._experiment import Experiment, prepare
+from smartshoe.identification._identification import Identification
+from smartshoe.identification._identifier import identify
 from smartshoe.models.first_order import lag, shifted
 from smartshoe.models.parameter import finite_or_none
 from smartshoe.recording import Channel, Recording

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, Integers
 from smartshoe.calibration import Compensator
 from smartshoe.errors import NotIdentifiableError, UsageError
-from smartshoe.identification.conclude import NAMES, WORST_RELATIVE_GAIN_SD, WORST_RELATIVE_SD, solid_of
-from smartshoe.identification.experiment import FEWEST_SAMPLES, LEAST_RETURN, Direction
-from smartshoe.identification.parametrisation import Shape, coefficients_of
-from smartshoe.identification.sufficient_statistics import LN_POLES, POLES, Columns, Projection, Sums, pooled
-from smartshoe.identification.uncertainty import inverse_normal, t_quantile
+from smartshoe.identification._conclude import NAMES, WORST_RELATIVE_GAIN_SD, WORST_RELATIVE_SD, solid_of
+from smartshoe.identification._experiment import FEWEST_SAMPLES, LEAST_RETURN, Direction
+from smartshoe.identification._parametrisation import Shape, coefficients_of
+from smartshoe.identification._sufficient_statistics import LN_POLES, POLES, Columns, Projection, Sums, pooled
+from smartshoe.identification._uncertainty import inverse_normal, t_quantile
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models import Parameter
 from smartshoe.units import Unit, declared, find_unit

@@ -1,6 +1,6 @@
 """One pass over an experiment: error and gradient of the first-order model, kept only as their inner products.
 
-The slow twin, with which the tests compare, is `smartshoe.identification.prediction_error`.
+The slow twin, with which the tests compare, is `smartshoe.identification._prediction_error`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from smartshoe.kernels.once import compile_each_kernel_once
+from smartshoe.kernels._once import compile_each_kernel_once
 
 CACHE = Path(__file__).parent / "__pycache__"
 KERNELS = ("first_order", "shift", "srivc", "residual", "linear_filter")

@@ -8,14 +8,12 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from smartshoe.devices.base import Block, Shoe
-from smartshoe.live.guidance import Guidance
-from smartshoe.live.relay import RelayedShoe
+from smartshoe.devices import Block, Shoe
+from smartshoe.live._guidance import Guidance
+from smartshoe.live._relay import RelayedShoe
 from smartshoe.live.server import LiveServer
 from smartshoe.live.session import LiveSession
-from smartshoe.runs.session.checks import PressingFault
-from smartshoe.runs.session.operator import Operator
-from smartshoe.runs.session.plan import SessionPlan
+from smartshoe.runs.session import Operator, PressingFault, SessionPlan
 
 DONE, AGAIN, STOP = "Done", "Press again", "Stop"
 LOOK_EVERY_S = 0.05

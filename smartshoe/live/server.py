@@ -17,10 +17,10 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from smartshoe.errors import UsageError
-from smartshoe.live.client import Client
-from smartshoe.live.desk import Desk
-from smartshoe.live.document import document
-from smartshoe.live.guard import Guard
+from smartshoe.live._client import Client
+from smartshoe.live._desk import Desk
+from smartshoe.live._document import document
+from smartshoe.live._guard import Guard
 from smartshoe.live.session import LiveSession
 
 LONGEST_MESSAGE = 4096

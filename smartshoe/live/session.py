@@ -14,16 +14,15 @@ from typing import Any
 import numpy as np
 
 from smartshoe.calibration import Calibration
-from smartshoe.devices.base import Block, Shoe
-from smartshoe.devices.events import ShoeEvent
+from smartshoe.devices import Block, Shoe, ShoeEvent
 from smartshoe.errors import UsageError
-from smartshoe.live import recorder
-from smartshoe.live.guidance import Guidance
-from smartshoe.live.lsl import Outlet
-from smartshoe.live.pace import Pace
-from smartshoe.live.shoe import LiveShoe, lost_in
-from smartshoe.live.source import Source
-from smartshoe.live.zeroing import zeros_of
+from smartshoe.live import _recorder as recorder
+from smartshoe.live._guidance import Guidance
+from smartshoe.live._lsl import Outlet
+from smartshoe.live._pace import Pace
+from smartshoe.live._shoe import LiveShoe, lost_in
+from smartshoe.live._source import Source
+from smartshoe.live._zeroing import zeros_of
 
 NOTES_KEPT, STEPS_KEPT = 500, 400
 LONGEST_WORD = 80

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.devices.base import Bladder
+from smartshoe.devices import Bladder
 from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.extended import ExtendedModel

@@ -13,9 +13,9 @@ from smartshoe.calibration.store.dates import iso
 from smartshoe.calibration.store.drift import Drift, Trend
 from smartshoe.calibration.store.quantities import STATIC_GAIN, ZERO
 from smartshoe.files.atomic import json_text, make_folder, write_text
+from smartshoe.report._drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.document import write_document
-from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of
 from smartshoe.report.wording import sentence

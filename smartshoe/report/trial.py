@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from smartshoe.arrays import Array
-from smartshoe.gait.result import GaitResult
+from smartshoe.gait import GaitResult
 from smartshoe.report.charts import Chart, Line, Panel, Style
 from smartshoe.report.gait import charts as gait_charts
 from smartshoe.report.numbers import plain

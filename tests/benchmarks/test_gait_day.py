@@ -17,7 +17,7 @@ from table import FigureTable
 from simulators.people import Person, Stand, Walk, trial
 from simulators.people import blocks as trial_blocks
 from smartshoe.calibration import Calibration
-from smartshoe.gait.day import analyse_stream
+from smartshoe.gait import analyse_stream
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 

@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 from threadpoolctl import threadpool_limits
 
 import smartshoe
-from smartshoe.identification.bank import fit_coefficients
+from smartshoe.identification import fit_coefficients
 from smartshoe.kernels.first_order import COLUMNS, inner_products
 from smartshoe.recording import Recording
 

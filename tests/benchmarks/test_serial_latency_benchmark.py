@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smartshoe.devices import open_shoe
-from smartshoe.devices.events import Gap
+from smartshoe.devices import Gap, open_shoe
 
 RATE_HZ = 1000.0
 DURATION_S = 60.0

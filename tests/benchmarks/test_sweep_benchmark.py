@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from table import FigureTable
 
-from smartshoe.runs.sweeps.case import computed
-from smartshoe.runs.sweeps.plan import Case, read_plan
-from smartshoe.runs.sweeps.running import sweep_plan
+from smartshoe.runs.sweeps._case import computed
+from smartshoe.runs.sweeps._plan import Case, read_plan
+from smartshoe.runs.sweeps._running import sweep_plan
 
 pytestmark = pytest.mark.benchmark
 SIZES = (2_000, 100_000)

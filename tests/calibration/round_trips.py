@@ -14,8 +14,8 @@ import smartshoe
 from simulators.people import Person, Walk, trial
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.export import export_files, write_files
-from smartshoe.gait import GaitResult, analyse
-from smartshoe.gait.c3d import LABELS, analog_signals, write_c3d
+from smartshoe.gait import GaitResult, analyse, write_c3d
+from smartshoe.gait._c3d import LABELS, analog_signals
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
@@ -140,7 +140,7 @@ def motion_bids_row(folder: Path) -> str:
     """A Motion-BIDS folder, its tables read as tables."""
     import pandas as pd
 
-    from smartshoe.gait.motion_bids import write_motion_bids
+    from smartshoe.gait._motion_bids import write_motion_bids
 
     given = walked()
     told = analysed()

@@ -24,10 +24,10 @@ from smartshoe.calibration.estimators import (
     estimator_names,
     methods,
 )
-from smartshoe.calibration.estimators.kalman import filter_of
+from smartshoe.calibration.estimators._kalman import filter_of
+from smartshoe.calibration.estimators._reading_noise import reading_noise_sd
+from smartshoe.calibration.estimators._state_space import contact_model, likely_density
 from smartshoe.calibration.estimators.methods.imm import InteractingModels
-from smartshoe.calibration.estimators.reading_noise import reading_noise_sd
-from smartshoe.calibration.estimators.state_space import contact_model, likely_density
 from smartshoe.errors import InputError, UsageError
 from smartshoe.models import StandardLinearSolid
 from smartshoe.protocol import dynamic_protocol, static_protocol
@@ -174,7 +174,7 @@ def test_the_likely_density_is_that_of_the_load() -> None:
 
 
 def test_the_steady_filter_is_what_filterpy_settles_to() -> None:
-    from smartshoe.calibration.estimators.state_space import _steady_innovations
+    from smartshoe.calibration.estimators._state_space import _steady_innovations
 
     c = plain()
     model = contact_model(c, RATE_HZ, 1e6, 0.1)

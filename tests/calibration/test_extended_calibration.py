@@ -12,8 +12,7 @@ from chains import BASELINE, EXACT, chain_of, some_conditions
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.calibration import Calibration, Compensator, compensated, extended_calibration
-from smartshoe.calibration.extended import ExtendedCompensator
+from smartshoe.calibration import Calibration, Compensator, ExtendedCompensator, compensated, extended_calibration
 from smartshoe.calibration.validation import validate
 from smartshoe.cli import run_command
 from smartshoe.errors import InputError, UnitError

@@ -10,8 +10,7 @@ from chains import BASELINE, EXACT, INVERTIBLE, LOOPED, chain_of, some_condition
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.calibration import Compensator, extended_calibration, stack
-from smartshoe.calibration.extended import ExtendedCompensator
+from smartshoe.calibration import Compensator, ExtendedCompensator, extended_calibration, stack
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, catalogue, effect
 from smartshoe.models.extended import ExtendedModel

@@ -17,7 +17,7 @@ from test_export import _run_c, _self_test
 
 from smartshoe.calibration import Calibration, extended_calibration
 from smartshoe.calibration.export import FilterModel, export_files, export_shoe, write_files
-from smartshoe.calibration.export.single import in_single
+from smartshoe.calibration.export._single import in_single
 from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import CStep
 from smartshoe.models.extended import ExtendedModel

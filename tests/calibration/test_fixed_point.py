@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from smartshoe.calibration import Calibration, extended_calibration
 from smartshoe.calibration.export import FilterModel, export_files, write_files
-from smartshoe.calibration.export.fixed_point import FixedPoint, Scaled
+from smartshoe.calibration.export._fixed_point import FixedPoint, Scaled
 from smartshoe.errors import UsageError
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR

@@ -111,7 +111,7 @@ def test_one_command_writes_page_result_and_calibration(
 def test_a_dash_for_json_leaves_nothing_else_on_stdout(
     files: tuple[Path, Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from smartshoe.diagnosis.result import Diagnosis
+    from smartshoe.diagnosis import Diagnosis
 
     def quick(*_: Any, **options: Any) -> Diagnosis:
         assert options["material"] == pytest.approx(0.0005)

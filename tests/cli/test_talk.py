@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from smartshoe.cli import run_command
-from smartshoe.cli.output import progress, talk
+from smartshoe.cli import run_command, talk
+from smartshoe.cli._output import progress
 
 ROWS = "\n".join(f"{0.01 * k:.2f},{k},{k},good" for k in range(20))
 

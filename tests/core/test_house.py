@@ -26,23 +26,23 @@ def _modules() -> dict[str, tuple[ast.Module, bool]]:
     return found
 
 
-def _statements(node: ast.AST) -> Iterator[ast.stmt]:
-    """All statements below ``node``, those of functions too, but none that only a type checker reads."""
+def _statements(node: ast.AST, *, types: bool = False) -> Iterator[ast.stmt]:
+    """All statements below ``node``, those of functions too; ``types``: those that only a type checker reads too."""
     for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+        if not types and isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
             continue
         if isinstance(child, ast.stmt):
             yield child
         if isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
-            yield from _statements(child)
+            yield from _statements(child, types=types)
 
 
-def _imported(name: str) -> set[str]:
+def _imported(name: str, *, types: bool = False) -> set[str]:
     """The modules of the two packages that ``name`` imports, by the time its functions have run."""
     modules = _modules()
     tree, _ = modules[name]
     found = set()
-    for statement in _statements(tree):
+    for statement in _statements(tree, types=types):
         if isinstance(statement, ast.Import):
             found |= {alias.name for alias in statement.names}
         elif isinstance(statement, ast.ImportFrom):
@@ -67,3 +67,14 @@ def test_imports_never_come_back_not_even_inside_functions() -> None:
         TopologicalSorter({name: _imported(name) for name in _modules()}).prepare()
     except CycleError as error:
         pytest.fail(" -> ".join(reversed(error.args[1])))
+
+
+def test_a_private_module_is_imported_by_its_room_alone() -> None:
+    """A module ``_x`` is its folder's own: what others use stands at the face, or in a module without ``_``."""
+    strangers = []
+    for name in _modules():
+        for module in _imported(name, types=True):
+            room, _, last = module.rpartition(".")
+            if last.startswith("_") and not f"{name}.".startswith(f"{room}."):
+                strangers.append(f"{name} -> {module}")
+    assert strangers == []

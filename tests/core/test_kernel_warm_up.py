@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from smartshoe.kernels import warm_up
-from smartshoe.kernels.once import compile_each_kernel_once
+from smartshoe.kernels._once import compile_each_kernel_once
 
 
 def test_while_one_process_compiles_a_kernel_no_other_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

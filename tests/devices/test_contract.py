@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smartshoe.devices import Shoe, TestMachine, open_machine, open_shoe
-from smartshoe.devices.base import Block
+from smartshoe.devices import Block, Shoe, TestMachine, open_machine, open_shoe
 from smartshoe.devices.checks import DeviceContractError, check_machine, check_shoe
 from smartshoe.devices.replay import ReplayedShoe
 from smartshoe.errors import DeviceError, LimitError, UsageError

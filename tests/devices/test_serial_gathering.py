@@ -7,10 +7,10 @@ from collections import deque
 import numpy as np
 import pytest
 
-from smartshoe.devices.base import Block
-from smartshoe.devices.serial_link.arrivals import KEPT, Arrivals
-from smartshoe.devices.serial_link.reader import GATHER_S
-from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices._base import Block
+from smartshoe.devices.serial_link._arrivals import KEPT, Arrivals
+from smartshoe.devices.serial_link._reader import GATHER_S
+from smartshoe.devices.serial_link._settings import SerialSettings
 from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.devices.wire.frames import ChannelInformation, Information, encode_information, encode_samples
 from smartshoe.errors import DeviceError, DeviceTimeoutError

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.characteristic import characteristic_of
+from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

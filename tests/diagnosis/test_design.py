@@ -10,8 +10,8 @@ import pytest
 
 from smartshoe import dynamic_protocol, static_protocol
 from smartshoe.cli import run_command
+from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis.design import Design, design
-from smartshoe.diagnosis.experiments import EXPERIMENTS
 from smartshoe.errors import UsageError
 
 CURVES = {"contact_area", "gas_compression", "sensor_nonlinearity", "wall_hardening"}

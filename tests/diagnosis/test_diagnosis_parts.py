@@ -10,17 +10,17 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from smartshoe import Recording, dynamic_protocol
-from smartshoe.diagnosis.baseline import baseline_of
-from smartshoe.diagnosis.denoise import noise_sd
-from smartshoe.diagnosis.excitation import excitation_of
-from smartshoe.diagnosis.experiments import EXPERIMENTS
-from smartshoe.diagnosis.held_out import errors, gain, residual_of
-from smartshoe.diagnosis.lack_of_fit import repeating, slow
-from smartshoe.diagnosis.likelihood import Likelihood, fit
-from smartshoe.diagnosis.next_experiment import expected_margin
-from smartshoe.diagnosis.noise import correlated_sd
-from smartshoe.diagnosis.session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
-from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._baseline import baseline_of
+from smartshoe.diagnosis._denoise import noise_sd
+from smartshoe.diagnosis._excitation import excitation_of
+from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._held_out import errors, gain, residual_of
+from smartshoe.diagnosis._lack_of_fit import repeating, slow
+from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._next_experiment import expected_margin
+from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from test_diagnosis_parts import RATE_HZ, recording, sessions_of
 
-from smartshoe.diagnosis.gauss_markov import gauss_markov_of
-from smartshoe.diagnosis.jittered import as_sampled, jitter_s
-from smartshoe.diagnosis.residual_structure import residual_structure
-from smartshoe.diagnosis.session import Session
-from smartshoe.diagnosis.thresholds import Thresholds
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._gauss_markov import gauss_markov_of
+from smartshoe.diagnosis._jittered import as_sampled, jitter_s
+from smartshoe.diagnosis._residual_structure import residual_structure
+from smartshoe.diagnosis._session import Session
 
 NOISE = 0.001
 ALARM = Thresholds().false_alarm

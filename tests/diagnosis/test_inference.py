@@ -12,12 +12,11 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose, dynamic_protocol
-from smartshoe.diagnosis import Diagnosis, Thresholds
-from smartshoe.diagnosis.baseline import baseline_of
-from smartshoe.diagnosis.evidence import OWN_SD, Evidence
-from smartshoe.diagnosis.sensitivity import Linearised, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis.session import full_scale, prepare
-from smartshoe.diagnosis.thresholds import described
+from smartshoe.diagnosis import Diagnosis, Thresholds, described
+from smartshoe.diagnosis._baseline import baseline_of
+from smartshoe.diagnosis._evidence import OWN_SD, Evidence
+from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
+from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
-from smartshoe.diagnosis.inference import Alternative, Member
-from smartshoe.diagnosis.likelihood import Fit
-from smartshoe.diagnosis.naming import Name, names_of, probability_of_kind, probability_of_law
+from smartshoe.diagnosis._inference import Alternative, Member
+from smartshoe.diagnosis._likelihood import Fit
+from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis.ranges import Ranges, ranges_of
-from smartshoe.diagnosis.session import full_scale, prepare
+from smartshoe.diagnosis._ranges import Ranges, ranges_of
+from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

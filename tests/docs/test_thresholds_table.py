@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from smartshoe.diagnosis.thresholds import Thresholds, described
+from smartshoe.diagnosis import Thresholds, described
 
 
 def test_the_guide_lists_every_threshold_with_its_value_unit_meaning_and_origin(root: Path) -> None:

@@ -20,11 +20,10 @@ from simulators.people import Person, Run, Stand, Walk, trial
 from smartshoe.calibration import Calibration
 from smartshoe.errors import InputError, RefusedError, UnitError, UsageError
 from smartshoe.files.atomic import json_text
-from smartshoe.gait import Coverage, GaitResult, analyse, day
-from smartshoe.gait.day import DayResult, analyse_stream
-from smartshoe.gait.events import Event
-from smartshoe.gait.strides import Stride
-from smartshoe.gait.sums import Moments
+from smartshoe.gait import Coverage, Event, GaitResult, Stride, analyse, analyse_stream
+from smartshoe.gait import _day as day
+from smartshoe.gait._day import DayResult
+from smartshoe.gait._sums import Moments
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
@@ -268,7 +267,7 @@ import sys
 from pathlib import Path
 import numpy as np
 from simulators.people import Person, Walk, trial
-from smartshoe.gait.day import analyse_stream
+from smartshoe.gait import analyse_stream
 from smartshoe.recording import Recording
 
 made = trial(Person(), Walk(1.3), 60.0, np.random.default_rng(1), sensors=False, noise_n=1.0).recording

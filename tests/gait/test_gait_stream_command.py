@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from trials import walked
 
-from smartshoe.cli import gait_stream, run_command
+from smartshoe.cli import _gait_stream as gait_stream
+from smartshoe.cli import run_command
 from smartshoe.files.logs import write
 
 

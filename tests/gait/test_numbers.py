@@ -15,12 +15,11 @@ from trials import analysed, loads_of, ran, recorded, stood, times_of, walked
 from simulators.people import Person, Walk, trial
 from smartshoe.errors import UsageError
 from smartshoe.files.atomic import json_text
-from smartshoe.gait import analyse, centre_of_pressure, memberships
-from smartshoe.gait.contact import Contacts
-from smartshoe.gait.crossing import bent_places, growth, level_places, rise_places, running_median
+from smartshoe.gait import Contacts, analyse, centre_of_pressure, memberships
+from smartshoe.gait._crossing import bent_places, growth, level_places, rise_places, running_median
+from smartshoe.gait._strides import loading_rate, strides_of
 from smartshoe.gait.insole import PLACES
 from smartshoe.gait.membership import PHASES
-from smartshoe.gait.strides import loading_rate, strides_of
 from smartshoe.gait.summary import asymmetry
 from smartshoe.recording import REGIONS
 
@@ -236,7 +235,7 @@ def test_frames_hold_strides_events_and_forces() -> None:
 
 def test_c3d_holds_loads_and_events_with_their_side(tmp_path: Path) -> None:
     ezc3d = pytest.importorskip("ezc3d")
-    from smartshoe.gait.c3d import write_c3d
+    from smartshoe.gait import write_c3d
 
     made = walked(60.0)
     shifted = recorded(made.time_s + 100.0, loads_of(made))

@@ -19,7 +19,7 @@ from judging import said
 from numpy.typing import NDArray
 
 import smartshoe
-from simulators.hidden.baseline import lagged
+from simulators.hidden._baseline import lagged
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]

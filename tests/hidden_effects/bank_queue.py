@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import smartshoe
-from smartshoe.runs.sweeps.folder import SweepFolder
-from smartshoe.runs.sweeps.queue import compute_all, place_of, shard_of
+from smartshoe.runs.sweeps._folder import SweepFolder
+from smartshoe.runs.sweeps._queue import compute_all, place_of, shard_of
 
 HERE = Path(__file__).resolve().parent
 NAME_DIGITS = 24

@@ -25,7 +25,7 @@ import numpy as np
 from simulators.hidden.effects import EFFECTS
 from simulators.hidden.recordings import HiddenCase
 from smartshoe.diagnosis import Cause, Diagnosis
-from smartshoe.diagnosis.session import Scale, prepare
+from smartshoe.diagnosis._session import Scale, prepare
 
 # What a fault's word of its own stands for.
 FAULT_IS = {

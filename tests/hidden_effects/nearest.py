@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
 from simulators.effects.memory import follow
-from simulators.hidden.baseline import lagged
+from simulators.hidden._baseline import lagged
 from simulators.hidden.cases import BankCase
 from simulators.hidden.effects.operators import cycles_done, slip
 from simulators.instruments.presets import FULL_SCALE_N

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from nearest import PLAIN, leaves
 
-from simulators.hidden.baseline import lagged
+from simulators.hidden._baseline import lagged
+from simulators.hidden._machine import Chain, Departed, Given, balanced, recorded
+from simulators.hidden._protocols import build
+from simulators.hidden._scaling import SILENT
 from simulators.hidden.cases import case
 from simulators.hidden.effects import BY_LAW_ALONE, EFFECTS, Law, Subject, Surroundings, Warp, merged
-from simulators.hidden.machine import Chain, Departed, Given, balanced, recorded
 from simulators.hidden.plans import INSIDE, KINDS, LAWS, MOST_DEPARTURE, plan
-from simulators.hidden.protocols import build
-from simulators.hidden.scaling import SILENT
 from smartshoe.errors import SmartShoeError
 from smartshoe.protocol import Protocol, dynamic_protocol
 

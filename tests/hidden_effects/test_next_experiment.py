@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from simulators.hidden._scaling import machine_of
 from simulators.hidden.recordings import HiddenCase, hide
-from simulators.hidden.scaling import machine_of
 from simulators.provider import provider
 from smartshoe.calibration import Calibration
 from smartshoe.diagnosis import Cause, Diagnosis, diagnose
-from smartshoe.diagnosis.next_experiment import SEPARATED
+from smartshoe.diagnosis._next_experiment import SEPARATED
 from smartshoe.models.twin import TwinBladder
 from smartshoe.protocol import Protocol
 

@@ -12,10 +12,10 @@ import numpy as np
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.export import export_files, write_files
 from smartshoe.calibration.store import CalibrationStore
-from smartshoe.devices.base import Block
+from smartshoe.devices import Block
 from smartshoe.files.atomic import make_folder, write_text
 from smartshoe.files.journal import AppendedFile, Journal, read_journal
-from smartshoe.live.recorder import Layout, LiveRecording, interrupted_at, journal_path
+from smartshoe.live._recorder import Layout, LiveRecording, interrupted_at, journal_path
 from smartshoe.protocol import Protocol, Segment
 from smartshoe.recording import Recording
 from smartshoe.runs.session import SessionFolder, SessionPlan

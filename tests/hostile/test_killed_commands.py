@@ -15,7 +15,7 @@ import pytest
 from hosted_commands import KILLED, Host, Tried
 from writing_commands import WRITING
 
-from smartshoe.live.recorder import interrupted_at
+from smartshoe.live._recorder import interrupted_at
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="forks the commands")
 EVERYDAY = ("calibrations add", "identify", "stream")

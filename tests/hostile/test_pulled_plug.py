@@ -11,7 +11,7 @@ from pulled_plug import Disk
 from smartshoe.errors import SmartShoeError
 from smartshoe.files.atomic import write_text
 from smartshoe.files.journal import Journal, read_journal
-from smartshoe.runs.sweeps.folder import SweepFolder
+from smartshoe.runs.sweeps._folder import SweepFolder
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="reads open files by /proc")
 # Who asks for what to be on disk, in all of the source.

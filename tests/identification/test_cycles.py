@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from presses import press
 
 from smartshoe.identification import identify
-from smartshoe.identification.cycles import averaged_reading, repeated_cycles
+from smartshoe.identification._cycles import averaged_reading, repeated_cycles
 from smartshoe.recording import Recording
 
 

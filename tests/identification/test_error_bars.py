@@ -7,7 +7,7 @@ import pytest
 from presses import press
 
 from smartshoe.identification import identify
-from smartshoe.identification.uncertainty import t_quantile
+from smartshoe.identification._uncertainty import t_quantile
 from smartshoe.models import Parameter
 from smartshoe.recording import Recording
 

@@ -10,9 +10,9 @@ from presses import FIXED, SIX_RATES, TOE, coefficients, press
 
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification import identify
-from smartshoe.identification.experiment import prepare
-from smartshoe.identification.parametrisation import GREY_FIXED, FreeForm, GreyBox
-from smartshoe.identification.prediction_error import PredictionError, Settings
+from smartshoe.identification._experiment import prepare
+from smartshoe.identification._parametrisation import GREY_FIXED, FreeForm, GreyBox
+from smartshoe.identification._prediction_error import PredictionError, Settings
 from smartshoe.recording import Recording
 
 METHODS = ("srivc", "gn", "lm", "trf")

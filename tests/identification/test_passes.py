@@ -9,10 +9,10 @@ from scipy.optimize import least_squares
 
 from smartshoe.errors import InputError, UsageError
 from smartshoe.identification import fit_coefficients, identify
-from smartshoe.identification.experiment import prepare
-from smartshoe.identification.parametrisation import GREY_FIXED, FreeForm, GreyBox
-from smartshoe.identification.prediction_error import PredictionError, Settings
-from smartshoe.identification.solve import Evaluation, minimise
+from smartshoe.identification._experiment import prepare
+from smartshoe.identification._parametrisation import GREY_FIXED, FreeForm, GreyBox
+from smartshoe.identification._prediction_error import PredictionError, Settings
+from smartshoe.identification._solve import Evaluation, minimise
 from smartshoe.recording import Recording
 
 

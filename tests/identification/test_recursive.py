@@ -13,8 +13,8 @@ from presses import TOE, press
 
 from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.identification import identify
+from smartshoe.identification._sufficient_statistics import BANK, FASTEST, SLOWEST, bank_weights
 from smartshoe.identification.recursive import RecursiveIdentification
-from smartshoe.identification.sufficient_statistics import BANK, FASTEST, SLOWEST, bank_weights
 from smartshoe.kernels.pole_bank import lag_bank
 from smartshoe.models import simulate
 from smartshoe.models.first_order import lag

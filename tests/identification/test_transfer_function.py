@@ -11,10 +11,10 @@ from scipy.signal import lsim, max_len_seq
 
 from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification.transfer_function import identify_transfer_function
-from smartshoe.identification.transfer_function.discrete import StateVariableFilter
-from smartshoe.identification.transfer_function.experiment import prepare
-from smartshoe.identification.transfer_function.problem import OutputError, Structure, Whitened
-from smartshoe.identification.transfer_function.srivc import least_squares, reflected
+from smartshoe.identification.transfer_function._discrete import StateVariableFilter
+from smartshoe.identification.transfer_function._experiment import prepare
+from smartshoe.identification.transfer_function._problem import OutputError, Structure, Whitened
+from smartshoe.identification.transfer_function._srivc import least_squares, reflected
 
 RAO_GARNIER = ([-6400.0, 1600.0], [1.0, 5.0, 408.0, 416.0, 1600.0])
 LATE = ([-4.0, 0.5], [1.0, 1.0, 4.0])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from test_integrity_clean import simulated
 
 from smartshoe.integrity import Integrity, examine
-from smartshoe.integrity.lines import aliases
+from smartshoe.integrity._lines import aliases
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import Channel, Recording
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from test_integrity_faults import kinds, on_lattice, recorded, with_reading
 
 from smartshoe.integrity import examine
-from smartshoe.integrity.spikes import comes_back
+from smartshoe.integrity._spikes import comes_back
 from smartshoe.protocol import dynamic_protocol, static_protocol
 from smartshoe.recording import Recording
 

@@ -17,7 +17,7 @@ from serving import health, page, serving, until, walk_table
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from smartshoe.live.client import Client
+from smartshoe.live._client import Client
 from smartshoe.live.server import LiveServer
 from smartshoe.live.session import LiveSession
 

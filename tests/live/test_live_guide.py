@@ -11,12 +11,10 @@ from serving import told, walk_table
 from websockets.sync.client import connect
 
 from smartshoe.devices import open_shoe
-from smartshoe.live.guidance import Guidance
+from smartshoe.live._guidance import Guidance
 from smartshoe.live.guide import AGAIN, DONE, PageOperator
 from smartshoe.protocol import Protocol, dynamic_protocol
-from smartshoe.runs.session import SessionPlan
-from smartshoe.runs.session.checks import PressingFault
-from smartshoe.runs.session.operator import Unattended
+from smartshoe.runs.session import PressingFault, SessionPlan, Unattended
 
 SHORT = Protocol("short", dynamic_protocol((200.0, 800.0), rest_s=2.0).segments)
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from serving import walk_table
 
 import smartshoe
-from smartshoe.live.pixel_columns import joined, reduced
-from smartshoe.live.ring import Ring
-from smartshoe.live.steps import StepFollower
+from smartshoe.live._pixel_columns import joined, reduced
+from smartshoe.live._ring import Ring
+from smartshoe.live._steps import StepFollower
 
 SIZES = st.lists(st.integers(0, 30), max_size=30)
 

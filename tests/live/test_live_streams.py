@@ -18,7 +18,7 @@ from simulators.wire.serving import Emulator
 from smartshoe.calibration import Calibration
 from smartshoe.devices import open_shoe
 from smartshoe.files.journal import read_journal
-from smartshoe.live.frames import SECONDS, view_of
+from smartshoe.live._frames import SECONDS, view_of
 from smartshoe.units import MILLIBAR
 
 
@@ -28,7 +28,7 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def numbers_of(frame: bytes, shoes: int = 1) -> list[dict[str, np.ndarray]]:
-    """A frame's arrays, by the layout that smartshoe.live.frames documents."""
+    """A frame's arrays, by the layout that smartshoe.live._frames documents."""
     assert (frame[0], frame[1]) == (1, shoes)
     found, at = [], 24
     for _ in range(shoes):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from smartshoe.arrays import Array
-from smartshoe.calibration.extended import ExtendedCompensator
+from smartshoe.calibration import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import (
     Conditions,

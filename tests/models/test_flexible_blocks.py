@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.arrays import Array
-from smartshoe.calibration.extended import ExtendedCompensator
+from smartshoe.calibration import ExtendedCompensator
 from smartshoe.models.core import Core, plain
 from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.effects._monotone_curve import KNOTS

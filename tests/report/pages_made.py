@@ -21,10 +21,10 @@ from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
 from smartshoe.report.calibration import UnitReport, write_page
 from smartshoe.report.drift import write_drift
+from smartshoe.report.gait._page import write_gait_page
 from smartshoe.report.gait.charts import mean_strides
-from smartshoe.report.gait.page import write_gait_page
 from smartshoe.report.trial import TrialSection, total_chart
-from smartshoe.runs.studies.running import study
+from smartshoe.runs.studies import study
 from smartshoe.units import MILLIBAR
 
 NAME = "<script>alert(1)</script>"

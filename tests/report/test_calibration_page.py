@@ -11,8 +11,8 @@ from balance import Balance
 from browser import Browser
 from pages_made import NAME, RATES, calibration_page, two_units
 
-from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
-from smartshoe.report.calibration.judgement import against_static, headline, judge, looks_like_friction
+from smartshoe.report.calibration import DiagnosisLink, UnitReport, headline, judge, write_page
+from smartshoe.report.calibration._judgement import against_static, looks_like_friction
 
 
 @pytest.fixture(scope="module")

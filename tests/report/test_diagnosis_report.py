@@ -17,16 +17,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from looks import look, unfold
 
-from smartshoe.diagnosis.held_out import Gain
-from smartshoe.diagnosis.result import Cause, Diagnosis, GoodnessOfFit, NextExperiment, Rival, Statement, Trace
+from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit, Trace
+from smartshoe.diagnosis._result import NextExperiment, Rival, Statement
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
-from smartshoe.report.diagnosis.page import write_diagnosis_page
-from smartshoe.report.diagnosis.protocol_file import protocol_text
-from smartshoe.report.diagnosis.sentences import (
+from smartshoe.report.diagnosis._page import write_diagnosis_page
+from smartshoe.report.diagnosis._protocol_file import protocol_text
+from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
     gain_sentence,
     interval,

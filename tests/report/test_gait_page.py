@@ -11,7 +11,7 @@ from pages_made import gait_page, walked
 
 from simulators.people import Person, Walk, trial
 from smartshoe.gait import Coverage, GaitResult, analyse
-from smartshoe.report.gait.page import verdict
+from smartshoe.report.gait._page import verdict
 from smartshoe.report.gait.terminal import by_foot, depends_on_coverage
 
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulators.hidden.baseline import lagged, left_over, residual
+from simulators.hidden._baseline import lagged, left_over, residual
+from simulators.hidden._protocols import PROTOCOLS, build
 from simulators.hidden.effects import EFFECTS
 from simulators.hidden.effects.noise import alias_hz
-from simulators.hidden.protocols import PROTOCOLS, build
 from simulators.hidden.recordings import hide
 from smartshoe.errors import UsageError
 from smartshoe.protocol import dynamic_protocol

@@ -16,6 +16,8 @@ from simulators.effects.damage import PermanentSetParameters
 from simulators.effects.friction import BoucWenParameters, StickSlipParameters
 from simulators.effects.outside import Odd
 from simulators.effects.relaxation import PowerLawCreepParameters, SecondRelaxationParameters
+from simulators.plant._steppers import PlainStepper, WallStepper
+from simulators.plant._wall_stepping import nozzle_flow
 from simulators.plant.bladder import SimulatedBladder
 from simulators.plant.bladder_parameters import (
     AMBIENT_PA,
@@ -27,8 +29,6 @@ from simulators.plant.bladder_parameters import (
     SofteningParameters,
     TemperatureParameters,
 )
-from simulators.plant.steppers import PlainStepper, WallStepper
-from simulators.plant.wall_stepping import nozzle_flow
 
 PLAIN = BladderParameters(1.341, 0.215, effective_area_m2=0.0623)
 K1 = 1.341 * 0.38113

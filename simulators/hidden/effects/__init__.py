@@ -1,7 +1,7 @@
 """What can be hidden in a simulated unit: every effect of the catalogue under several laws, and some outside of it.
 
-One file a family lists its effects: to add a truth is to add an entry there. `simulators.hidden.effects.registry` says
-what an entry is made of, `simulators.hidden.effects.law` how a further law acts.
+One file a family lists its effects: to add a truth is to add an entry there. `simulators.hidden.effects._registry` says
+what an entry is made of, `simulators.hidden.effects._law` how a further law acts.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from simulators.hidden.effects import (
     timing,
     zero,
 )
-from simulators.hidden.effects.law import Law, Surroundings, Warp
-from simulators.hidden.effects.registry import SHARE_OF_RANGE, Draws, Hideable, Options, Subject, merged
+from simulators.hidden.effects._law import Law, Surroundings, Warp
+from simulators.hidden.effects._registry import SHARE_OF_RANGE, Draws, Hideable, Options, Subject, merged
 
 _FAMILIES = (
     relaxation, leak, gas_heat, static_curve, dead_band, hysteresis, asymmetry, rate, softening, gain_drift, timing,

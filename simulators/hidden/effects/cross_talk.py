@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from simulators.hidden.effects.law import Law
-from simulators.hidden.effects.registry import Draws, Hideable, Options, Subject, uniform
+from simulators.hidden.effects._law import Law
+from simulators.hidden.effects._registry import Draws, Hideable, Options, Subject, uniform
 
 
 def neighbour(amount: float, draws: Draws, subject: Subject) -> Options:

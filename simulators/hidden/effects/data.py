@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.registry import Draws, Hideable, reading, uniform
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, reading, uniform
 from smartshoe.arrays import Array
 
 

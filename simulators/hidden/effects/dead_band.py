@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.registry import Draws, Hideable, bladder, uniform
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, bladder, uniform
 from simulators.instruments.presets import FULL_SCALE_N
 from smartshoe.arrays import Array
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.registry import Draws, Hideable, Options, Subject, log_uniform, sensor, signed
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, Options, Subject, log_uniform, sensor, signed
 from simulators.hidden.effects.zero import PER_KELVIN, ROOM, by_temperature
 from smartshoe.arrays import Array
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, bladder, log_uniform
 from simulators.hidden.effects.operators import against_modes
-from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform
 from simulators.plant.bladder_parameters import HEAT_RATIO
 from smartshoe.arrays import Array
 

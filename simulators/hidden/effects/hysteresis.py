@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, bladder, log_uniform, uniform
 from simulators.hidden.effects.operators import endochronic, jiles_atherton, slip
-from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform, uniform
 from simulators.instruments.presets import FULL_SCALE_N
 from simulators.plant.preisach import MEMORY, loop_shape
 from smartshoe.arrays import Array

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, bladder, log_uniform, uniform
 from simulators.hidden.effects.operators import against_modes, integral
-from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform, uniform
 from smartshoe.arrays import Array
 
 LAMINAR = 2e-3  # of full scale: below it every opening's flow is viscous

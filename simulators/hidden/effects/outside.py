@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from simulators.effects.outside import moments
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.operators import lagged
-from simulators.hidden.effects.registry import (
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import (
     Draws,
     Hideable,
     Options,
@@ -19,6 +18,7 @@ from simulators.hidden.effects.registry import (
     signed,
     uniform,
 )
+from simulators.hidden.effects.operators import lagged
 from smartshoe.arrays import Array
 
 

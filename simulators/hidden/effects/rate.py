@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, bladder, signed, uniform
 from simulators.hidden.effects.operators import lagged
-from simulators.hidden.effects.registry import Draws, Hideable, bladder, signed, uniform
 from smartshoe.arrays import Array
 
 

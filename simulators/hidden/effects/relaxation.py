@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, Subject, bladder, both, log_uniform, uniform
 from simulators.hidden.effects.operators import against_modes, norton
-from simulators.hidden.effects.registry import Draws, Hideable, Subject, bladder, both, log_uniform, uniform
 from simulators.plant.bladder_parameters import X_OVER_NRT
 from smartshoe.arrays import Array
 

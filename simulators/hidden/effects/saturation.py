@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.registry import SHARE_OF_RANGE, Draws, Hideable, Options, Subject, sensor, uniform
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import SHARE_OF_RANGE, Draws, Hideable, Options, Subject, sensor, uniform
 from smartshoe.arrays import Array
 
 

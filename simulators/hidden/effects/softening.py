@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, bladder, log_uniform, signed, uniform
 from simulators.hidden.effects.operators import cycles_done
-from simulators.hidden.effects.registry import Draws, Hideable, bladder, log_uniform, signed, uniform
 from smartshoe.arrays import Array
 
 CYCLE_BEGINS, CYCLE_ENDS = 0.1, 0.03  # of full scale

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.registry import (
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import (
     SHARE_OF_RANGE,
     Draws,
     Hideable,

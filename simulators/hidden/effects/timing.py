@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulators.hidden.effects.law import Law, Surroundings
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import Draws, Hideable, reading, sensor, signed, uniform
 from simulators.hidden.effects.operators import against_modes, opening_port
-from simulators.hidden.effects.registry import Draws, Hideable, reading, sensor, signed, uniform
 from smartshoe.arrays import Array
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from simulators.effects.sensing import DIE_FASTER, DIE_SHARE
-from simulators.hidden.effects.law import Law, Surroundings
-from simulators.hidden.effects.operators import integral
-from simulators.hidden.effects.registry import (
+from simulators.hidden.effects._law import Law, Surroundings
+from simulators.hidden.effects._registry import (
     Draws,
     Hideable,
     Options,
@@ -18,6 +17,7 @@ from simulators.hidden.effects.registry import (
     signed,
     uniform,
 )
+from simulators.hidden.effects.operators import integral
 from simulators.plant.bladder_parameters import X_OVER_NRT
 from smartshoe.arrays import Array
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from smartshoe.calibration.calibration import Calibration
-from smartshoe.calibration.export.c99 import c_files
-from smartshoe.calibration.export.fmu import fmu_files, twin_files
-from smartshoe.calibration.export.json_file import json_files
-from smartshoe.calibration.export.matlab import matlab_files
-from smartshoe.calibration.export.model import FilterModel
-from smartshoe.calibration.export.names import DEFAULT_NAME, TWIN_NAME, names_of
-from smartshoe.calibration.export.twin import TwinModel
+from smartshoe.calibration._calibration import Calibration
+from smartshoe.calibration.export._c99 import c_files
+from smartshoe.calibration.export._fmu import fmu_files, twin_files
+from smartshoe.calibration.export._json_file import json_files
+from smartshoe.calibration.export._matlab import matlab_files
+from smartshoe.calibration.export._model import FilterModel
+from smartshoe.calibration.export._names import DEFAULT_NAME, TWIN_NAME, names_of
+from smartshoe.calibration.export._twin import TwinModel
 from smartshoe.errors import UsageError
 from smartshoe.files.atomic import make_folder, replacing
 

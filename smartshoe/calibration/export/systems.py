@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from smartshoe.calibration.calibration import Calibration
-from smartshoe.calibration.export.model import FilterModel
+from smartshoe.calibration._calibration import Calibration
+from smartshoe.calibration.export._model import FilterModel
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:

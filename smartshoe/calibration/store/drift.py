@@ -12,9 +12,9 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index
 from smartshoe.calibration import Calibration
-from smartshoe.calibration.store.calibration_store import CalibrationStore
+from smartshoe.calibration.store._calibration_store import CalibrationStore
+from smartshoe.calibration.store._entry import Entry, HistoryEvent
 from smartshoe.calibration.store.dates import days_between, iso
-from smartshoe.calibration.store.entry import Entry, HistoryEvent
 from smartshoe.calibration.store.quantities import STATIC_GAIN, ZERO, quantities, require_one_reading_unit, top_load_n
 from smartshoe.errors import UsageError
 from smartshoe.models.parameter import Parameter

@@ -58,7 +58,7 @@ def require_one_reading_unit(calibrations: Sequence[Calibration]) -> None:
 
 def top_load_n(calibrations: Sequence[Calibration]) -> float:
     """The largest load that all calibrations have seen, the paper's 800 N where none says."""
-    from smartshoe.calibration.calibration import USUAL_FULL_SCALE_N
+    from smartshoe.calibration._calibration import USUAL_FULL_SCALE_N
 
     tops = [c.load_range_n[1] for c in calibrations if c.load_range_n is not None and c.load_range_n[1] > 0.0]
     return min(tops, default=USUAL_FULL_SCALE_N)

@@ -10,7 +10,7 @@ from threading import Condition
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.devices.base import Block
+from smartshoe.devices._base import Block
 from smartshoe.errors import DeviceError
 
 

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smartshoe.devices.base import Block, ChannelDescription, Shoe
-from smartshoe.devices.events import Dropped, ShoeEvent
+from smartshoe.devices._base import Block, ChannelDescription, Shoe
+from smartshoe.devices._events import Dropped, ShoeEvent
+from smartshoe.devices.serial_link._settings import SerialSettings, settings_from
 from smartshoe.devices.serial_link.reconnect import Backoff
-from smartshoe.devices.serial_link.settings import SerialSettings, settings_from
 from smartshoe.errors import DeviceError, DeviceTimeoutError, UsageError
 from smartshoe.recording import REGIONS
 from smartshoe.units import COUNTS, MILLIBAR, Unit, declared, find_unit
 
 if TYPE_CHECKING:
-    from smartshoe.devices.serial_link.assembly import Assembler
-    from smartshoe.devices.serial_link.greeting import Greeting
-    from smartshoe.devices.serial_link.port import Port
-    from smartshoe.devices.serial_link.reader import SerialReader
+    from smartshoe.devices.serial_link._assembly import Assembler
+    from smartshoe.devices.serial_link._greeting import Greeting
+    from smartshoe.devices.serial_link._port import Port
+    from smartshoe.devices.serial_link._reader import SerialReader
     from smartshoe.devices.wire.clock import DeviceClock
     from smartshoe.devices.wire.counters import Counters
     from smartshoe.devices.wire.information import Information
@@ -123,13 +123,13 @@ class SerialShoe(Shoe):
     def _port(self) -> Port:
         if self._open_port is not None:
             return self._open_port(self.target, self.settings.baud)
-        from smartshoe.devices.serial_link.port import SerialPort
+        from smartshoe.devices.serial_link._port import SerialPort
 
         return SerialPort(self.target, self.settings.baud)
 
     def _open_internal(self) -> None:
-        from smartshoe.devices.serial_link.assembly import Assembler
-        from smartshoe.devices.serial_link.reader import SerialReader
+        from smartshoe.devices.serial_link._assembly import Assembler
+        from smartshoe.devices.serial_link._reader import SerialReader
 
         port, greeting = self._greeted(self._port(), self._clock() + self.settings.wait_s)
         try:
@@ -149,7 +149,7 @@ class SerialShoe(Shoe):
 
     def _greeted(self, port: Port, until_s: float) -> tuple[Port, Greeting]:
         """A port and the shoe's greeting over it; where the connection breaks it is made anew, until ``until_s``."""
-        from smartshoe.devices.serial_link.greeting import greet
+        from smartshoe.devices.serial_link._greeting import greet
 
         backoff = Backoff()
         while True:
@@ -204,7 +204,7 @@ class SerialShoe(Shoe):
 
 def _columns_of(settings: SerialSettings) -> tuple[str, ...]:
     """The units among the columns of text lines; raises `UsageError` where no column is the time."""
-    from smartshoe.devices.serial_link.greeting import decoder_for
+    from smartshoe.devices.serial_link._greeting import decoder_for
 
     return decoder_for("lines", settings).feed(b"").names
 

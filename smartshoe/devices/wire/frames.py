@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smartshoe.arrays import Array, Integers, Mask
-from smartshoe.devices.wire.checksums import checksums
-from smartshoe.devices.wire.commands import Command, CommandDecoder, encode_command
+from smartshoe.devices.wire._checksums import checksums
+from smartshoe.devices.wire._commands import Command, CommandDecoder, encode_command
+from smartshoe.devices.wire._framing import framed
+from smartshoe.devices.wire._ordering import CLOCK, COUNT, Ordering
+from smartshoe.devices.wire._scanning import INFORMATION, SAMPLE, FrameScanner
 from smartshoe.devices.wire.counters import Counters
-from smartshoe.devices.wire.framing import framed
 from smartshoe.devices.wire.information import MOST_COUNTS, ChannelInformation, Information
-from smartshoe.devices.wire.ordering import CLOCK, COUNT, Ordering
 from smartshoe.devices.wire.samples import CHANNELS, Samples
-from smartshoe.devices.wire.scanning import INFORMATION, SAMPLE, FrameScanner
 from smartshoe.errors import UsageError
 from smartshoe.units import COUNTS
 

@@ -14,9 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smartshoe.devices.wire._line_clock import LineClock, ReadingLine, TimeUnit
 from smartshoe.devices.wire.counters import Counters
 from smartshoe.devices.wire.information import ChannelInformation, Information
-from smartshoe.devices.wire.line_clock import LineClock, ReadingLine, TimeUnit
 from smartshoe.devices.wire.samples import CHANNELS, Samples
 from smartshoe.errors import FormatError, UsageError
 from smartshoe.units import COUNTS, Unit, find_unit, unit_of_suffix

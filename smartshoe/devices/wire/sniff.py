@@ -7,8 +7,8 @@ from collections import Counter
 from itertools import pairwise
 from typing import Literal
 
+from smartshoe.devices.wire._framing import is_intact, unframed
 from smartshoe.devices.wire.frames import FrameDecoder
-from smartshoe.devices.wire.framing import is_intact, unframed
 from smartshoe.devices.wire.lines import number, split_fields, without_label
 
 Format = Literal["frames", "lines"]

@@ -4,11 +4,11 @@ Behind it numbers are finite, sizes bounded before memory is taken, names inside
 sentence (`smartshoe.errors`).
 """
 
-from smartshoe.files.gate.files import read_bytes, read_text, require_regular_file
+from smartshoe.files.gate._files import read_bytes, read_text, require_regular_file
+from smartshoe.files.gate._names import inside, require_file_name
+from smartshoe.files.gate._objects import parsed_json
+from smartshoe.files.gate._readers import foreign_code, require_columns, require_values
 from smartshoe.files.gate.limits import Limits, limits, raise_limits
-from smartshoe.files.gate.names import inside, require_file_name
-from smartshoe.files.gate.objects import parsed_json
-from smartshoe.files.gate.readers import foreign_code, require_columns, require_values
 
 __all__ = [
     "Limits",

@@ -1,7 +1,7 @@
 """Data that must not be lost: appended to a file, checked, on disk before anyone is told of it."""
 
-from smartshoe.files.journal.appending import AppendedFile
-from smartshoe.files.journal.journal import Contents, Journal, read_journal
-from smartshoe.files.journal.records import Record
+from smartshoe.files.journal._appending import AppendedFile
+from smartshoe.files.journal._journal import Contents, Journal, read_journal
+from smartshoe.files.journal._records import Record
 
 __all__ = ["AppendedFile", "Contents", "Journal", "Record", "read_journal"]

@@ -8,8 +8,8 @@ from pathlib import Path
 from smartshoe.errors import FormatError, InputError, UsageError
 from smartshoe.files.atomic import replacing
 from smartshoe.files.gate import foreign_code, require_regular_file
+from smartshoe.files.logs._sheet import Column, Format, Sheet, require_sound
 from smartshoe.files.logs.formats import formats
-from smartshoe.files.logs.sheet import Column, Format, Sheet, require_sound
 from smartshoe.recording import Recording
 
 _HEAD_BYTES = 1 << 16

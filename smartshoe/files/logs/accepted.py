@@ -56,8 +56,8 @@ def _is_frame(given: Any) -> bool:
 
 
 def _from_frame(frame: pd.DataFrame, argument: str) -> Recording:
+    from smartshoe.files.logs._sheet import Column, Sheet, require_sound
     from smartshoe.files.logs.columns import recording_from
-    from smartshoe.files.logs.sheet import Column, Sheet, require_sound
 
     if f"{TIME_NAME}_s" not in frame.columns and frame.index.name == f"{TIME_NAME}_s":
         frame = frame.reset_index()

@@ -12,13 +12,13 @@ import numpy as np
 from smartshoe.arrays import Array, Index
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.logs import detect, read
+from smartshoe.files.logs._numbers import numbers_of
+from smartshoe.files.logs._sheet import Column, Sheet
+from smartshoe.files.logs._text import even_rows
+from smartshoe.files.logs._times import check_increasing, time_of
 from smartshoe.files.logs.columns import recording_from
 from smartshoe.files.logs.formats import plain as table
-from smartshoe.files.logs.numbers import numbers_of
 from smartshoe.files.logs.picks import unit_in_file
-from smartshoe.files.logs.sheet import Column, Sheet
-from smartshoe.files.logs.text import even_rows
-from smartshoe.files.logs.times import check_increasing, time_of
 from smartshoe.recording import Channel, Recording, split_column
 
 BLOCK_BYTES = 4 << 20  # of text; as numbers and while it is parsed some five times as much

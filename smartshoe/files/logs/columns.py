@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from smartshoe.errors import InputError
+from smartshoe.files.logs._sheet import Column, Sheet
+from smartshoe.files.logs._times import check_increasing, counts_rows, time_of
 from smartshoe.files.logs.picks import Pick, names_a_column, need_quantity, need_unit, pick, titles, unit_in_file
-from smartshoe.files.logs.sheet import Column, Sheet
-from smartshoe.files.logs.times import check_increasing, counts_rows, time_of
 from smartshoe.recording import (
     COMMAND_NAME,
     LOAD_NAME,

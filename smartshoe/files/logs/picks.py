@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from smartshoe.errors import InputError, MissingChannelError, UnitError
-from smartshoe.files.logs.sheet import Column, Sheet
+from smartshoe.files.logs._sheet import Column, Sheet
 from smartshoe.units import Unit, declared, find_unit
 
 MOST_NAMES = 10  # of columns in an error

@@ -1,11 +1,11 @@
 """Checks in the field: zero before use, auto-zero in swing, body weight, units that do not answer, temperature."""
 
-from smartshoe.gait.field.at_rest import ZeroReading, check_zero, zero
-from smartshoe.gait.field.body_weight import check_body_weight
-from smartshoe.gait.field.finding import CheckResult
-from smartshoe.gait.field.silence import check_units
-from smartshoe.gait.field.swing_zero import SwingZero
-from smartshoe.gait.field.temperature import sealed_air_pa_per_k, temperature_of_zeros, temperature_sensitivity
+from smartshoe.gait.field._at_rest import ZeroReading, check_zero, zero
+from smartshoe.gait.field._body_weight import check_body_weight
+from smartshoe.gait.field._finding import CheckResult
+from smartshoe.gait.field._silence import check_units
+from smartshoe.gait.field._swing_zero import SwingZero
+from smartshoe.gait.field._temperature import sealed_air_pa_per_k, temperature_of_zeros, temperature_sensitivity
 
 __all__ = [
     "CheckResult",

@@ -12,13 +12,13 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.calibration import Calibration, compensate
 from smartshoe.errors import InputError, MissingChannelError, UsageError
-from smartshoe.gait.estimate import calibration_of
-from smartshoe.gait.field.at_rest import SHORTEST_S, check_zero
-from smartshoe.gait.field.body_weight import check_body_weight
-from smartshoe.gait.field.finding import CheckResult, Verdict
-from smartshoe.gait.field.silence import check_units
-from smartshoe.gait.field.swing_zero import SwingZero
-from smartshoe.gait.field.temperature import temperature_of_zeros
+from smartshoe.gait._estimate import calibration_of
+from smartshoe.gait.field._at_rest import SHORTEST_S, check_zero
+from smartshoe.gait.field._body_weight import check_body_weight
+from smartshoe.gait.field._finding import CheckResult, Verdict
+from smartshoe.gait.field._silence import check_units
+from smartshoe.gait.field._swing_zero import SwingZero
+from smartshoe.gait.field._temperature import temperature_of_zeros
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
 from smartshoe.signals.noise import white_noise_sd
 

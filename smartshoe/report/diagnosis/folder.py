@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from smartshoe.diagnosis.result import Diagnosis
+from smartshoe.diagnosis import Diagnosis
 from smartshoe.files.atomic import json_text, make_folder, write_text
-from smartshoe.report.diagnosis.page import write_diagnosis_page
-from smartshoe.report.diagnosis.protocol_file import protocol_text, table_name
+from smartshoe.report.diagnosis._page import write_diagnosis_page
+from smartshoe.report.diagnosis._protocol_file import protocol_text, table_name
 
 
 def publish_diagnosis(

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis.result import Diagnosis
+from smartshoe.diagnosis import Diagnosis
 from smartshoe.report.diagnosis.views import Map
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import words

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
+from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.design import Design
-from smartshoe.diagnosis.result import Cause, Diagnosis
-from smartshoe.report.diagnosis.sentences import (
+from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
     comparison,
     fault_text,

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
-from smartshoe.diagnosis.result import Trace
+from smartshoe.diagnosis import Trace
 from smartshoe.signals.loading import Cycle, by_rate, cycles, ramps
 
 SLOPE_S = 0.2  # over which a load's rate is taken

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.gait import FootSeries, GaitResult
 from smartshoe.gait.indices import POINTS, overlaid
 from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
-from smartshoe.gait.result import GaitResult
-from smartshoe.gait.series import FootSeries
 from smartshoe.gait.summary import of_main_activity
 from smartshoe.report.charts import Chart, Line, Mark, Panel
 from smartshoe.report.gait.strides import main_strides, whole_of

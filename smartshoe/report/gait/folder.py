@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from smartshoe.files.atomic import json_text, make_folder, write_text
-from smartshoe.gait.result import GaitResult
-from smartshoe.report.gait.page import write_gait_page
+from smartshoe.gait import GaitResult
+from smartshoe.report.gait._page import write_gait_page
 
 DIGITS = 9  # of a number in the tables of strides and events
 TIME_FORMAT, FORMAT = "%.9g", "%.6g"  # of the forces: a load is not known to a millionth of itself

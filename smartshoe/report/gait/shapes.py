@@ -6,9 +6,8 @@ import numpy as np
 from markupsafe import Markup
 
 from smartshoe.arrays import Array
+from smartshoe.gait import FootSeries, GaitResult
 from smartshoe.gait.insole import OUTLINE, PLACES
-from smartshoe.gait.result import GaitResult
-from smartshoe.gait.series import FootSeries
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain
 

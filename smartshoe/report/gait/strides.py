@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.gait.result import GaitFindings
-from smartshoe.gait.series import FootSeries
-from smartshoe.gait.strides import Stride
+from smartshoe.gait import FootSeries, GaitFindings, Stride
 from smartshoe.gait.summary import of_main_activity
 
 

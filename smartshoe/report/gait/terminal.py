@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.gait.result import GaitFindings
+from smartshoe.gait import GaitFindings
 from smartshoe.report.gait.strides import main_strides
 from smartshoe.report.numbers import plain, with_sd
 from smartshoe.report.tables import new_console, table_of

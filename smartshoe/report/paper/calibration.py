@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from smartshoe.calibration.validation import ForceTrace
 from smartshoe.recording import Recording
-from smartshoe.report.calibration.unit_report import UnitReport
+from smartshoe.report.calibration import UnitReport
 from smartshoe.report.paper.drawing import STYLE, figure_of, save, thin
 from smartshoe.signals.loading import by_rate, cycles
 

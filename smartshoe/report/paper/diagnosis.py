@@ -7,9 +7,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from smartshoe.diagnosis.result import Diagnosis
+from smartshoe.diagnosis import Diagnosis
 from smartshoe.report.diagnosis.views import by_load_and_rate, by_place_and_cycle, evidence
-from smartshoe.report.paper import diagnosis_reasoning, diagnosis_signals
+from smartshoe.report.paper import _diagnosis_reasoning as diagnosis_reasoning
+from smartshoe.report.paper import _diagnosis_signals as diagnosis_signals
 from smartshoe.report.paper.drawing import save
 
 

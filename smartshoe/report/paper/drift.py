@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
 from smartshoe.calibration.store.drift import Drift, Trend
-from smartshoe.report.drift_quantities import LEAST_SPAN, TITLES, shown_names
+from smartshoe.report._drift_quantities import LEAST_SPAN, TITLES, shown_names
 from smartshoe.report.paper.drawing import STYLE, figure_of
 from smartshoe.signals.noise import NORMAL_95
 

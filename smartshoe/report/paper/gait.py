@@ -13,15 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from smartshoe.arrays import Array
+from smartshoe.gait import GaitResult, Stride
 from smartshoe.gait.indices import POINTS, overlaid
 from smartshoe.gait.membership import PHASES as MEMBERS
 from smartshoe.gait.phases import PHASES
-from smartshoe.gait.result import GaitResult
-from smartshoe.gait.strides import Stride
 from smartshoe.gait.summary import of_main_activity
 from smartshoe.report.gait.strides import main_strides, whole_of
+from smartshoe.report.paper._soles import centre
 from smartshoe.report.paper.drawing import FOOT_COLOURS, REGION_COLOURS, STYLE, TOTAL, figure_of, save, thin
-from smartshoe.report.paper.soles import centre
 
 PHASE_COLOURS = ("#f3f4f6", "#a5b4fc", "#6ee7b7", "#fcd34d")
 MEMBER_COLOURS = ("#c7d2fe", "#a5b4fc", "#6ee7b7", "#fde68a", "#fbbf24", "#f3f4f6")

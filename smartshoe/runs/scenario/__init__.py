@@ -1,6 +1,7 @@
 """Scenarios: a TOML file that says which devices, protocols and steps; read, checked and run."""
 
-from smartshoe.runs.scenario.run import (
+from smartshoe.runs.scenario._keys import Tables, parse_assignments, with_values
+from smartshoe.runs.scenario._run import (
     ScenarioResult,
     UnitResult,
     check_simulated,
@@ -10,7 +11,15 @@ from smartshoe.runs.scenario.run import (
     simulate_trial,
     steps_of,
 )
-from smartshoe.runs.scenario.schema import Scenario, checked, load, read_tables
+from smartshoe.runs.scenario._schema import (
+    ProtocolTable,
+    Scenario,
+    ScenarioKeyError,
+    ScenarioText,
+    checked,
+    load,
+    read_tables,
+)
 
 __all__ = [
     "Scenario",
@@ -25,4 +34,10 @@ __all__ = [
     "simulate",
     "simulate_trial",
     "steps_of",
+    "ProtocolTable",
+    "ScenarioKeyError",
+    "ScenarioText",
+    "Tables",
+    "parse_assignments",
+    "with_values",
 ]

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 from smartshoe.calibration.provenance import calibrated_on
 from smartshoe.files.atomic import make_folder, write_text
-from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
-from smartshoe.report.calibration.judgement import headline, judge
+from smartshoe.report.calibration import DiagnosisLink, UnitReport, headline, judge, write_page
 from smartshoe.report.wording import sentence
-from smartshoe.runs.scenario.run import ScenarioResult, UnitResult, diagnosed_on
+from smartshoe.runs.scenario._run import ScenarioResult, UnitResult, diagnosed_on
 from smartshoe.version import __version__
 
 if TYPE_CHECKING:

@@ -1,11 +1,12 @@
 """A calibration session: a unit under a machine, recorded so that nothing is lost, then identified and judged."""
 
-from smartshoe.runs.session.analysis import SessionResult, analyse
-from smartshoe.runs.session.folder import SessionFolder
-from smartshoe.runs.session.operator import Operator, Unattended
-from smartshoe.runs.session.plan import SessionPlan, protocols_named
-from smartshoe.runs.session.procedure import conduct
-from smartshoe.runs.session.publish import publish
+from smartshoe.runs.session._analysis import SessionResult, analyse
+from smartshoe.runs.session._checks import PressingFault
+from smartshoe.runs.session._folder import SessionFolder
+from smartshoe.runs.session._operator import Operator, Unattended
+from smartshoe.runs.session._plan import SessionPlan, protocols_named
+from smartshoe.runs.session._procedure import conduct
+from smartshoe.runs.session._publish import publish
 
 __all__ = [
     "Operator",
@@ -17,4 +18,5 @@ __all__ = [
     "conduct",
     "protocols_named",
     "publish",
+    "PressingFault",
 ]

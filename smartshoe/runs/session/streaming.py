@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.calibration import Calibration
-from smartshoe.calibration.filter import ForceFilter
-from smartshoe.devices.base import Block, Shoe
+from smartshoe.calibration import Calibration, ForceFilter
+from smartshoe.devices import Block, Shoe
 from smartshoe.errors import UnitError, UsageError
 from smartshoe.files.journal import AppendedFile
 from smartshoe.units import Unit

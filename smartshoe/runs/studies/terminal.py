@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
-from smartshoe.runs.studies.page import SHOWN, careful, headline, is_clear, shown_figures
-from smartshoe.runs.studies.running import StudyResult
+from smartshoe.runs.studies._page import SHOWN, careful, headline, is_clear, shown_figures
+from smartshoe.runs.studies._running import StudyResult
 
 
 def print_study(result: StudyResult) -> None:

@@ -1,5 +1,5 @@
 """Sweeps: one scenario many times, over designs of its keys and over seeds, on all cores or a cluster."""
 
-from smartshoe.runs.sweeps.running import SweepResult, sweep
+from smartshoe.runs.sweeps._running import SweepResult, sweep
 
 __all__ = ["SweepResult", "sweep"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from smartshoe.report.numbers import plain
 from smartshoe.report.tables import new_console, table_of
-from smartshoe.runs.sweeps.drivers import drivers_of, main_figures, what_drives
-from smartshoe.runs.sweeps.running import SweepResult
+from smartshoe.runs.sweeps._drivers import drivers_of, main_figures, what_drives
+from smartshoe.runs.sweeps._running import SweepResult
 
 
 def print_sweep(result: SweepResult) -> None:

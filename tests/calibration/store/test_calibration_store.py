@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from lives import LEFT_TOE, aged, calibration, day
 
 from smartshoe.calibration import Calibration
-from smartshoe.calibration.store import CalibrationStore, default_folder, find
-from smartshoe.calibration.store.calibration_store import segment
+from smartshoe.calibration.store import CalibrationStore, HistoryEvent, default_folder, find
+from smartshoe.calibration.store._calibration_store import segment
 from smartshoe.calibration.store.dates import iso, moment
-from smartshoe.calibration.store.entry import HistoryEvent
 from smartshoe.errors import InputError, RefusedError, UsageError
 
 
@@ -282,7 +281,7 @@ def test_an_empty_store_is_read_without_being_made(store: CalibrationStore) -> N
 def test_a_store_that_can_only_be_read_is_read(store: CalibrationStore, monkeypatch: pytest.MonkeyPatch) -> None:
     put(store, 0)
     (store.folder / "index.json").unlink(missing_ok=True)
-    monkeypatch.setattr("smartshoe.calibration.store.files.os.access", lambda *_: False)
+    monkeypatch.setattr("smartshoe.calibration.store._files.os.access", lambda *_: False)
     assert len(store.entries()) == 1
     assert not (store.folder / "index.json").exists()
 
@@ -307,7 +306,7 @@ def test_a_full_disk_is_said_and_leaves_nothing_half_written(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("smartshoe.calibration.store.files.write_text", full)
+    monkeypatch.setattr("smartshoe.calibration.store._files.write_text", full)
     with pytest.raises(UsageError, match="No space left"):
         put(store, 30)
     # What cannot be indexed is read all the same.

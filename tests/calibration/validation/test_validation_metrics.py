@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.calibration import Calibration
-from smartshoe.calibration.validation import metrics, validate
+from smartshoe.calibration.validation import _metrics as metrics
+from smartshoe.calibration.validation import validate
 from smartshoe.recording import Recording
 from smartshoe.signals import loading
 from smartshoe.units import MILLIBAR

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.devices.wire.commands import Command, CommandDecoder, encode_command
+from smartshoe.devices.wire._commands import Command, CommandDecoder, encode_command
 from smartshoe.errors import UsageError
 
 COMMANDS = st.one_of(

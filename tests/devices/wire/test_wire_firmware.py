@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smartshoe.devices.wire.commands import Command, CommandDecoder, encode_command
+from smartshoe.devices.wire._commands import Command, CommandDecoder, encode_command
 from smartshoe.devices.wire.frames import FrameDecoder, encode_information, encode_samples
 from smartshoe.devices.wire.information import ChannelInformation, Information
 

@@ -11,7 +11,9 @@ from cobs import cobs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.devices.wire.checksums import FEW, checksum, checksums
+from smartshoe.devices.wire._checksums import FEW, checksum, checksums
+from smartshoe.devices.wire._framing import framed
+from smartshoe.devices.wire._scanning import SAMPLE, FrameScanner
 from smartshoe.devices.wire.counters import Counters
 from smartshoe.devices.wire.frames import (
     ChannelInformation,
@@ -20,9 +22,7 @@ from smartshoe.devices.wire.frames import (
     encode_information,
     encode_samples,
 )
-from smartshoe.devices.wire.framing import framed
 from smartshoe.devices.wire.samples import Samples, join_samples
-from smartshoe.devices.wire.scanning import SAMPLE, FrameScanner
 from smartshoe.errors import FormatError, UsageError
 from smartshoe.units import COUNTS, MILLIBAR
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smartshoe.devices.wire._ordering import Ordering, Placed
 from smartshoe.devices.wire.counters import Counters
-from smartshoe.devices.wire.ordering import Ordering, Placed
 
 MOST_LOST = 32767
 

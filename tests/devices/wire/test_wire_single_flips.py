@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from smartshoe.devices.wire.checksums import checksum
+from smartshoe.devices.wire._checksums import checksum
+from smartshoe.devices.wire._framing import framed
+from smartshoe.devices.wire._scanning import SAMPLE, FrameScanner
+from smartshoe.devices.wire._single_flips import FORMS, FOUR_READINGS, may_be_flipped
 from smartshoe.devices.wire.counters import Counters
-from smartshoe.devices.wire.framing import framed
-from smartshoe.devices.wire.scanning import SAMPLE, FrameScanner
-from smartshoe.devices.wire.single_flips import FORMS, FOUR_READINGS, may_be_flipped
 
 ENCODED = 18  # code, then 17 bytes
 Change = tuple[tuple[int, int], ...]

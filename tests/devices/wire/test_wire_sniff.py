@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smartshoe.devices.wire._framing import framed
 from smartshoe.devices.wire.frames import encode_samples
-from smartshoe.devices.wire.framing import framed
 from smartshoe.devices.wire.lines import encode_lines
 from smartshoe.devices.wire.sniff import guess, looks_like
 

@@ -14,9 +14,8 @@ from puppet import RATE_HZ, ramp_shoe
 
 from simulators.wire.faults import FaultyAir, Outages, WireFaults
 from simulators.wire.firmware import Firmware
-from smartshoe.devices.base import Block
-from smartshoe.devices.events import Gap
-from smartshoe.devices.serial_link.assembly import Assembler
+from smartshoe.devices import Block, Gap
+from smartshoe.devices.serial_link._assembly import Assembler
 from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.devices.wire.frames import Command, FrameDecoder, encode_command
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from simulators.wire.pty_line import PtyLine
-from smartshoe.devices.serial_link.port import SerialPort
+from smartshoe.devices.serial_link._port import SerialPort
 from smartshoe.errors import DeviceError, UsageError
 
 pytestmark = pytest.mark.wire

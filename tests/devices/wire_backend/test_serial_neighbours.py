@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from smartshoe.devices import open_shoe
-from smartshoe.devices.base import Block
-from smartshoe.devices.events import Dropped, EventLog, Gap, Silence
+from smartshoe.devices import Block, Dropped, Gap, open_shoe
+from smartshoe.devices._events import EventLog, Silence
+from smartshoe.devices.serial_link._port import SerialPort, why_not_open
+from smartshoe.devices.serial_link._settings import SerialSettings, settings_from
 from smartshoe.devices.serial_link.inbox import Inbox, joined
-from smartshoe.devices.serial_link.port import SerialPort, why_not_open
 from smartshoe.devices.serial_link.reconnect import Backoff
-from smartshoe.devices.serial_link.settings import SerialSettings, settings_from
 from smartshoe.errors import DeviceError, DeviceTimeoutError, UsageError
 from smartshoe.units import MILLIBAR
 

@@ -14,12 +14,11 @@ from simulators.wire.faults import WireFaults
 from simulators.wire.firmware import Firmware
 from simulators.wire.pty_line import PtyLine
 from simulators.wire.serving import Emulator
-from smartshoe.devices import open_shoe
-from smartshoe.devices.base import Block
-from smartshoe.devices.events import Disconnected, Dropped, Gap, Reconnected, Restarted, Silence
+from smartshoe.devices import Block, Disconnected, Dropped, Gap, Reconnected, Restarted, open_shoe
+from smartshoe.devices._events import Silence
+from smartshoe.devices.serial_link._port import SerialPort
+from smartshoe.devices.serial_link._settings import SerialSettings
 from smartshoe.devices.serial_link.inbox import joined
-from smartshoe.devices.serial_link.port import SerialPort
-from smartshoe.devices.serial_link.settings import SerialSettings
 from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.devices.wire.frames import Command, encode_command
 from smartshoe.errors import DeviceError, DeviceTimeoutError

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from puppet import RATE_HZ, STEP_S, Puppet, wait_until, within
 
-from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices.serial_link._settings import SerialSettings
 from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.errors import DeviceError
 

@@ -12,8 +12,8 @@ from contextlib import contextmanager, suppress
 import pytest
 from puppet import STEP_S, within
 
-from smartshoe.devices.events import Silence, ToldLate
-from smartshoe.devices.serial_link.settings import SerialSettings
+from smartshoe.devices._events import Silence, ToldLate
+from smartshoe.devices.serial_link._settings import SerialSettings
 from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.devices.wire.frames import encode_information, encode_samples
 from smartshoe.devices.wire.information import ChannelInformation, Information

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from smartshoe.errors import InputError, MissingChannelError, UnitError
-from smartshoe.files.logs import read, write
+from smartshoe.files.logs import Column, Sheet, read, write
 from smartshoe.files.logs.columns import recording_from
-from smartshoe.files.logs.sheet import Column, Sheet
 from smartshoe.recording import Recording
 
 RAMP = np.array([0.0, 1.0, 2.0])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import smartshoe
 from smartshoe.cli import run_command
 from smartshoe.errors import FormatError, MissingChannelError
-from smartshoe.files.logs.moments import is_moment, seconds_of
+from smartshoe.files.logs._moments import is_moment, seconds_of
 
 
 def table(path: Path, header: str, rows: list[str]) -> Path:

@@ -12,7 +12,7 @@ from shoes import RATE_HZ, feet_n, foot_n, made
 
 from smartshoe.errors import UsageError
 from smartshoe.gait.field import SwingZero
-from smartshoe.gait.field.swing_zero import HOP_S, MOST, SLEW_PER_S
+from smartshoe.gait.field._swing_zero import HOP_S, MOST, SLEW_PER_S
 
 FULL_SCALE_N = 800.0
 NOISE_N = 2.0  # 0.3 % of full scale: the filtered signal of Chinimilli 2016

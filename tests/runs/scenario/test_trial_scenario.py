@@ -11,7 +11,7 @@ from smartshoe.cli import run_command
 from smartshoe.errors import ScenarioError
 from smartshoe.files.logs import read, write
 from smartshoe.runs.scenario import load, run, simulate_trial
-from smartshoe.runs.scenario.against_truth import onsets
+from smartshoe.runs.scenario._against_truth import onsets
 from smartshoe.runs.scenario.publish import publish
 
 REGIONS = ("toe", "meta1", "meta4", "heel")

@@ -13,8 +13,7 @@ from smartshoe.errors import InputError, SmartShoeError
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import dynamic_protocol
-from smartshoe.runs.scenario.run import simulate
-from smartshoe.runs.scenario.schema import load
+from smartshoe.runs.scenario import load, simulate
 
 SCENARIO = """
 title = "a twin"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from bench_sessions import bench_plan
 
-from smartshoe.devices.base import Block
+from smartshoe.devices import Block
 from smartshoe.runs.session import SessionFolder, Unattended, analyse, conduct, publish
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from smartshoe.devices import open_machine, open_shoe
-from smartshoe.devices.corners import corners, follow_corners
+from smartshoe.devices._corners import corners, follow_corners
 from smartshoe.devices.joining import align_reading, coarse
 from smartshoe.protocol import Protocol, dynamic_protocol
 

@@ -19,8 +19,9 @@ import pytest
 
 from smartshoe.errors import UsageError
 from smartshoe.files.journal import read_journal
-from smartshoe.runs.session import SessionFolder, analyse, conduct, samples
-from smartshoe.runs.session.folder import SAMPLES
+from smartshoe.runs.session import SessionFolder, analyse, conduct
+from smartshoe.runs.session import _samples as samples
+from smartshoe.runs.session._folder import SAMPLES
 from smartshoe.units import MILLIBAR
 
 HERE = Path(__file__).parent

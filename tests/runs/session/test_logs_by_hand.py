@@ -20,8 +20,9 @@ from smartshoe.files.logs import write
 from smartshoe.files.logs.formats.bluehill import write_bluehill
 from smartshoe.protocol import Protocol, dynamic_protocol
 from smartshoe.recording import Recording
-from smartshoe.runs.session import SessionFolder, conduct, machine_run
-from smartshoe.runs.session.machine_run import LogByHand
+from smartshoe.runs.session import SessionFolder, conduct
+from smartshoe.runs.session import _machine_run as machine_run
+from smartshoe.runs.session._machine_run import LogByHand
 
 
 def _pressed(folder: Path, protocol: Protocol = SHORT) -> tuple[Recording, Recording]:

@@ -6,12 +6,11 @@ import time
 
 import pytest
 
-from smartshoe.devices import open_machine
-from smartshoe.devices.base import ChannelDescription, TestMachine
+from smartshoe.devices import ChannelDescription, TestMachine, open_machine
 from smartshoe.errors import DeviceError, LimitError
 from smartshoe.protocol import MachineLimits, Protocol, dynamic_protocol
 from smartshoe.recording import Recording
-from smartshoe.runs.session.machine_run import RunMachine
+from smartshoe.runs.session._machine_run import RunMachine
 
 QUICK = dynamic_protocol((800.0,), rest_s=0.5)
 

@@ -13,12 +13,12 @@ from bench_sessions import SHORT, SHORT_TOML, bench_plan
 from simulators.instruments.presets import TABLE_1
 from smartshoe.calibration.store import CalibrationStore
 from smartshoe.cli import run_command
-from smartshoe.devices.base import Block
+from smartshoe.devices import Block
 from smartshoe.errors import InputError, LimitError, UsageError
 from smartshoe.files.journal import Journal, read_journal
 from smartshoe.protocol import static_protocol
 from smartshoe.runs.session import SessionFolder, SessionPlan, Unattended, analyse, conduct, protocols_named
-from smartshoe.runs.session.folder import SAMPLES
+from smartshoe.runs.session._folder import SAMPLES
 from smartshoe.units import MILLIBAR
 
 BENCH = ["--shoe", "sim:stand?seed=5", "--machine", "sim:instron?seed=6", "--unit", "left_toe", "--no-diagnose"]
@@ -156,7 +156,7 @@ def test_a_live_shoes_block_is_on_disk_before_it_is_shown(
 
 
 def test_blocks_survive_the_journal_bit_for_bit(tmp_path: Path) -> None:
-    from smartshoe.runs.session import samples
+    from smartshoe.runs.session import _samples as samples
 
     rng = np.random.default_rng(0)
     names = ("toe", "heel")

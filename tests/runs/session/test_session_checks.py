@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from bench_sessions import SHORT, bench_plan
 
-from smartshoe.devices import open_shoe
-from smartshoe.devices.base import Shoe
+from smartshoe.devices import Shoe, open_shoe
 from smartshoe.errors import InputError, RefusedError
 from smartshoe.files.logs import write
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Channel, Recording
-from smartshoe.runs.session import SessionFolder, Unattended, conduct, machine_run
-from smartshoe.runs.session.checks import AT_THE_END, Pressing, PressingFault, first_fault
+from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, conduct
+from smartshoe.runs.session import _machine_run as machine_run
+from smartshoe.runs.session._checks import AT_THE_END, Pressing, first_fault
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +131,7 @@ def test_the_wrong_unit_under_the_anvil_is_pressed_again_once_it_is_put_right(
     def misplaced(url: str, shoe: Shoe, unit: str) -> machine_run.MachineSide:
         return real(url, shoe, "left_heel")
 
-    monkeypatch.setattr("smartshoe.runs.session.procedure.machine_at", misplaced)
+    monkeypatch.setattr("smartshoe.runs.session._procedure.machine_at", misplaced)
 
     class PutsItRight(_Counting):
         def wants_repeat(self, finding: PressingFault, repeats_left: int) -> bool:
@@ -145,7 +145,7 @@ def test_the_wrong_unit_under_the_anvil_is_pressed_again_once_it_is_put_right(
         shoes.append(open_shoe(url))
         return shoes[0]
 
-    monkeypatch.setattr("smartshoe.runs.session.procedure.open_shoe", keeps)
+    monkeypatch.setattr("smartshoe.runs.session._procedure.open_shoe", keeps)
     operator = PutsItRight()
     with SessionFolder.begin(tmp_path, bench_plan()) as folder:
         conduct(folder, operator)

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from smartshoe.runs.studies.plan import TrialEntry
-from smartshoe.runs.studies.statistics import _icc, agreement_of, difference_of, mean_of, prediction_interval
-from smartshoe.runs.studies.swapped import swapped_trials
-from smartshoe.runs.studies.trials import TrialFigures
+from smartshoe.runs.studies._plan import TrialEntry
+from smartshoe.runs.studies._statistics import _icc, agreement_of, difference_of, mean_of, prediction_interval
+from smartshoe.runs.studies._swapped import swapped_trials
+from smartshoe.runs.studies._trials import TrialFigures
 from smartshoe.signals.noise import NORMAL_95
 
 # Shrout and Fleiss 1979, table 2: six targets, four judges.

@@ -15,8 +15,8 @@ from smartshoe.cli import run_command
 from smartshoe.errors import InputError
 from smartshoe.files.logs import write
 from smartshoe.recording import Recording
-from smartshoe.runs.studies.norms import read_norms
-from smartshoe.runs.studies.page import careful
+from smartshoe.runs.studies._norms import read_norms
+from smartshoe.runs.studies._page import careful
 
 SPEEDS = {"slow": 1.0, "fast": 1.5}
 SUBJECTS = {"Anna": 540.0, "Ben": 700.0, "Carl": 620.0}
@@ -190,8 +190,8 @@ def test_one_condition_has_figures_and_no_differences(folder: Path, capsys: pyte
 
 def test_calibrations_come_from_a_folder_or_a_store(tmp_path: Path) -> None:
     from smartshoe.runs.scenario import load, run
-    from smartshoe.runs.studies.plan import TrialEntry
-    from smartshoe.runs.studies.trials import calibrations_for
+    from smartshoe.runs.studies._plan import TrialEntry
+    from smartshoe.runs.studies._trials import calibrations_for
 
     text = '[protocol.dynamic]\nrates_n_per_s = [200.0, 800.0]\n[[unit]]\nname = "left_toe"\n'
     (tmp_path / "s.toml").write_text(text)

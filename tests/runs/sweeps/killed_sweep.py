@@ -7,8 +7,8 @@ from pathlib import Path
 
 from small_sweeps import slow
 
-from smartshoe.runs.sweeps.plan import read_plan
-from smartshoe.runs.sweeps.running import sweep_plan
+from smartshoe.runs.sweeps._plan import read_plan
+from smartshoe.runs.sweeps._running import sweep_plan
 
 if __name__ == "__main__":
     sweep_plan(read_plan(sys.argv[1]), Path(sys.argv[2]), jobs=2, compute=slow)

@@ -7,8 +7,8 @@ import os
 import time
 from pathlib import Path
 
-from smartshoe.runs.sweeps.case import computed
-from smartshoe.runs.sweeps.plan import Case
+from smartshoe.runs.sweeps._case import computed
+from smartshoe.runs.sweeps._plan import Case
 
 SMALL = """\
 title = "small"

@@ -17,10 +17,10 @@ from small_sweeps import SMALL, empty, write_scenario
 import smartshoe
 from smartshoe.cli import run_command
 from smartshoe.errors import DeviceError, InputError, UsageError
-from smartshoe.runs.sweeps.folder import SweepFolder
-from smartshoe.runs.sweeps.plan import Case, read_plan
-from smartshoe.runs.sweeps.repeating import command_of
-from smartshoe.runs.sweeps.running import sweep_plan
+from smartshoe.runs.sweeps._folder import SweepFolder
+from smartshoe.runs.sweeps._plan import Case, read_plan
+from smartshoe.runs.sweeps._repeating import command_of
+from smartshoe.runs.sweeps._running import sweep_plan
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_a_scheduler_that_is_not_there_is_told(
     done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("smartshoe.runs.sweeps.places.ANSWER_S", 0.5)
+    monkeypatch.setattr("smartshoe.runs.sweeps._places.ANSWER_S", 0.5)
     words = ["sweep", str(done.parent / "small.toml"), "--out", str(tmp_path / "out")]
     assert run_command([*words, "--scheduler", "tcp://127.0.0.1:1"]) == 4
     assert "no Dask scheduler answers at tcp://127.0.0.1:1" in capsys.readouterr().err
@@ -246,7 +246,7 @@ def test_a_fault_of_the_machine_is_no_result_of_the_case(tmp_path: Path, monkeyp
     def starved(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("smartshoe.runs.sweeps.case.run", starved)
+    monkeypatch.setattr("smartshoe.runs.sweeps._case.run", starved)
     with pytest.raises(DeviceError, match="MemoryError"):
         smartshoe.sweep(write_scenario(tmp_path), tmp_path / "out", jobs=1)
     assert not list((tmp_path / "out" / "cases").iterdir())
@@ -256,7 +256,7 @@ def test_a_fault_of_the_code_costs_one_case_and_is_called_one(tmp_path: Path, mo
     def faulty(*_: object) -> None:
         raise ZeroDivisionError("by nought")
 
-    monkeypatch.setattr("smartshoe.runs.sweeps.case.run", faulty)
+    monkeypatch.setattr("smartshoe.runs.sweeps._case.run", faulty)
     result = smartshoe.sweep(write_scenario(tmp_path), tmp_path / "out", jobs=1)
     assert result.failed == 4
     assert result.table()["says"].str.startswith("ZeroDivisionError: by nought").all()

@@ -11,9 +11,9 @@ from small_sweeps import SMALL, write_scenario
 
 from smartshoe.cli import run_command
 from smartshoe.errors import ScenarioError
-from smartshoe.runs.scenario.keys import parse_assignments, with_values
-from smartshoe.runs.sweeps.design import design_of
-from smartshoe.runs.sweeps.plan import read_plan
+from smartshoe.runs.scenario import parse_assignments, with_values
+from smartshoe.runs.sweeps._design import design_of
+from smartshoe.runs.sweeps._plan import read_plan
 
 
 def _refuse(path: tuple[str | int, ...], reason: str) -> ScenarioError:

@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 from small_sweeps import SMALL, write_scenario
 
-from smartshoe.runs.sweeps.drivers import drivers_of, what_drives
-from smartshoe.runs.sweeps.plan import read_plan
+from smartshoe.runs.sweeps._drivers import drivers_of, what_drives
+from smartshoe.runs.sweeps._plan import read_plan
 
 
 @pytest.mark.parametrize("count", [4, 60])

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from small_sweeps import SMALL, empty, write_scenario
 
-from smartshoe.runs.sweeps.case import computed
-from smartshoe.runs.sweeps.places import Compute
-from smartshoe.runs.sweeps.plan import read_plan
-from smartshoe.runs.sweeps.running import sweep_plan
+from smartshoe.runs.sweeps._case import computed
+from smartshoe.runs.sweeps._places import Compute
+from smartshoe.runs.sweeps._plan import read_plan
+from smartshoe.runs.sweeps._running import sweep_plan
 
 HERE = Path(__file__).parent
 LATEST_S = 600.0  # until some case must have been done

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from smartshoe.errors import UsageError
 
 if TYPE_CHECKING:
-    from smartshoe.calibration.calibration import Calibration
-    from smartshoe.calibration.estimators.estimate import Estimator
+    from smartshoe.calibration._calibration import Calibration
+    from smartshoe.calibration.estimators._estimate import Estimator
 
 GROUP = "smartshoe.estimators"
 
@@ -84,7 +84,7 @@ def _installed() -> dict[str, EntryPoint]:
 
 
 def _loaded(entry: EntryPoint) -> Any:
-    from smartshoe.calibration.estimators.estimate import Estimator
+    from smartshoe.calibration.estimators._estimate import Estimator
 
     try:
         kind = entry.load()

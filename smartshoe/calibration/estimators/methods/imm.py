@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.calibration.estimators.estimate import ForceEstimate, ForceRun
-from smartshoe.calibration.estimators.kalman import KalmanEstimator, ahead, filter_of, straight
-from smartshoe.calibration.estimators.state_space import contact_model, swing_model
+from smartshoe.calibration.estimators._estimate import ForceEstimate, ForceRun
+from smartshoe.calibration.estimators._kalman import KalmanEstimator, ahead, filter_of, straight
+from smartshoe.calibration.estimators._state_space import contact_model, swing_model
 
 STANCE_S, SWING_S = 0.6, 0.4  # how long either lasts on average, at a walk
 FALL_S = 0.02  # within which a load is gone that the foot takes off

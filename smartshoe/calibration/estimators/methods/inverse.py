@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from smartshoe.calibration.estimators.filtered import Filtered
-from smartshoe.calibration.filter import ForceFilter
+from smartshoe.calibration._filter import ForceFilter
+from smartshoe.calibration.estimators._filtered import Filtered
 from smartshoe.errors import UsageError
 
 

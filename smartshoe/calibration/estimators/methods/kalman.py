@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from smartshoe.calibration.estimators.kalman import KalmanEstimator, KalmanRun
-from smartshoe.calibration.estimators.state_space import contact_model
+from smartshoe.calibration.estimators._kalman import KalmanEstimator, KalmanRun
+from smartshoe.calibration.estimators._state_space import contact_model
 
 
 class Kalman(KalmanEstimator):

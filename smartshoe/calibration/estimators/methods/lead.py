@@ -1,5 +1,5 @@
 """The paper's phase lead: Chinimilli 2016, (13)."""
 
-from smartshoe.calibration.estimators.filtered import Filtered
+from smartshoe.calibration.estimators._filtered import Filtered
 
 ESTIMATOR = Filtered

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.calibration.estimators.estimate import Estimator, ForceEstimate, ForceRun
-from smartshoe.calibration.estimators.reading_noise import reading_noise_sd
+from smartshoe.calibration.estimators._estimate import Estimator, ForceEstimate, ForceRun
+from smartshoe.calibration.estimators._reading_noise import reading_noise_sd
 
 
 class StaticGain(Estimator):

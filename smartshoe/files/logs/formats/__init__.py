@@ -11,7 +11,7 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from smartshoe.errors import UsageError
-from smartshoe.files.logs.sheet import Format
+from smartshoe.files.logs._sheet import Format
 
 GROUP = "smartshoe.files"
 

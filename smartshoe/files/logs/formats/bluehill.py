@@ -14,9 +14,9 @@ import numpy as np
 
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
-from smartshoe.files.logs.numbers import is_number, numbers_of
-from smartshoe.files.logs.sheet import Column, Format, Sheet
-from smartshoe.files.logs.text import even_rows, head_lines, is_text, read_lines, split_cells
+from smartshoe.files.logs._numbers import is_number, numbers_of
+from smartshoe.files.logs._sheet import Column, Format, Sheet
+from smartshoe.files.logs._text import even_rows, head_lines, is_text, read_lines, split_cells
 from smartshoe.recording import Recording
 
 _BRACKETED = re.compile(r"\s*[(（\[]([^()（）]*)[)）\]]\s*")

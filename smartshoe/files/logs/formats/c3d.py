@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_values
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.recording import UNITS_OF_A_SHOE, Role
 from smartshoe.units import find_unit
 

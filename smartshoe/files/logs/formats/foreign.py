@@ -11,10 +11,10 @@ import numpy as np
 
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
-from smartshoe.files.logs.moments import is_moment, seconds_of
-from smartshoe.files.logs.numbers import is_missing, is_number, numbers_of
-from smartshoe.files.logs.sheet import Column, Format, Sheet
-from smartshoe.files.logs.text import even_rows, is_text, read_lines, split_cells
+from smartshoe.files.logs._moments import is_moment, seconds_of
+from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of
+from smartshoe.files.logs._sheet import Column, Format, Sheet
+from smartshoe.files.logs._text import even_rows, is_text, read_lines, split_cells
 from smartshoe.recording import split_column
 from smartshoe.units import ONE, find_unit
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from smartshoe.errors import FormatError
 from smartshoe.files.gate import parsed_json
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs.formats._hdf5_objects import opened, vectors
-from smartshoe.files.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -11,7 +11,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
 from smartshoe.files.gate import require_columns
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, Role
 
 _MAGIC = "LabVIEW Measurement"

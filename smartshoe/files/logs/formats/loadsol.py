@@ -9,8 +9,8 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.errors import FormatError
-from smartshoe.files.logs.exported import lines_of, numbers_below
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._exported import lines_of, numbers_below
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 
 _SENSOR = re.compile(r"(?P<serial>\w+)-(?P<side>[LR])(::(?P<part>\w+))?")
 _SIDES = {"L": "left", "R": "right"}

@@ -11,9 +11,9 @@ import numpy as np
 
 from smartshoe.errors import FormatError
 from smartshoe.files.gate import parsed_json
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs.formats._hdf5_objects import opened, vectors
 from smartshoe.files.logs.formats._mat5 import require_bounded
-from smartshoe.files.logs.sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, column_name, split_column
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from smartshoe.errors import FormatError
-from smartshoe.files.logs.exported import lines_of, numbers_below
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._exported import lines_of, numbers_below
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 
 _HEADER = "# time\t"
 _TITLE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]]*)\]\s*")

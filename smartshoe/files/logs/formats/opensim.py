@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from smartshoe.errors import FormatError
-from smartshoe.files.logs.exported import lines_of, numbers_below
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._exported import lines_of, numbers_below
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 
 _END = "endheader"
 # OpenSim's ground reaction files have no units; its own convention is N, m and N m.

@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.errors import FormatError, UsageError
 from smartshoe.files.gate import parsed_json, require_columns, require_values
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.recording import Recording, column_name, split_column
 
 _MAGIC = b"PAR1"

@@ -10,8 +10,8 @@ import re
 from pathlib import Path
 
 from smartshoe.errors import FormatError
-from smartshoe.files.logs.exported import lines_of, numbers_below
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._exported import lines_of, numbers_below
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 
 SENSORS = 99  # of an insole
 _RATE = re.compile(rb"\[Hz\]\s*:")

@@ -15,11 +15,11 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import FormatError, InputError
 from smartshoe.files.gate import require_columns
+from smartshoe.files.logs._moments import is_moment
+from smartshoe.files.logs._numbers import is_missing, numbers_of
+from smartshoe.files.logs._sheet import Column, Format, Sheet
+from smartshoe.files.logs._text import head_lines, is_text, read_lines
 from smartshoe.files.logs.columns import roles_of
-from smartshoe.files.logs.moments import is_moment
-from smartshoe.files.logs.numbers import is_missing, numbers_of
-from smartshoe.files.logs.sheet import Column, Format, Sheet
-from smartshoe.files.logs.text import head_lines, is_text, read_lines
 from smartshoe.recording import Recording, Role, column_name, split_column
 
 _KEY_VALUE = re.compile(r'#\s*("(?:[^"\\]|\\.)*"|[^:]*?)\s*:\s*(.*?)\s*')

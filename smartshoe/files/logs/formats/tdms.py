@@ -13,7 +13,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import FormatError
 from smartshoe.files.gate import require_columns, require_values
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.recording import Recording
 
 _PADDING = "channels end at different samples; the shorter ones were filled up with missing samples"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from smartshoe.errors import FormatError, InputError
-from smartshoe.files.logs.sheet import Column, Format, Sheet
+from smartshoe.files.logs._sheet import Column, Format, Sheet
 
 
 def _sniff(path: Path, head: bytes) -> bool:

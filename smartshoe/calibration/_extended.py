@@ -1,0 +1,139 @@
+"""The extended model run backwards: readings in, force out, hysteresis, curves, lag and drift undone on the way."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.calibration._core_inverse import CoreInverse
+from smartshoe.calibration._filter import ForceFilter
+from smartshoe.calibration._noise_limit import MOST, NoiseLimit, noise_gain
+from smartshoe.errors import UsageError
+from smartshoe.models.effects.effect import CStep, Inverse
+from smartshoe.models.elements import Arm
+from smartshoe.models.extended import ExtendedModel, Part
+from smartshoe.units import Unit, declared, find_unit
+
+LEAK_CAUTION = (
+    "the air that is gone is summed up from the readings, so that an error of their zero grows with time: reset the"
+    " filter at rest"
+)
+
+
+class ExtendedCompensator(ForceFilter):
+    """The inverse of an `ExtendedModel`'s chain, block by block, last block first, at ``sample_rate_hz``.
+
+    ``not_inverted``: effect to one sentence, for those that are passed over because nothing can undo them on a
+    stream. ``cautions``: effect to one sentence, for those whose inverse asks something of the readings. Time, which
+    drifts need, is counted from the first reading on top of ``started_s``, the seconds for which the unit has been
+    on. Start, missing readings and streams are those of `ForceFilter`; at the start nothing has leaked, nothing is
+    worn. Raises `UsageError` for a rate that is not positive.
+    """
+
+    def __init__(
+        self,
+        model: ExtendedModel,
+        sample_rate_hz: float = 100.0,
+        *,
+        started_s: float = 0.0,
+        reading_unit: Unit | None = None,
+    ) -> None:
+        if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0):
+            raise UsageError(f"sample_rate_hz is {sample_rate_hz:g}: give a positive number")
+        if not (np.isfinite(started_s) and started_s >= 0):
+            raise UsageError(f"started_s is {started_s:g}: give the seconds since the unit was switched on, from 0")
+        self.model = model
+        self.sample_rate_hz = float(sample_rate_hz)
+        self.step_s = 1.0 / self.sample_rate_hz
+        self.started_s = float(started_s)
+        self.reading_unit = reading_unit or find_unit(model.reading_unit) or declared(model.reading_unit)
+        self.reading_per_share = model.full_scale_reading * model.gain
+        self.core = CoreInverse(model.core, self.step_s)
+        self._blocks: list[tuple[str, Inverse]] = []
+        self._passed_over: dict[str, str] = {}
+        leaks = (part for part in model.parts if part.effect.air == "leaves")
+        self._cautions = {part.name: LEAK_CAUTION for part in leaks if not part.effect.is_null(part.values)}
+        for part in reversed(model.chain):
+            if part is None:
+                self._undo_core()
+            elif not (part.effect.parameters and part.effect.is_null(part.values)):
+                self._undo(part)
+        self.blocks = tuple(self._blocks)
+        self.not_inverted = MappingProxyType(self._passed_over)
+        self.cautions = MappingProxyType(self._cautions)
+        self.reset()
+
+    def _undo(self, part: Part) -> None:
+        # A tone's phase belongs to the session it was fitted on, so that noise is never taken off.
+        arm = Arm(self.model.relaxing_share, self.model.relaxation_rate_per_s)
+        inverse = part.effect.inverse_beside(arm, part.values, self.step_s) if part.effect.is_physical else None
+        if inverse is None:
+            self._passed_over[part.name] = _why_not(part)
+            return
+        self._blocks.append((part.name, inverse))
+        if not part.effect.is_latency:
+            return
+        raised = noise_gain(inverse)
+        if raised <= MOST:
+            self._cautions[part.name] = f"undoing it raises fast noise of the readings {raised:.3g} times"
+            return
+        limit = NoiseLimit(MOST / raised)
+        self._blocks.append((f"{part.name}_limit", limit))
+        self._cautions[part.name] = (
+            f"undoing it would raise fast noise of the readings {raised:.3g} times: smoothed to {MOST:g} times, which"
+            f" leaves a lag of {1e3 * limit.lag_steps * self.step_s:.3g} ms"
+        )
+
+    def _undo_core(self) -> None:
+        self._blocks.append(("core", self.core))
+        if not self.core.is_exact:
+            self._cautions["baseline"] = (
+                f"{self.sample_rate_hz:g} Hz is coarse for this relaxation: the bilinear transform stands in for the"
+                " exact inverse, which would ring"
+            )
+
+    def reset(self) -> None:
+        """Forget the past: the next reading counts as having lasted for ever, and time begins again."""
+        super().reset()
+        for _, inverse in self.blocks:
+            inverse.reset()
+
+    def _copy(self) -> ExtendedCompensator:
+        return ExtendedCompensator(
+            self.model, self.sample_rate_hz, started_s=self.started_s, reading_unit=self.reading_unit
+        )
+
+    def _begin(self, first: float) -> None:
+        """Each block begins with the first value that reaches it."""
+
+    def _advance(self, readings: Array, count: int) -> Array:
+        time_s: Array = self.started_s + np.arange(count, count + readings.size, dtype=float) * self.step_s
+        signal = readings / self.reading_per_share
+        # Far beyond full scale a curve may have no load that gives the reading: it is passed over there.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            for _, inverse in self.blocks:
+                undone = inverse.push(signal, time_s)
+                finite = np.isfinite(undone)
+                signal = undone if finite.all() else np.where(finite, undone, signal)
+        return np.asarray(self.model.full_scale_load_n * signal)
+
+    def c_steps(self, *, single: bool = False) -> tuple[tuple[str, CStep], ...]:
+        """Every block's name and C99, in the order in which they run, between the two scalings.
+
+        ``single`` asks for the form that loses least in single precision, still written in doubles.
+        """
+        return tuple(
+            (name, inverse.c_single(name) if single else inverse.c_step(name)) for name, inverse in self.blocks
+        )
+
+
+def _why_not(part: Part) -> str:
+    effect = part.effect
+    if not effect.is_physical:
+        return "noise and faults of the data cannot be taken off a single reading"
+    channels = sorted({*effect.needs, *(parameter.channel for parameter in effect.parameters if parameter.channel)})
+    if channels:
+        return f"it follows another channel ({', '.join(channels)}), which one unit's readings do not carry"
+    return effect.why_not_undone

@@ -1,0 +1,144 @@
+"""The options by which any command is told which columns of a file are what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from smartshoe.recording import UNITS_OF_A_SHOE, Recording
+
+if TYPE_CHECKING:
+    from smartshoe.calibration import Calibration
+
+MISSING_SHARE = 0.05  # of a signal's samples, from which on a person is told
+BEYOND = 1.1  # of the largest load that a calibration has seen
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def column_options(command: _F) -> _F:
+    """Add --time, --force, --sensor and --unit."""
+    for decorate in (
+        click.option("--unit", metavar="NAME", help="The sensing unit's name, for example left_toe."),
+        click.option(
+            "--sensor",
+            "sensors",
+            multiple=True,
+            metavar="COLUMN",
+            help="A sensor's column (repeatable): '6[bar]'.",
+        ),
+        click.option(
+            "--force",
+            metavar="COLUMN",
+            help="The reference load's column: '7[N]', 'Load[kN]'; '-7[N]' where compression is negative.",
+        ),
+        click.option(
+            "--time",
+            metavar="COLUMN",
+            help="The time column, by name or 1-based number, with its unit: '1[ms]'; 'rows[49Hz]' for none.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
+def read_all(
+    files: Sequence[str], *, time: str | None, force: str | None, sensors: Sequence[str], unit: str | None
+) -> list[Recording]:
+    """Every experiment as a recording; a machine's log and a data logger's are joined. Notes go to stderr."""
+    from smartshoe.cli._output import show_notes
+    from smartshoe.devices.joining import join_pairs
+    from smartshoe.errors import MissingChannelError
+    from smartshoe.files.logs import read
+
+    def one(file: str) -> Recording:
+        try:
+            return read(file, time=time, force=force, sensors=list(sensors), unit=unit)
+        except MissingChannelError:
+            if len(files) == 1:
+                raise
+            # One of two logs of a test may hold the load only, or the reading only.
+            half = read(file, time=time, force=force, sensors=list(sensors), unit=unit, partly=True)
+            if bool(half.of_role("load")) == bool(half.sensors):
+                raise
+            return half
+
+    recordings = join_pairs([one(file) for file in files])
+    show_notes(recordings)
+    say_what_strikes(recordings)
+    return recordings
+
+
+def say_what_strikes(recordings: Sequence[Recording]) -> None:
+    """A warning on stderr for each load that looks negated, and for each signal that lacks much of its samples."""
+    from smartshoe.files.logs.columns import is_negative
+
+    for recording in recordings:
+        for channel in (*recording.of_role("load"), *recording.sensors):
+            share = 0.0 if channel.missing is None else float(channel.missing.mean())
+            if share > MISSING_SHARE:
+                click.echo(
+                    f"warning: {recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}: they are"
+                    " left out",
+                    err=True,
+                )
+            if channel.role == "load" and is_negative(channel):
+                low, high = channel.values.min(), channel.values.max()
+                click.echo(
+                    f"warning: the load of {recording.label} goes from {low:.4g} to {high:.4g} {channel.unit.symbol}:"
+                    " compression is positive here; if it is compression, turn it with --force '-COLUMN'",
+                    err=True,
+                )
+
+
+def units_of(choices: Sequence[str]) -> dict[str, str]:
+    """``UNIT=COLUMN`` choices as columns by unit; raises `UsageError` for a unit that no shoe has."""
+    from smartshoe.errors import UsageError
+
+    found: dict[str, str] = {}
+    for choice in choices:
+        unit, _, column = choice.partition("=")
+        if unit not in UNITS_OF_A_SHOE or not column:
+            raise UsageError(f"--sensor {choice!r} names no unit and column: write it like left_heel='L_force'")
+        found[unit] = column
+    return found
+
+
+def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
+    """The recording with the named columns as the units' readings; raises `MissingChannelError` for one not there."""
+    from smartshoe.errors import MissingChannelError
+    from smartshoe.files.logs.picks import listed
+
+    for unit, column in columns.items():
+        channel = recording.channels.get(column)
+        if channel is None:
+            names = listed(list(recording.channels))
+            raise MissingChannelError(f"{recording.label} has no column {column!r} for {unit}; it has {names}")
+        recording = recording.without(column).with_channel(replace(channel, name=unit, role="sensor"))
+    return recording
+
+
+def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:
+    """A warning on stderr for each recording that says it is of another unit, or whose load passes what was seen."""
+    for recording in recordings:
+        if recording.unit and calibration.unit and recording.unit != calibration.unit:
+            click.echo(
+                f"warning: {recording.label} is of unit {recording.unit}, the calibration of {calibration.unit}: its"
+                " forces mean nothing; give that unit's own calibration",
+                err=True,
+            )
+    seen = calibration.load_range_n
+    for recording in recordings:
+        loads = recording.of_role("load")
+        if seen is None or not loads:
+            continue
+        top_n = float(loads[0].si.max())
+        if top_n > BEYOND * seen[1]:
+            click.echo(
+                f"warning: {recording.label} is loaded to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N:"
+                " the rest is extrapolated",
+                err=True,
+            )

@@ -1,0 +1,139 @@
+"""From decoded samples and their arrival to blocks and events; no I/O, so that it runs on any clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from smartshoe.arrays import Array, Integers
+from smartshoe.devices._base import Block
+from smartshoe.devices._events import Gap, Restarted, ShoeEvent
+from smartshoe.devices.serial_link.inbox import joined
+from smartshoe.devices.wire.clock import DeviceClock
+from smartshoe.devices.wire.information import Information
+from smartshoe.devices.wire.samples import Samples
+from smartshoe.errors import DeviceError
+from smartshoe.units import Unit
+
+RATED_S = 1.0
+# A step this many times the usual one is a hole; below, a rounded clock's (1 and 2 ms at 700 Hz) count as steps.
+HOLE_STEPS = 2.5
+# Text lines' unit of time is a guess: a clock that seems this much slower than the host's is in another one.
+SLOWEST_CLOCK = 0.1
+WATCHED_S = 3.0
+
+
+class Assembler:
+    """Scales and names the samples, keeps their time increasing over restarts, fits the device's clock to the host's.
+
+    ``first`` are samples of the stream, for their names and unit; ``to`` is the unit of the blocks, the samples' own
+    where it is None. ``counts_samples`` is False where the device has no counter of its own (text lines): gaps are
+    then told from the time alone. A restarted device counts from zero: its time goes on where the host's clock says
+    that it must be, and the clock is fitted anew.
+    """
+
+    def __init__(
+        self,
+        first: Samples,
+        information: Information | None = None,
+        to: Unit | None = None,
+        named: Callable[[str], str] = str,
+        counts_samples: bool = True,
+    ) -> None:
+        self._information = information
+        scaled = self._scaled(first)
+        self.names = tuple(named(name) for name in scaled.names)
+        self.comes_in = scaled.unit
+        self.unit = to or scaled.unit
+        self.clock = DeviceClock()
+        self.rate_hz: float | None = None
+        self._counts_samples = counts_samples
+        self._steps_s: list[float] = []
+        self._is_rated = False
+        self._watched_s = [0.0, 0.0]  # of the device's clock, of the host's, while samples flowed
+        self._shift_s = 0.0
+        self._last: tuple[int, int, float, float] | None = None  # boot, sequence, time and arrival of the last sample
+
+    def take(self, samples: Samples, arrival_s: ArrayLike) -> tuple[Block, list[ShoeEvent]]:
+        """One block of ``samples`` (one at least), come at ``arrival_s`` (n,), and what befell the stream before."""
+        events: list[ShoeEvent] = []
+        scaled = self._scaled(samples)
+        arrivals_s = np.array(np.broadcast_to(np.asarray(arrival_s, dtype=np.float64), len(scaled)))
+        if scaled.unit != self.comes_in:
+            raise DeviceError(
+                f"the shoe's readings changed from {self.comes_in.symbol} to {scaled.unit.symbol}: open it again, or"
+                " say unit in its address"
+            )
+        boots = np.flatnonzero(np.diff(scaled.boot)) + 1
+        ends = [*boots.tolist(), len(scaled)]
+        blocks = [
+            self._take_boot(scaled, slice(start, end), arrivals_s[start:end], events)
+            for start, end in zip([0, *ends], ends, strict=False)
+        ]
+        return joined(blocks), events
+
+    def _scaled(self, samples: Samples) -> Samples:
+        return samples if self._information is None else self._information.scale(samples)
+
+    def _take_boot(self, samples: Samples, part: slice, arrival_s: Array, events: list[ShoeEvent]) -> Block:
+        """Samples of one boot."""
+        sequence, device_s, boot = samples.sequence[part], samples.device_time_s[part], int(samples.boot[part][0])
+        if self._last is not None and boot != self._last[0]:
+            # A restart within one arrival still has to move on: time increases, if by a microsecond.
+            resumes_s = self._last[2] + max(float(arrival_s[0]) - self._last[3], 1e-6)
+            self._shift_s = resumes_s - float(device_s[0])
+            self._last = None
+            self.clock = DeviceClock()
+            events.append(Restarted(float(arrival_s[0]), resumes_s))
+        time_s = device_s + self._shift_s
+        self._require_seconds(float(time_s[-1]), float(arrival_s[-1]))
+        self._find_gaps(sequence, time_s, arrival_s, events)
+        self._last = (boot, int(sequence[-1]), float(time_s[-1]), float(arrival_s[-1]))
+        self.clock.update(time_s, arrival_s)
+        readings = self.comes_in.convert(samples.readings[part], self.unit)
+        return Block(
+            time_s, readings, samples.missing[part], self.names, self.unit, self.clock.host_time(time_s), arrival_s
+        )
+
+    def _find_gaps(self, sequence: Integers, time_s: Array, arrival_s: Array, events: list[ShoeEvent]) -> None:
+        if self._last is not None:
+            sequence, time_s = np.append(self._last[1], sequence), np.append(self._last[2], time_s)
+            arrival_s = np.append(self._last[3], arrival_s)
+        if time_s.size < 2:
+            return
+        steps = self._steps(sequence, time_s)
+        events += [
+            Gap(float(arrival_s[i + 1]), int(steps[i]) - 1, float(time_s[i]), float(time_s[i + 1]))
+            for i in np.flatnonzero(steps > 1)
+        ]
+        if not self._is_rated:
+            self._steps_s += (np.diff(time_s) / steps).tolist()
+            self._is_rated = sum(self._steps_s) >= RATED_S
+            self.rate_hz = rate_of(np.array(self._steps_s))
+
+    def _require_seconds(self, time_s: float, arrival_s: float) -> None:
+        """Raises `DeviceError` where text lines' times go by far slower than the host's clock."""
+        if self._counts_samples or self._last is None or arrival_s - self._last[3] > WATCHED_S:
+            return
+        self._watched_s[0] += time_s - self._last[2]
+        self._watched_s[1] += arrival_s - self._last[3]
+        device_s, host_s = self._watched_s
+        if host_s >= WATCHED_S and device_s < SLOWEST_CLOCK * host_s:
+            raise DeviceError(
+                f"the shoe's times went on by {device_s:.3g} s in {host_s:.1f} s: say their unit in its address,"
+                " with time=s, time=ms or time=us"
+            )
+
+    def _steps(self, sequence: Integers, time_s: Array) -> Integers:
+        """Samples that the device took from each to the next, one at least."""
+        if self._counts_samples or self.rate_hz is None:
+            return np.diff(sequence)
+        return np.maximum(np.rint(np.diff(time_s) * self.rate_hz).astype(np.int64), 1)
+
+
+def rate_of(steps_s: Array) -> float:
+    """Samples a second of a device whose samples are ``steps_s`` (n,) apart, holes left out; n is 1 at least."""
+    usual = steps_s <= HOLE_STEPS * float(np.median(steps_s))
+    return 1.0 / float(steps_s[usual].mean())

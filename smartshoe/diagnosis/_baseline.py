@@ -1,0 +1,70 @@
+"""The baseline: the paper's standard linear solid, with an offset and an initial state of each recording's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.models.core import USUAL_WALL_RATIO
+from smartshoe.models.extended import ExtendedModel
+
+USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
+POLES_PER_S = np.geomspace(0.01, 20.0, 31)
+LEAST_RELAXING, MOST_RELAXING = -0.9, 5.0
+
+
+def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
+    """The best standard linear solid over a grid of poles, linear in the rest, so that no local optimum is taken.
+
+    Either sign of what relaxes is allowed: a baseline that is kept from following the data leaves structure that no
+    effect made.
+    """
+    fitted = [session for session in sessions if session.fitted.any()]
+    best: tuple[float, float, float, float] | None = None
+    for pole in POLES_PER_S:
+        gram = np.zeros((3, 3))
+        for session in fitted:
+            load, step_s, time_s = session.conditions.load, session.conditions.step_s, session.conditions.time_s
+            rows = np.column_stack([session.reading, load, lagged(load, step_s, 1.0 / float(pole))])
+            past = np.column_stack([np.ones(time_s.size), np.exp(-float(pole) * time_s)])
+            seen, own = rows[session.fitted], past[session.fitted]
+            gram += seen.T @ (seen - own @ np.linalg.lstsq(own, seen, rcond=1e-10)[0])
+        part = gram[1:, 1:] + 1e-9 * np.trace(gram[1:, 1:]) * np.eye(2)
+        fast, slow = np.linalg.solve(part, gram[1:, 0])
+        # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
+        gain = float(fast + slow)
+        if gain <= 0 or fast <= 0:
+            continue
+        share = min(max(gain / float(fast) - 1.0, LEAST_RELAXING), MOST_RELAXING)
+        fast = gain / (1.0 + share)
+        slow = gain - fast
+        error = float(
+            gram[0, 0] - 2 * np.array([fast, slow]) @ gram[1:, 0] + np.array([fast, slow]) @ gram[1:, 1:] @ [fast, slow]
+        )
+        if best is None or error < best[0]:
+            best = error, gain, share, float(pole)
+    if best is None:
+        best = 0.0, 1.0, 0.0, 0.2
+    _, gain, share, pole = best
+    ratio = _wall_ratio(sessions, gain, scale)
+    return ExtendedModel(gain, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), ratio)
+
+
+def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
+    """``signal`` (n,) through a first-order lag, the first value having lasted for ever."""
+    keep = float(np.exp(-step_s / tau_s))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=np.array([keep * signal[0]]))[0])
+
+
+def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:
+    """1 + k1 x0^2/(nRT) where an effective area is declared, from the static gain; else what units usually have."""
+    declared = sessions[0].recording.metadata.get("effective_area_m2")
+    if declared is None or scale.unit.quantity != "pressure":
+        return USUAL_WALL_RATIO
+    pascal_per_newton = gain * float(scale.unit.to_si(np.array([scale.reading]))[0]) / scale.load_n
+    ratio = 1.0 / (float(declared) * pascal_per_newton)
+    return ratio if 1.02 < ratio < 50.0 else USUAL_WALL_RATIO

@@ -1,0 +1,123 @@
+"""The static characteristic, reading over load, without any model: what can be told where no model of a unit holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.recording import Recording
+
+STANDARD = Thresholds()
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """Medians of the reading over bins of the load, while it rises (``ups``) and while it falls (``downs``), (n,) each.
+
+    ``by_curve`` and ``by_branch``: share of the reading's variance that their mean explains, and the branches apart,
+    of what moves.
+    """
+
+    recording: Recording
+    place: Array
+    ups: Array
+    downs: Array
+    by_curve: float
+    by_branch: float
+
+    @property
+    def mean(self) -> Array:
+        """(n,) the static characteristic: the mean of both branches."""
+        return 0.5 * (self.ups + self.downs)
+
+
+def branches_of(recording: Recording, thresholds: Thresholds = STANDARD) -> Branches | None:
+    """The two branches; None where the load seldom passes the same place in both directions."""
+    if not recording.of_role("load") or len(recording.sensors) != 1:
+        return None
+    load, sensor = recording.load, recording.sensor
+    present = load.present & sensor.present
+    x, y = load.values[present], sensor.values[present]
+    if x.size < thresholds.least_samples or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return None
+    width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
+    rate = np.gradient(np.convolve(x, np.full(width, 1.0 / width), "same"))
+    low, high = (float(value) for value in np.percentile(x, [1, 99]))
+    still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
+    # Rice's rule, of each direction's half.
+    bins = 2 * round((0.5 * x.size) ** (1.0 / 3.0))
+    edges = np.linspace(low, high, bins + 1)
+    at, ups, downs = [], [], []
+    for left, right in pairwise(edges):
+        inside = (x >= left) & (x < right)
+        up, down = y[inside & (rate > still)], y[inside & (rate < -still)]
+        if min(up.size, down.size) > 2:
+            at.append(0.5 * (left + right))
+            ups.append(float(np.median(up)))
+            downs.append(float(np.median(down)))
+    if len(at) < bins // 2:
+        return None
+    place, rising, falling = np.array(at), np.array(ups), np.array(downs)
+    moving = np.abs(rate) > still
+    either = np.where(rate > 0, np.interp(x, place, rising), np.interp(x, place, falling))
+    by_curve = _explained(y, np.interp(x, place, 0.5 * (rising + falling)))
+    return Branches(recording, place, rising, falling, by_curve, _explained(y[moving], either[moving]))
+
+
+def friction_of(recording: Recording, thresholds: Thresholds = STANDARD) -> str | None:
+    """A sentence where the reading follows the load's direction and not the load; None where it does not."""
+    found = branches_of(recording, thresholds)
+    if found is None or found.by_curve >= thresholds.follows or found.by_branch < thresholds.follows:
+        return None
+    return _friction(found)
+
+
+def _friction(found: Branches) -> str:
+    sensor = found.recording.sensor
+    half = 0.5 * float(np.median(found.ups - found.downs))
+    return (
+        f"the {sensor.name} does not follow this load but its direction: while the load rises it lies"
+        f" {abs(half):.3g} {sensor.unit.symbol} {'above' if half > 0 else 'below'} its mean, while the load falls as"
+        " much to the other side, which is friction; Coulomb's and viscous friction are told apart by strokes at"
+        " several rates only"
+    )
+
+
+def characteristic_of(recording: Recording, thresholds: Thresholds = STANDARD) -> str | None:
+    """A sentence on curve and loop of the reading over its load; None where the two hardly go together."""
+    found = branches_of(recording, thresholds)
+    if found is None or max(found.by_curve, found.by_branch) < thresholds.follows:
+        return None
+    if found.by_curve < thresholds.follows:
+        return _friction(found)
+    sensor, place = recording.sensor, found.place
+    half_span = 0.5 * float(place[-1] - place[0])
+    u = (place - 0.5 * (place[0] + place[-1])) / half_span
+    middle = _slope(place, found.mean, np.abs(u) < 0.25)
+    ends = 0.5 * (_slope(place, found.mean, u > 0.5) + _slope(place, found.mean, u < -0.5))
+    ratio = ends / middle if middle else np.inf
+    if thresholds.clear * ratio < 1.0:
+        shape = "it flattens, as friction does that saturates, and no straight line or linear damping describes it"
+    elif ratio > thresholds.clear:
+        shape = "it steepens towards the ends, and no straight line describes it"
+    else:
+        shape = "it is nearly straight"
+    apart = 0.5 * float(np.median(np.abs(found.ups - found.downs)[np.abs(u) < 0.5]))
+    unit, of_load = sensor.unit.symbol, recording.load.unit.symbol
+    return (
+        f"over this load the {sensor.name} rises by {middle:.3g} {unit}/{of_load} about the middle and by {ends:.3g}"
+        f" {unit}/{of_load} at the ends: {shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"
+    )
+
+
+def _explained(values: Array, by: Array) -> float:
+    whole = float(np.var(values))
+    return 1.0 - float(np.var(values - by)) / whole if whole > 0 else 0.0
+
+
+def _slope(place: Array, level: Array, among: Mask) -> float:
+    return float(np.polyfit(place[among], level[among], 1)[0]) if among.sum() >= 3 else 0.0

@@ -1,0 +1,154 @@
+"""What an experiment can show at all: rates, holds, rests, repeats; and what must not be claimed where they lack."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from smartshoe.arrays import Mask
+from smartshoe.diagnosis._session import CYCLE_SHARE, Session
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.signals.loading import turning_points
+from smartshoe.signals.masks import runs_of
+
+STANDARD = Thresholds()
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
+
+    ``present`` holds the words of `Effect.exposed_by` that apply.
+    """
+
+    rates_per_s: tuple[float, ...]
+    peaks: tuple[float, ...]
+    repeats: int
+    present: frozenset[str]
+    thresholds: Thresholds = STANDARD
+
+    def limits(self) -> list[str]:
+        """A sentence for each thing of which this data says nothing."""
+        said = []
+        if len(self.rates_per_s) <= 1:
+            said.append(
+                "one loading rate only: nothing can be said of rate dependence, nor can viscous friction be told from"
+                " Coulomb's"
+            )
+        if "holds" not in self.present:
+            said.append(
+                f"no hold longer than {self.thresholds.hold_s:g} s under load: little can be said of a leak, and"
+                " nothing of slow creep"
+            )
+        if "rests" not in self.present:
+            said.append("the unit is never seen unloaded: zero, tare and what lies near zero load cannot be judged")
+        if "repeats" not in self.present:
+            said.append("no load cycle is repeated: what repeats cannot be told from noise without a model")
+        if len(self.peaks) <= 1 and len(self.rates_per_s) >= 1:
+            said.append("one peak load only: the curve of reading against load and softening are seen along one path")
+        return said
+
+
+def excitation_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) -> Excitation:
+    """What all sessions together hold."""
+    rises = [rise for session in sessions for rise in _rises(session, thresholds)]
+    alike = float(np.log1p(thresholds.same))
+    kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rises)
+    hold_s = max(
+        (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
+    )
+    rests_s = [[n * session.conditions.step_s for n in _runs(session.resting)] for session in sessions]
+    rates = _distinct_rates([(rise.rate, rise.samples) for rise in rises], thresholds.same)
+    peaks = _distinct([rise.peak for rise in rises], thresholds.same)
+    rest_s = max((rest for own in rests_s for rest in own), default=0.0)
+    pauses = [rest for own in rests_s for rest in own[1:-1]]
+    # A reading has come to its zero when any sensor's lag is over.
+    settled_s = thresholds.clear * thresholds.sensor_lag_s
+    repeats = max(kinds.values(), default=0)
+    found = {
+        "rates": len(rates) > 1,
+        "peaks": len(peaks) > 1,
+        "steps": any(rise.rate * thresholds.echo_s > thresholds.same for rise in rises),
+        "holds": hold_s >= thresholds.hold_s,
+        "rests": rest_s >= settled_s,
+        "idle": rest_s >= thresholds.idle_s,
+        "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), settled_s),
+        "repeats": repeats > 1,
+        "minor_loops": any(rise.is_minor for rise in rises),
+        "low_loads": bool(peaks) and min(peaks) < thresholds.same,
+    }
+    present = frozenset(word for word, is_there in found.items() if is_there)
+    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds)
+
+
+class _Rise(NamedTuple):
+    """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at."""
+
+    rate: float
+    samples: int
+    peak: float
+    is_minor: bool
+
+
+def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
+    load, step_s = session.conditions.load, session.conditions.step_s
+    span = min(1.0, max(float(np.ptp(load)), 1e-9))
+    for first, last in pairwise(turning_points(load, CYCLE_SHARE * span)):
+        rise = float(load[last] - load[first])
+        if rise < 3.0 * CYCLE_SHARE * span or load[last] <= 0.0:
+            continue
+        part = (load[first : last + 1] - load[first]) / rise
+        samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
+        if samples * thresholds.same < 1.0 and session.thinned == 1:
+            continue  # a sample more or less makes another rate of it
+        rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
+        above = float(load[first]) - float(load.min()) > thresholds.clear * CYCLE_SHARE * span
+        yield _Rise(rate, samples, float(load[last]), above)
+
+
+def _held(session: Session, thresholds: Thresholds) -> Mask:
+    """(n,) True where a load is borne and does not move."""
+    flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
+    return np.asarray(flat & ~session.resting & (session.conditions.load > CYCLE_SHARE))
+
+
+def _runs(mask: Mask) -> list[int]:
+    first, last = runs_of(mask)
+    return [int(n) for n in last - first]
+
+
+def _longest(mask: Mask) -> int:
+    return max(_runs(mask), default=0)
+
+
+def _distinct(values: Sequence[float], alike: float) -> list[float]:
+    found: list[float] = []
+    for value in sorted(values):
+        if not found or value > found[-1] * (1.0 + alike):
+            found.append(value)
+    return found
+
+
+def _distinct_rates(rates: Sequence[tuple[float, int]], same: float) -> list[float]:
+    """Rates that differ by more than ``same``, and by more than ramps of so few samples tell.
+
+    Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2. A
+    stray ramp beside a single rate, a first one say, makes no second rate.
+    """
+    found: list[float] = []
+    ramps: list[int] = []
+    reach = 0.0
+    for rate, samples in sorted(rates):
+        n = max(samples, 1)
+        if not found or (rate > found[-1] * (1.0 + same) and rate * n / (n + 2.0) > reach):
+            found.append(rate)
+            ramps.append(0)
+            reach = rate * n / max(n - 2.0, 0.1)
+        ramps[-1] += 1
+    most = int(np.argmax(ramps)) if ramps else 0
+    return [found[most]] if ramps and ramps[most] >= (1.0 - same) * sum(ramps) else found

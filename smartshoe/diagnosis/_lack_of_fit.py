@@ -1,0 +1,174 @@
+"""What a model leaves over: how much of it is structure and how much noise, judged without any model of the structure.
+
+Two tests, since an unknown effect shows in either:
+
+*repeating*: the products of a cycle's residual with its repeats' (cycles of one rate and height). Noise of different
+cycles is independent whatever its colour, so that their mean is the variance of what repeats.
+
+*slow*: means over blocks of a few seconds against what noise of the residual's own fast part would give. A step in
+gain, a slow walk, a random telegraph repeat with no cycle, but they do not average out within a block either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._session import Session
+
+FEWEST_BLOCKS = 8
+COLOUR_S = (0.1, 0.2, 0.35, 0.6, 1.0)  # time constants of the noise's coloured part; slower ones count as structure
+NOISE_KNOWN_TO = 0.25
+CUT = 3.0  # medians of the size
+PLACES = 64  # of a cycle, when repeats are laid over each other
+ALIKE = 0.1  # in height and duration
+
+
+@dataclass(frozen=True, slots=True)
+class LackOfFit:
+    """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
+
+    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks.
+    """
+
+    rms: float
+    z: float
+    pairs: int
+
+
+def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> LackOfFit:
+    """Structure that repeats from cycle to cycle."""
+    products: list[float] = []
+    spreads: list[float] = []
+    found, share = repeats(sessions, residuals)
+    for rows in found:
+        count = rows.shape[0]
+        gram = rows @ rows.T / PLACES
+        upper = np.triu_indices(count, 1)
+        products += list(gram[upper])
+        # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
+        noise = rows - rows.mean(axis=0)
+        scale = count / (count - 1)
+        auto = np.zeros(PLACES)
+        for row in noise:
+            auto += np.correlate(row, row, "full")[PLACES - 1 :] / PLACES
+        auto *= scale / count
+        fewer = 1 - np.arange(1, auto.size) / auto.size
+        variance = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
+        spreads += [variance] * upper[0].size
+    if not products:
+        return LackOfFit(0.0, 0.0, 0)
+    mean = float(np.mean(products))
+    sd = float(np.sqrt(np.sum(spreads))) / len(spreads)
+    return LackOfFit(float(np.sqrt(max(share * mean, 0.0))), mean / max(sd, 1e-300), len(products))
+
+
+def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[list[Array], float]:
+    """The residual over each kind of load cycle: (repeats, PLACES) a kind, while the unit is loaded.
+
+    And the share of all samples that are within a load cycle: the rests are taken to hold no structure.
+    """
+    found: list[tuple[float, float, Array]] = []
+    inside_cycles = total = 0
+    for session, residual in zip(sessions, residuals, strict=True):
+        load = session.conditions.load
+        total += load.size
+        for number in range(int(session.cycle[-1]) + 1):
+            index = np.flatnonzero(session.cycle == number)
+            part = load[index]
+            low, peak = float(load.min()), float(part.max())
+            tall = peak - low > 0.1 * np.ptp(load)
+            inside = np.flatnonzero(part > low + 0.1 * (peak - low)) if tall else np.zeros(0, dtype=int)
+            if inside.size < 8:
+                continue
+            first, last = index[inside[0]], index[inside[-1]]
+            span = slice(first, last + 1)
+            if session.usable[span].mean() < 0.9:
+                continue
+            inside_cycles += last + 1 - first
+            places = np.linspace(0, last - first, PLACES)
+            row = np.interp(places, np.arange(last + 1 - first), residual[span])
+            found.append((peak, (last - first) * session.conditions.step_s, row))
+    kinds: list[list[tuple[float, float, Array]]] = []
+    for one in found:
+        for kind in kinds:
+            if all(abs(a - b) <= ALIKE * abs(b) for a, b in zip(one[:2], kind[0][:2], strict=True)):
+                kind.append(one)
+                break
+        else:
+            kinds.append([one])
+    rows = [np.stack([row for _, _, row in kind]) for kind in kinds if len(kind) > 1]
+    return rows, inside_cycles / max(total, 1)
+
+
+def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float) -> LackOfFit:
+    """Structure in the means of blocks of ``block_s``, beyond what the noise of the faster part would leave there."""
+    excess: list[float] = []
+    spread = 0.0
+    for session, residual in zip(sessions, residuals, strict=True):
+        step_s = session.conditions.step_s
+        width = max(4, round(block_s / step_s))
+        count = residual.size // width
+        if count < FEWEST_BLOCKS:
+            continue
+        mask = session.usable[: count * width].reshape(count, width)
+        rows = residual[: count * width].reshape(count, width)[mask.all(axis=1)]
+        if rows.shape[0] < FEWEST_BLOCKS:
+            continue
+        means = rows.mean(axis=1)
+        expected = _mean_variance(rows - means[:, None], step_s) * _loudness(rows)
+        excess += list(means**2 - expected)
+        # The blocks' own scatter, and that the noise is known from them to some percent only.
+        spread += 2.0 * float(expected @ expected) + (NOISE_KNOWN_TO * float(expected.sum())) ** 2
+    if not excess:
+        return LackOfFit(0.0, 0.0, 0)
+    mean = float(np.mean(excess))
+    return LackOfFit(
+        float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(float(np.sqrt(spread)), 1e-300), len(excess)
+    )
+
+
+def _quiet(rows: Array) -> Mask:
+    """(blocks,) the nine tenths with the least power: a block with a step in it tells nothing of noise."""
+    power = np.sum((rows - rows.mean(axis=1, keepdims=True)) ** 2, axis=1)
+    return np.asarray(power <= np.quantile(power, 0.9))
+
+
+def _loudness(rows: Array) -> Array:
+    """(blocks,) noise power of each block over that of the quiet ones, by differences of neighbours.
+
+    Noise that grows with load or slope is no structure; and structure hardly shows from one sample to the next.
+    """
+    fast = np.abs(np.diff(rows, axis=1))
+    # One jump in a block is no loud noise.
+    fast = np.mean(np.minimum(fast, CUT * np.median(fast, axis=1, keepdims=True)) ** 2, axis=1)
+    usual = float(fast[_quiet(rows)].mean())
+    return np.asarray(fast / usual) if usual > 0.0 else np.ones(fast.size)
+
+
+def _mean_variance(centred: Array, step_s: float) -> float:
+    """Variance of a block's mean under noise, white and first-order, that fits the ``centred`` (blocks, width).
+
+    Taking a block's mean out changes every covariance; so the fit is to covariances that were changed in the same way.
+    """
+    width = centred.shape[1]
+    lags = np.arange(width // 2)
+    rows = centred[_quiet(centred)]
+    found = np.array([float(np.mean(rows[:, k:] * rows[:, : width - k])) for k in lags])
+    place = np.arange(width)
+    centring = np.eye(width) - 1.0 / width
+    white = np.array([float(np.mean(np.diag(centring, int(k)))) for k in lags])
+    best: tuple[float, float] | None = None
+    for tau_s in COLOUR_S:
+        covariance = np.exp(-np.abs(place[:, None] - place) * (step_s / tau_s))
+        changed = centring @ covariance @ centring
+        coloured = np.array([float(np.mean(np.diag(changed, int(k)))) for k in lags])
+        (w, c), off = nnls(np.column_stack([white, coloured]), found)
+        variance = w / width + c * float(covariance.mean())
+        if best is None or off < best[0]:
+            best = off, variance
+    return best[1] if best else 0.0

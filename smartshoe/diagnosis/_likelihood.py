@@ -1,0 +1,166 @@
+"""Fits of an extended model to several sessions at once: penalised output error, nuisances marginalised."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances
+from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.models.effects import EffectParameter
+from smartshoe.models.extended import ExtendedModel
+
+MOST_STEPS = 25
+SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
+LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
+SHAPE_SD = 1.0  # of a shape's logarithm, or in sizes, about where it was begun
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """``cost`` is -2 log likelihood but for a constant, prior included; ``covariance`` (p, p) of theta."""
+
+    model: ExtendedModel
+    cost: float
+    covariance: Array
+
+
+class Likelihood:
+    """What a model's parameters are judged by: ``sessions``, the noise, and nuisances that belong to a session."""
+
+    def __init__(
+        self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
+    ) -> None:
+        self.sessions = tuple(session for session in sessions if session.fitted.any())
+        self.noise_sd = noise_sd
+        self._past: list[Array] = []
+        self._inverse: list[Array] = []
+        for session in self.sessions:
+            past = nuisances(session, like.relaxation_rate_per_s)[session.fitted] / noise_sd
+            inner = past.T @ past + nuisance_precision(session, like, thresholds)
+            inner += 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(2)
+            self._past.append(past)
+            self._inverse.append(np.asarray(np.linalg.inv(inner), dtype=np.float64))
+
+    def _gram(self, k: int, rows: Array) -> Array:
+        white = rows[self.sessions[k].fitted] / self.noise_sd
+        cross = self._past[k].T @ white
+        return np.asarray(white.T @ white - cross.T @ self._inverse[k] @ cross)
+
+    def cost(self, model: ExtendedModel) -> float:
+        """Sum of squares over what is fitted, in units of the noise's variance."""
+        total = 0.0
+        for k, session in enumerate(self.sessions):
+            total += float(self._gram(k, (session.reading - model.simulate(session.conditions))[:, None])[0, 0])
+        return total
+
+    def normal(self, model: ExtendedModel) -> tuple[float, Array, Array]:
+        """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p)."""
+        total = np.zeros((1, 1))
+        for k, session in enumerate(self.sessions):
+            reading, slopes = model.sensitivities(session.conditions)
+            total = total + self._gram(k, np.column_stack([session.reading - reading, slopes]))
+        return float(total[0, 0]), total[1:, 0], total[1:, 1:]
+
+
+def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -> Fit:
+    """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
+
+    Shapes have a wide prior about their start, weights of flexible blocks theirs about null.
+    """
+    owners = start.parameters
+    logarithmic = np.array([_is_logarithmic(p) for _, p in owners])
+    low, high = np.array([p.lower for _, p in owners]), np.array([p.upper for _, p in owners])
+    model = start.at(np.clip(start.theta, low, high))
+    about, precision = _prior(owners, model.theta, logarithmic)
+
+    def penalty(theta: Array) -> float:
+        return float(np.sum(precision * (_stepped(theta, logarithmic) - about) ** 2))
+
+    cost, right, normal = likelihood.normal(model)
+    cost += penalty(model.theta)
+    damping = 1e-4
+    for _ in range(steps):
+        theta = model.theta
+        scale = np.where(logarithmic, theta, 1.0)
+        inner = normal * np.outer(scale, scale) + np.diag(precision)
+        pull = right * scale - precision * (_stepped(theta, logarithmic) - about)
+        best: tuple[float, ExtendedModel] | None = None
+        for _ in range(6):
+            step = _bounded_step(inner, pull, damping, theta, low, high, logarithmic)
+            moved = np.where(logarithmic, theta * np.exp(np.where(logarithmic, step, 0.0)), theta + step)
+            trial = model.at(np.clip(moved, low, high))
+            trial_cost = likelihood.cost(trial) + penalty(trial.theta)
+            if np.isfinite(trial_cost) and trial_cost < cost:
+                best = trial_cost, trial
+                damping = max(damping * 0.1, 1e-7)
+                break
+            damping = max(damping * 10.0, 1e-4)
+        if best is None:
+            break
+        fell = cost - best[0]
+        model = best[1]
+        cost, right, normal = likelihood.normal(model)
+        cost += penalty(model.theta)
+        if fell < SETTLED:
+            break
+    scale = np.where(logarithmic, model.theta, 1.0)
+    inner = normal * np.outer(scale, scale) + np.diag(precision)
+    return Fit(model, cost, _inverse(inner) * np.outer(scale, scale))
+
+
+def _prior(owners: Sequence[tuple[str, EffectParameter]], theta: Array, logarithmic: Mask) -> tuple[Array, Array]:
+    about, precision = _stepped(theta, logarithmic).copy(), np.zeros(theta.size)
+    for k, (owner, parameter) in enumerate(owners):
+        weight_sd = getattr(parameter, "prior_sd", None)
+        if weight_sd is not None:
+            about[k], precision[k] = parameter.null or 0.0, 1.0 / weight_sd**2
+        elif parameter.null is None and owner != "baseline":
+            precision[k] = 1.0 / (SHAPE_SD if logarithmic[k] else SHAPE_SD * parameter.size) ** 2
+    return about, precision
+
+
+def _stepped(theta: Array, logarithmic: Mask) -> Array:
+    return np.where(logarithmic, np.log(np.where(logarithmic, np.abs(theta) + 1e-300, 1.0)), theta)
+
+
+def _is_logarithmic(parameter: EffectParameter) -> bool:
+    return parameter.null is None and parameter.lower > 0 and parameter.upper / parameter.lower >= LOG_RANGE
+
+
+def _bounded_step(
+    normal: Array, right: Array, damping: float, theta: Array, low: Array, high: Array, logarithmic: Mask
+) -> Array:
+    """The damped step over the parameters that are not pushed against a bound or without any influence."""
+    diagonal = np.diag(normal)
+    free = diagonal > 1e-12 * max(float(diagonal.max()), 1e-300)
+    step = np.zeros(theta.size)
+    for _ in range(theta.size):
+        index = np.flatnonzero(free)
+        if not index.size:
+            break
+        part = normal[np.ix_(index, index)] + damping * np.diag(diagonal[index])
+        root = np.sqrt(np.diag(part))
+        step[:] = 0.0
+        step[index] = np.linalg.lstsq(part / np.outer(root, root), right[index] / root, rcond=1e-12)[0] / root
+        step = np.where(logarithmic, np.clip(step, -1.0, 1.0), step)
+        outward = ((theta <= low) & (step < 0)) | ((theta >= high) & (step > 0))
+        if not (outward & free).any():
+            break
+        free &= ~outward
+    return step
+
+
+def _inverse(normal: Array) -> Array:
+    scale = np.sqrt(np.diag(normal))
+    out = np.zeros_like(normal)
+    index = np.flatnonzero(scale > 0)
+    if index.size:
+        part = normal[np.ix_(index, index)] / np.outer(scale[index], scale[index])
+        inverse = np.linalg.pinv(part, rcond=1e-12, hermitian=True)
+        out[np.ix_(index, index)] = inverse / np.outer(scale[index], scale[index])
+    return out

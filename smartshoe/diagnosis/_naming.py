@@ -1,0 +1,79 @@
+"""From members of a model to names: how sure each is, what cannot be told from it, and which of them are causes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from smartshoe.diagnosis._inference import Member
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.models.effects import Effect, catalogue
+
+
+@dataclass(frozen=True, eq=False)
+class Name:
+    """``confidence`` that it is this effect or one of ``equivalents``, which nothing tells from it; ``law`` of the two.
+
+    ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
+    family is what was found; its equation follows no better than others of the family.
+    """
+
+    member: Member
+    effect: Effect
+    confidence: float
+    law: float
+    equivalents: tuple[str, ...]
+    kind_only: bool = False
+
+
+def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> tuple[Name, ...]:
+    """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
+
+    A flexible block is named by the law of its family that comes nearest.
+    """
+    likely = ((one, probability_of_kind(one, left, thresholds)) for one in members if one.size >= thresholds.material)
+    return tuple(_named(one, kind, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
+
+
+def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
+    if not one.effect.is_flexible:
+        law, equivalents = probability_of_law(one, thresholds)
+        return Name(one, one.effect, kind, law, equivalents)
+    family = [e for e in catalogue().values() if e.family == one.effect.family]
+    margins = {a.effect: a.margin for a in one.laws}
+    nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
+    others = tuple(e.name for e in family if e is not nearest)
+    # That none of the family follows better than another speaks for one that the catalogue does not have.
+    return Name(one, nearest, kind / 2.0, 1.0 / len(family), others, True)
+
+
+def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:
+    """That an effect of this family is there: a logistic of two ratios, each without a unit, and the evidence for it.
+
+    What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow), and
+    how far its equation is asked to depart.
+    """
+    intercept, per_left, per_departed = thresholds.kind_odds
+    ratio = (left + thresholds.material) / (one.size + thresholds.material)
+    score = intercept + per_left * math.log(ratio) + per_departed * one.departed
+    nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
+    return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
+
+
+def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
+    """That it is this law of its family, and the laws that this data cannot tell from it.
+
+    No law is exact: another one that explains all but the square of the usual departure, of what this one explains, is
+    as good. So the margin is counted in units of that square, and of one look at noise; of the largest departure that
+    is usual where a law is to be ruled out. It is held against its nearest rival: one half in a dead heat.
+    """
+
+    def odds(margin: float, departure: float) -> float:
+        unit = 2.0 * (1.0 + departure**2 * max(one.fall, 0.0))
+        return math.exp(-max(margin, 0.0) / unit)
+
+    laws = [(a.effect, a.margin) for a in one.laws if a.effect is not None]
+    equivalents = (name for name, margin in laws if odds(margin, thresholds.law_departure) > thresholds.equivalent_odds)
+    nearest = max((odds(margin, thresholds.departure) for _, margin in laws), default=0.0)
+    return 1.0 / (1.0 + nearest), tuple(equivalents)

@@ -1,0 +1,131 @@
+"""The experiment that would separate what this data cannot: which one, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._inference import Inference
+from smartshoe.diagnosis._likelihood import Fit, fit
+from smartshoe.diagnosis._result import Cause, NextExperiment
+from smartshoe.diagnosis._session import Session
+from smartshoe.models.effects import Conditions, effect, told_apart_by
+from smartshoe.protocol import Protocol
+
+SEPARATED = 6.0  # difference of -2 log likelihood under which another effect does as well
+DOUBTFUL = 5.0 * SEPARATED  # margins below this deserve another experiment
+SHOWN_BY = {
+    "rates": "rates",
+    "holds": "long_hold",
+    "rests": "idle",
+    "minor_loops": "minor_loops",
+    "peaks": "shuffled_loads",
+    "pauses": "pauses",
+    "steps": "steps",
+}
+CHANNELS = {
+    "displacement": "displacement",
+    "temperature": "temperature",
+    "pressure_reference": "pressure reference",
+    "neighbour": "neighbour",
+}
+
+
+def next_experiment(
+    found: Inference, causes: Sequence[Cause], sessions: Sequence[Session], excitation: Excitation, *, open_: bool
+) -> NextExperiment | None:
+    """For the most doubtful cause: the protocol with the largest expected margin, or the channel to log.
+
+    Where no cause is in doubt and something is left (``open_``), what this data never showed; else None.
+    """
+    doubtful = [cause for cause in causes if cause.equivalents and cause.name in found.fit.model.names]
+    if not doubtful:
+        return _unseen(found, causes, excitation) if open_ or any(c.equivalents for c in causes) else None
+    cause = max(doubtful, key=lambda one: one.size)
+    rival = cause.equivalents[0]
+    other = _in_place_of(found, cause.name, rival)
+    margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
+    peak_n = found.fit.model.full_scale_load_n
+    noise_sd = found.likelihood.noise_sd
+    expected = {
+        name: expected_margin(found.fit, other, made(peak_n), noise_sd, sessions[0])
+        for name, made in EXPERIMENTS.items()
+    }
+    best = max(expected, key=lambda name: expected[name])
+    names = (cause.name, *cause.equivalents)
+    pair = f"{cause.name} and {rival}".replace("_", " ")
+    channel = _channel(cause.name, rival, sessions)
+    if expected[best] < DOUBTFUL and channel is not None:
+        says = f"no load history tells {pair} apart well: log the {channel} too"
+        return NextExperiment(names, None, channel, says, expected[best])
+    if expected[best] < SEPARATED:
+        says = f"no load history that a machine can run tells {pair} apart: take either, they predict the same"
+        return NextExperiment(names, None, channel, says, expected[best])
+    says = (
+        f"run {best.replace('_', ' ')}: it should tell {pair} apart by {expected[best]:,.0f} of -2 log likelihood,"
+        f" where this data does by {max(margin, 0.0):,.0f}"
+    )
+    return NextExperiment(names, best, channel, says, expected[best], EXPERIMENTS[best](peak_n))
+
+
+def _in_place_of(found: Inference, name: str, rival: str) -> Fit:
+    """The fit with ``rival`` in the place of an effect, of the size that the screen expects of it."""
+    added = effect(rival)
+    sizes = {p.name: p.size for p in added.parameters if p.null is not None}
+    values = added.start()
+    for k, parameter in enumerate(added.parameters):
+        if parameter.name in sizes:
+            values[k] = min(
+                max((parameter.null or 0.0) + 0.1 * sizes[parameter.name], parameter.lower), parameter.upper
+            )
+    return fit(found.likelihood, found.fit.model.without(name).with_part(added, values))
+
+
+def _unseen(found: Inference, causes: Sequence[Cause], excitation: Excitation) -> NextExperiment:
+    """The first protocol that holds what this data lacks; the same again where it lacks nothing."""
+    peak_n = found.fit.model.full_scale_load_n
+    names = tuple(cause.name for cause in causes)
+    for word, protocol in SHOWN_BY.items():
+        if word not in excitation.present:
+            says = f"run {protocol.replace('_', ' ')}: this data holds no {word.replace('_', ' ')}, where kinds differ"
+            return NextExperiment(names, protocol, None, says, None, EXPERIMENTS[protocol](peak_n))
+    says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"
+    return NextExperiment(names, "repeat", None, says)
+
+
+def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise_sd: float, like: Session) -> float:
+    """By how much -2 log likelihood would be worse with the rival, were ``truth`` true and the protocol run once.
+
+    The rival may move its parameters as far as the data so far lets it: min over d of |yA - yB - J d|^2 + d' H d in
+    standard deviations of the noise, H the information that it was fitted with.
+    """
+    step_s = like.conditions.step_s
+    time_s = np.arange(0.0, protocol.duration_s, step_s)
+    full_n = truth.model.full_scale_load_n
+    conditions = Conditions(time_s, protocol.load_at(time_s) / full_n, step_s, like.conditions.load_noise)
+    reading, slopes = rival.model.sensitivities(conditions)
+    difference = (truth.model.simulate(conditions) - reading) / noise_sd
+    J = slopes / noise_sd
+    information = np.linalg.pinv(rival.covariance, rcond=1e-12, hermitian=True)
+    unseen = np.diag(rival.covariance) == 0
+    scale = np.sqrt(np.sum(J**2, axis=0) + np.diag(information))
+    good = (scale > 0) & ~unseen
+    if not good.any():
+        return float(difference @ difference)
+    Js, H = J[:, good] / scale[good], information[np.ix_(good, good)] / np.outer(scale[good], scale[good])
+    moved = np.linalg.lstsq(Js.T @ Js + H, Js.T @ difference, rcond=1e-12)[0]
+    left = difference - Js @ moved
+    return float(left @ left + moved @ H @ moved)
+
+
+def _channel(name: str, rival: str, sessions: Sequence[Session]) -> str | None:
+    """The channel that the catalogue says would tell them apart, if it was not logged already."""
+    said = told_apart_by(effect(name), effect(rival))
+    logged = {channel for session in sessions for channel in session.recording.channels}
+    for word, channel in CHANNELS.items():
+        if word in said and channel not in logged:
+            return channel
+    return None

@@ -1,0 +1,54 @@
+"""An effect's parameters as a person reads them: in SI and the reading's own unit, with their intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smartshoe.diagnosis._likelihood import Fit
+from smartshoe.diagnosis._session import Scale
+from smartshoe.models.parameter import Parameter
+from smartshoe.signals.noise import NORMAL_95
+
+
+def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
+    """The effect's parameters by name; an interval stays within the parameter's bounds."""
+    theta = fit.model.theta
+    found = {}
+    for k, (owner, parameter) in enumerate(fit.model.parameters):
+        if owner != name:
+            continue
+        factor, unit = _scaled(parameter.unit, scale, fit.model.gain)
+        sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
+        low = max(theta[k] - NORMAL_95 * sd, parameter.lower)
+        high = min(theta[k] + NORMAL_95 * sd, parameter.upper)
+        found[parameter.name] = Parameter(
+            float(theta[k] * factor), float(sd * factor), (float(low * factor), float(high * factor)), unit
+        )
+    return found
+
+
+def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tuple[tuple[float, ...], ...]]:
+    """Every effect's parameters as ``effect.parameter``, and their covariance in the same units and order."""
+    found: dict[str, Parameter] = {}
+    factors, places = [], []
+    for name in fit.model.names:
+        for key, parameter in parameters_of(fit, name, scale).items():
+            found[f"{name}.{key}"] = parameter
+    for k, (owner, parameter_) in enumerate(fit.model.parameters):
+        if owner != "baseline":
+            places.append(k)
+            factors.append(_scaled(parameter_.unit, scale, fit.model.gain)[0])
+    part = fit.covariance[np.ix_(places, places)] * np.outer(factors, factors)
+    return found, tuple(tuple(float(value) for value in row) for row in part)
+
+
+def _scaled(unit: str, scale: Scale, gain: float) -> tuple[float, str]:
+    """Factor and unit in which a share of full scale is told; the chain's shares come out ``gain`` times as large."""
+    factor = 1.0
+    if "FS_reading" in unit:
+        factor, unit = factor * gain * abs(scale.reading), unit.replace("FS_reading", scale.unit.symbol)
+    if "FS_load" in unit:
+        inverse = "/FS_load" in unit
+        factor = factor / scale.load_n if inverse else factor * scale.load_n
+        unit = unit.replace("FS_load", "N")
+    return (factor if np.isfinite(factor) else 1.0), unit

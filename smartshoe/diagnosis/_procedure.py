@@ -1,0 +1,407 @@
+"""From recordings to a diagnosis: integrity, baseline, inference, what is left, what it is worth on held-out data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._aligned import aligned
+from smartshoe.diagnosis._baseline import baseline_of
+from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
+from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis._inference import Inference, Progress, infer
+from smartshoe.diagnosis._naming import Name, names_of
+from smartshoe.diagnosis._next_experiment import next_experiment
+from smartshoe.diagnosis._noise_kinds import noise_kinds
+from smartshoe.diagnosis._parameters import joint_parameters, parameters_of
+from smartshoe.diagnosis._ranges import ranges_of
+from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
+from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
+from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
+from smartshoe.diagnosis.decay import decay_of
+from smartshoe.errors import UsageError
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of
+from smartshoe.integrity import Integrity, examine
+from smartshoe.kernels.blas import on_one_thread
+from smartshoe.models.effects.effect import CoreEffect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import Parameter
+from smartshoe.recording import Recording
+from smartshoe.signals.noise import NORMAL_95
+
+BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
+
+
+def _silent(_: str) -> None:
+    return None
+
+
+def diagnose(
+    recordings: RecordingLike | Sequence[RecordingLike],
+    hold_out: RecordingLike | Sequence[RecordingLike] = (),
+    *,
+    material: float | None = None,
+    thresholds: Thresholds | None = None,
+    progress: Progress = _silent,
+) -> Diagnosis:
+    """What the baseline simulation of ``recordings`` gets wrong, why, and what mending it gains.
+
+    Parameters
+    ----------
+    recordings
+        Load and reading of one unit (recordings, paths or DataFrames), each a session of its own unless its metadata
+        ``continues`` names another.
+    hold_out
+        Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is kept.
+    material
+        Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given.
+    thresholds
+        Every number that decides.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    UsageError
+        Where no recording is given. A diagnosis that the data cannot support comes back with the verdict "refused" and
+        the reason in ``limits``.
+    """
+    fitted, kept_out = recordings_of(recordings), recordings_of(hold_out, "hold_out")
+    if not fitted:
+        raise UsageError("diagnose was given no recording: give one at least")
+    decided = thresholds or Thresholds()
+    if material is not None:
+        decided = replace(decided, material=material)
+    everything = [*fitted, *kept_out]
+    integrity = examine(everything)
+    refusals = integrity.refusals or _outside(everything)
+    if refusals:
+        return _refused(everything, integrity, refusals, decided)
+    return _diagnosed(everything, len(fitted), integrity, decided, progress)
+
+
+def _outside(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Why the recordings are none of a unit that is pressed."""
+    for recording in recordings:
+        low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
+        if min(abs(low), abs(high)) > BOTH_WAYS * max(abs(low), abs(high)) and low < 0 < high:
+            return (
+                f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is"
+                " pressed, which bears compression only (turn the sign of the load, or take its mean out, if that is"
+                " what was meant)",
+            )
+        if -low > abs(high):
+            return (
+                f"{recording.label}: the load is negative in compression (it runs from {low:.4g} to {high:.4g} N): turn"
+                " its sign, compression is positive",
+            )
+    return ()
+
+
+def _refused(
+    recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str], thresholds: Thresholds
+) -> Diagnosis:
+    sensors = recordings[0].sensors
+    unit = sensors[0].unit.symbol if sensors else ""
+    return Diagnosis(
+        "refused",
+        f"no diagnosis: {refusals[0]}",
+        unit,
+        0.0,
+        0.0,
+        data_faults=integrity.faults,
+        limits=(*refusals, *(said for said in map(_seen, recordings) if said is not None)),
+        thresholds=thresholds,
+    )
+
+
+def _seen(recording: Recording) -> str | None:
+    """What can be told of a recording without a model."""
+    decay = decay_of(recording)
+    return decay.says if decay is not None else characteristic_of(recording)
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    sessions: list[Session]
+    fine: list[Session]
+    scale: Scale
+    limits: list[str]
+    start: ExtendedModel
+    excitation: Excitation
+    is_no_unit: bool
+
+
+def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
+    clocks = aligned(recordings, integrity)
+    scale = full_scale(clocks.recordings[:count], clocks.usable[:count])
+    held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
+    sessions = prepare(clocks.recordings, clocks.usable, held, scale, thinning(clocks.recordings, scale))
+    start = baseline_of(sessions, scale)
+    for added, values in clocks.parts:
+        start = start.with_part(added, values)
+    excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
+    friction = [friction_of(recording, thresholds) for recording in clocks.recordings[:count]]
+    limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
+    fine = at_full_rate(sessions, clocks.usable, scale)
+    is_no_unit = ranges.is_trap or all(said is not None for said in friction)
+    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit)
+
+
+@on_one_thread
+def _diagnosed(
+    recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds, progress: Progress
+) -> Diagnosis:
+    given = _prepared(recordings, count, integrity, thresholds)
+    sessions, fine, scale = given.sessions, given.fine, given.scale
+    found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
+    progress("judging on held-out data")
+    extended = found.fit.model
+    alarm = thresholds.false_alarm
+    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], alarm)
+    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions], alarm)
+    left = after.rms if after.significant else 0.0
+    everything = max(left, after.size)
+    silent = given.is_no_unit or not found.can_validate
+    names = names_of(found.members, everything, thresholds)
+    names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings, thresholds))
+    remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
+    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds)
+    zeros = tuple(one for one in zeros if one.size >= thresholds.material)
+    baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
+    causes = [_cause(name, found, fine, best, given) for name in names]
+    causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
+    causes.sort(key=lambda one: -one.size)
+    # What follows something else than the load is simulated by no unit, however well it fits.
+    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds)
+    with_zero = _with_offset(extended, zeros, sessions, scale)
+    noise_variance = max(best.rmse**2 - left**2, 0.0)
+    explained = verdict in ("adequate", "explained") or after.is_noise
+    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, after.memory)
+    named = {cause.name for cause in causes}
+    parameters, covariance = joint_parameters(found.fit, scale)
+    force = force_rmse_n(fine, extended)
+    return Diagnosis(
+        verdict,
+        _sentence(verdict, causes, baseline, best, after, thresholds),
+        scale.unit.symbol,
+        scale.load_n,
+        abs(scale.reading),
+        causes=tuple(causes),
+        minor=tuple(part.name for part in extended.parts if part.name not in named),
+        data_faults=(*integrity.faults, *noise),
+        baseline=_goodness(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
+        extended=_goodness(best, force, after, scale),
+        gain=gain(baseline, best, scale),
+        explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
+        explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
+        rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
+        next_experiment=next_experiment(
+            found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
+        ),
+        limits=(*given.limits, *_refused_members(found)),
+        leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
+        screening=found.screening,
+        model=with_zero,
+        baseline_model=found.baseline.model,
+        parameters=parameters,
+        covariance=covariance,
+        traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),
+        thresholds=thresholds,
+    )
+
+
+def _is_within_a_sample(
+    name: Name, model: ExtendedModel, recordings: Sequence[Recording], thresholds: Thresholds
+) -> bool:
+    """Whether a latency is too short to be one: a time stamp does not say where within its interval a sample lies."""
+    if not (name.effect.is_latency and name.effect.parameters[0].unit == "s"):
+        return False
+    values = next(part.values for part in model.parts if part.name == name.member.name)
+    step_s = max(recording.sample_time_s for recording in recordings)
+    return abs(float(values[0])) < thresholds.timing_resolution * step_s
+
+
+def _verdict(
+    causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure, thresholds: Thresholds
+) -> Verdict:
+    left = after.rms if after.significant else 0.0
+    if causes:
+        wrong = before.rms if before.significant else 0.0
+        least = max(thresholds.material, thresholds.tolerable, thresholds.departure * wrong)
+        return "partly_explained" if left > least else "explained"
+    return "unexplained" if left > max(thresholds.material, thresholds.tolerable) else "adequate"
+
+
+def _sentence(
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    baseline: Errors,
+    best: Errors,
+    after: ResidualStructure,
+    thresholds: Thresholds,
+) -> str:
+    names = [cause.name.replace("_", " ") for cause in causes]
+    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
+    left = after.rms if after.significant else 0.0
+    rest = f"{100 * left:.2g} % {after.how} and is not explained"
+    if verdict == "adequate":
+        return good if left <= thresholds.material else f"{good}; {rest}"
+    if verdict == "unexplained":
+        return f"{good}; {rest}, and no effect of the catalogue accounts for it"
+    said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
+    return said if verdict == "explained" else f"{said}; {rest}"
+
+
+def _refused_members(found: Inference) -> list[str]:
+    if not found.can_validate:
+        return [
+            "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
+        ]
+    if not found.refused:
+        return []
+    names = ", ".join(dict.fromkeys(name.replace("_", " ") for name in found.refused))
+    return [f"fitted well but made recordings left out worse, and so were taken out again: {names}"]
+
+
+def _percent_less(after: float, before: float) -> float:
+    """By how many percent a variance falls, 0 where it grows."""
+    return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
+
+
+def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared) -> Cause:
+    member = name.member
+    won = gain(errors(fine, member.without.model), best, given.scale)
+    near = {a.effect: a.margin for a in (*member.alternatives, *member.laws) if a.effect is not None}
+    rivals = tuple(Rival(effect, margin) for effect, margin in sorted(near.items(), key=lambda one: one[1]))
+    nothing = next((a.margin for a in member.alternatives if a.effect is None), 0.0)
+    evidence = [
+        Statement(
+            "fall of -2 log evidence",
+            nothing,
+            0.0,
+            f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log",
+        ),
+        *_held_out_evidence(member.size, won),
+    ]
+    if rivals:
+        evidence.append(
+            Statement(
+                "margin to the nearest rival",
+                rivals[0].margin,
+                0.0,
+                f"{rivals[0].effect.replace('_', ' ')} in its place is worse by {rivals[0].margin:,.0f}",
+            )
+        )
+    if name.kind_only:
+        evidence.append(
+            Statement(
+                "kind", 1.0, 1.0, "the kind is sure, the law is not: no equation of it follows better than others"
+            )
+        )
+    lacking = name.effect.exposed_by - given.excitation.present
+    if lacking:
+        said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
+        evidence.append(
+            Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")
+        )
+    values = parameters_of(found.fit, member.name, given.scale)
+    sure = name.confidence, name.law
+    return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals)
+
+
+def _held_out_evidence(size: float, won: Gain) -> list[Statement]:
+    return [
+        Statement(
+            "size in percent of full scale",
+            100 * size,
+            0.0,
+            f"it moves the reading by {100 * size:.3g} % of full scale",
+        ),
+        Statement(
+            "gain on held-out data in percent",
+            won.gain_percent,
+            0.0,
+            f"on data not fitted the error falls from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+        ),
+    ]
+
+
+def _zero_cause(
+    zero: Zero, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared, thresholds: Thresholds
+) -> Cause:
+    """An offset or tare: removed, every reading is off by it."""
+    scale = given.scale
+    worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
+    won = gain(worse, best, scale)
+    parameter = zero.effect.parameters[0]
+    factor = scale.load_n if "FS_load" in parameter.unit else abs(scale.reading)
+    unit = "N" if "FS_load" in parameter.unit else scale.unit.symbol
+    low, high = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
+    values = {parameter.name: Parameter(zero.value * factor, zero.sd * factor, (low * factor, high * factor), unit)}
+    deviations = abs(zero.value) / zero.sd
+    seen = Statement(
+        "deviations from nothing",
+        deviations,
+        thresholds.zero_deviations,
+        f"it is {deviations:.3g} standard deviations from nothing",
+    )
+    sure = thresholds.seen_confidence, 1.0 / (1.0 + len(zero.alternatives))
+    evidence = (seen, *_held_out_evidence(zero.size, won))
+    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
+
+
+def _with_offset(
+    model: ExtendedModel, zeros: Sequence[Zero], sessions: Sequence[Session], scale: Scale
+) -> ExtendedModel:
+    """``model`` with the recordings' mean offset, so that it gives readings as they are logged."""
+    for zero in zeros:
+        model = model.with_part(zero.effect, np.array([zero.value]))
+    if not any(zero.effect.shifts == "reading" for zero in zeros):
+        rest = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
+        if rest != 0.0:
+            model = model.with_part(shift_of("reading"), np.array([rest / model.gain]))
+    return model
+
+
+def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit:
+    span = abs(scale.reading)
+    return GoodnessOfFit(
+        found.rmse * span,
+        scale.unit.symbol,
+        found.fit_percent,
+        force_n,
+        left.rms * span,
+        found.variance_explained_percent,
+    )
+
+
+def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, scale: Scale) -> Trace:
+    def told(shares: Array) -> Array:
+        return np.asarray(scale.zero + shares * scale.reading)
+
+    def simulated(model: ExtendedModel) -> Array:
+        plain = model.simulate(session.conditions)
+        return told(plain + own_of(session, model, session.reading - plain)[1])
+
+    return Trace(
+        session.recording.name,
+        session.conditions.time_s + session.recording.time_s[0],
+        session.conditions.load * scale.load_n,
+        told(session.reading),
+        simulated(baseline),
+        simulated(extended),
+        session.usable,
+        session.held_out,
+        session.cycle,
+    )
+
+
+__all__ = ["diagnose"]

@@ -1,0 +1,85 @@
+"""What the range of the load allows: a gain seen over a narrow range, or within files only, is a trap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._thresholds import Thresholds
+
+STANDARD = Thresholds()
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """Sentences, and whether the gain is a trap: no name can be trusted then."""
+
+    says: tuple[str, ...] = ()
+    is_trap: bool = False
+
+
+def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds = STANDARD) -> Ranges:
+    """A sentence for each thing that the loads' range does not allow to be said."""
+    said: list[str] = []
+    kept = [(s.conditions.load[s.usable], s.reading[s.usable]) for s in sessions if s.usable.sum() > 10]
+    if not kept:
+        return Ranges()
+    trap = False
+    unit = scale.unit.symbol
+    to_physical = scale.reading / scale.load_n
+    within = [_gain(load, reading, thresholds.follows) for load, reading in kept]
+    narrow = [
+        k for k, (load, _) in enumerate(kept) if thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max())
+    ]
+    if len(narrow) == len(kept) and all(gain is not None for gain in within):
+        gain = float(np.median([gain for gain in within if gain is not None]))
+        load, reading = kept[narrow[0]]
+        through_zero = float(reading.mean() / load.mean())
+        low, high = np.quantile(load, [0.01, 0.99]) * scale.load_n
+        trap = not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
+        said.append(
+            f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
+            f" {sessions[narrow[0]].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
+            f" ({1.0 / (gain * to_physical):.4g} N/{unit})"
+            + (
+                f", where reading over load is {through_zero * to_physical:.3g} {unit}/N"
+                f" ({1.0 / (through_zero * to_physical):.4g} N/{unit}): load and reading may both follow a third thing"
+                " (a reversal, a regulator), so that this gain is none to calibrate by, and no cause is named"
+                if trap
+                else ": what lies below is extrapolated"
+            )
+        )
+    between = _between(kept, thresholds.same)
+    if between is not None and all(gain is not None for gain in within):
+        gain = float(np.median([gain for gain in within if gain is not None]))
+        if not 1.0 < abs(gain / between) * (1.0 + thresholds.same) < (1.0 + thresholds.same) ** 2:
+            trap = trap or len(narrow) == len(kept)
+            said.append(
+                f"within a file the reading moves by {gain * to_physical:.3g} {unit}/N, between the files by"
+                f" {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, or the"
+                " files are not of one unit"
+            )
+    return Ranges(tuple(said), trap)
+
+
+def _gain(load: Array, reading: Array, follows: float) -> float | None:
+    """Slope of reading on load within a file, None where load explains less of its variance than ``follows``."""
+    a, b = load - load.mean(), reading - reading.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b / (a @ a)) if size > 0 and float(a @ b) ** 2 > follows * size**2 else None
+
+
+def _between(kept: Sequence[tuple[Array, Array]], apart: float) -> float | None:
+    """Slope of the files' mean readings on their mean loads, None where these are not ``apart`` (full scales)."""
+    if len(kept) < 2:
+        return None
+    loads = np.array([load.mean() for load, _ in kept])
+    readings = np.array([reading.mean() for _, reading in kept])
+    if np.ptp(loads) < apart:
+        return None
+    a = loads - loads.mean()
+    return float(a @ readings / (a @ a)) or None

@@ -1,0 +1,123 @@
+"""What is left over, in a sentence: how large, whether it is more than noise, and where it sits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._denoise import noise_sd
+from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
+from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, slow
+from smartshoe.diagnosis._session import Session
+
+BLOCK_S = 5.0
+SIGNIFICANT_Z = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualStructure:
+    """``rms`` of the structure in a residual (shares of full scale), by two tests of lack of fit.
+
+    ``says`` where it is largest. ``memory`` is what its slow part is made of: where that is noise, it is no structure,
+    however slow. ``size`` is all that is beyond white noise.
+    """
+
+    repeating: LackOfFit
+    slow: LackOfFit
+    memory: GaussMarkov | None
+    says: str
+    size: float
+
+    @property
+    def rms(self) -> float:
+        """The largest of the tests that stand out of the noise."""
+        return max(self._found, default=0.0)
+
+    @property
+    def significant(self) -> bool:
+        """Whether any test stands out of the noise."""
+        return bool(self._found)
+
+    @property
+    def how(self) -> str:
+        """What the largest part does: it repeats with the load's cycles, or it wanders."""
+        return "repeats" if self.repeating.z > SIGNIFICANT_Z and self.repeating.rms >= self.rms else "wanders"
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether nothing is left but noise, slow or not."""
+        return self.memory is not None and self.memory.is_noise and not self.significant
+
+    @property
+    def _found(self) -> list[float]:
+        if self.memory is not None and self.memory.is_noise:
+            return [self.repeating.rms] if self.repeating.z > SIGNIFICANT_Z else []
+        found = [one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z]
+        # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
+        return found if self.memory is None else [*found, min(self.memory.rms, self.size)]
+
+
+def residual_structure(
+    sessions: Sequence[Session], residuals: Sequence[Array], false_alarm: float
+) -> ResidualStructure:
+    """Both tests of the residuals, and the place of the largest part; ``false_alarm`` of the tests for noise."""
+    memory = gauss_markov_of(sessions, residuals, false_alarm)
+    says = where(sessions, residuals)
+    if memory is not None and memory.switches:
+        says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
+    return ResidualStructure(
+        repeating(sessions, residuals),
+        slow(sessions, residuals, BLOCK_S),
+        memory,
+        says,
+        beyond_noise(sessions, residuals),
+    )
+
+
+def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array]) -> float:
+    """Rms of ``residuals``, (n,) a session, over what is fitted beyond white noise, whether it repeats or not."""
+    square, white, count = 0.0, 0.0, 0
+    for session, whole in zip(sessions, residuals, strict=True):
+        if session.fitted.any():
+            residual = whole[session.fitted]
+            square += float(residual @ residual)
+            white += noise_sd(residual) ** 2 * residual.size
+            count += residual.size
+    return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
+
+
+def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:
+    """The bin of load and direction, and the stretch of time, that hold most of the residual's slow part."""
+    load, rate, error, names = [], [], [], []
+    for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
+        width = max(1, round(0.5 / session.conditions.step_s))
+        smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
+        load.append(session.conditions.load)
+        rate.append(session.conditions.rate_per_s)
+        error.append(smooth)
+        names += [index] * residual.size
+    loads, rates, errors = (np.concatenate(x) for x in (load, rate, error))
+    power = errors**2
+    total = float(power.sum()) or 1.0
+    level = np.clip((loads * 4).astype(int), 0, 3)
+    direction = np.where(np.abs(rates) < 0.004, 0, np.where(rates > 0, 1, 2))
+    table = np.zeros((3, 4))
+    share = np.zeros((3, 4))
+    np.add.at(table, (direction, level), power)
+    np.add.at(share, (direction, level), 1.0 / power.size)
+    d, k = np.unravel_index(int(np.argmax(table)), table.shape)
+    doing = ("while the load is held", "while loading", "while unloading")[int(d)]
+    numbers = np.array(names)
+    worst = max(range(len(sessions)), key=lambda i: float(power[numbers == i].mean()))
+    own = power[numbers == worst]
+    tenth = np.array_split(own, 10)
+    at = int(np.argmax([float(part.mean()) for part in tenth]))
+    duration = sessions[worst].conditions.time_s[-1]
+    return (
+        f"{100 * table[d, k] / total:.0f} % of it sits at {25 * k}-{25 * (k + 1)} % of the load {doing}"
+        f" ({100 * share[d, k]:.0f} % of the samples); it is largest in {sessions[worst].recording.name},"
+        f" {at * duration / 10:.0f}-{(at + 1) * duration / 10:.0f} s"
+    )

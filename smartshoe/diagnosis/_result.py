@@ -1,0 +1,270 @@
+"""`Diagnosis`: what was found, as an object and as the contract's JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from smartshoe.arrays import Array, Index, Mask
+from smartshoe.diagnosis._held_out import Gain
+from smartshoe.diagnosis._thresholds import Thresholds, described
+from smartshoe.display import Summarised, SummaryTable, panels, significant
+from smartshoe.errors import NotIdentifiableError
+from smartshoe.integrity import DataFault
+from smartshoe.models.effects import Effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import Parameter, finite_or_none
+from smartshoe.protocol import Protocol
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from smartshoe.calibration import Calibration
+
+Verdict = Literal["adequate", "explained", "partly_explained", "unexplained", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """One piece of evidence: a number, what it is held against, and a sentence."""
+
+    statistic: str
+    value: float
+    threshold: float
+    says: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers."""
+        return {
+            "statistic": self.statistic,
+            "value": finite_or_none(self.value),
+            "threshold": finite_or_none(self.threshold),
+            "says": self.says,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """Another effect that came near: ``margin`` is by how much -2 log likelihood is worse with it."""
+
+    effect: str
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale.
+
+    ``confidence`` that it is this effect or one of its ``equivalents``, which this data cannot tell from it;
+    ``law_confidence`` that, if so, it is this one and not its nearest rival: one half in a dead heat.
+    """
+
+    effect: Effect
+    confidence: float
+    law_confidence: float
+    equivalents: tuple[str, ...]
+    parameters: dict[str, Parameter]
+    evidence: tuple[Statement, ...]
+    held_out: Gain
+    size: float
+    rivals: tuple[Rival, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The effect's identifier."""
+        return self.effect.name
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's entry in ``causes``."""
+        return {
+            "effect": self.effect.name,
+            "family": self.effect.family,
+            "stage": self.effect.stage,
+            "confidence": self.confidence,
+            "law_confidence": self.law_confidence,
+            "equivalents": list(self.equivalents),
+            "parameters": {
+                name: {key: value for key, value in parameter.to_dict().items() if key != "sd"}
+                for name, parameter in self.parameters.items()
+            },
+            "evidence": [one.to_dict() for one in self.evidence],
+            "held_out": self.held_out.to_dict(),
+            "size_percent_of_full_scale": 100.0 * self.size,
+            "says": self.effect.says,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class GoodnessOfFit:
+    """How a model does on held-out data; ``structure_rms`` is what its residual holds beside noise (reading's unit)."""
+
+    rmse: float
+    unit: str
+    fit_percent: float
+    force_rmse_n: float
+    structure_rms: float
+    variance_explained_percent: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's ``baseline`` and ``extended``."""
+        return {
+            "rmse": {"value": self.rmse, "unit": self.unit},
+            "fit_percent": self.fit_percent,
+            "force_rmse_n": finite_or_none(self.force_rmse_n),
+            "structure_rms": {"value": self.structure_rms, "unit": self.unit},
+            "variance_explained_percent": self.variance_explained_percent,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class NextExperiment:
+    """What would separate the rivals: a protocol to run (with its expected margin), or a channel to log."""
+
+    separates: tuple[str, ...]
+    protocol: str | None
+    channel: str | None
+    says: str
+    expected_margin: float | None = None
+    steps: Protocol | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's ``next_experiment``."""
+        return {
+            "separates": list(self.separates),
+            "protocol": self.protocol,
+            "channel": self.channel,
+            "says": self.says,
+            "expected_margin": None if self.expected_margin is None else finite_or_none(self.expected_margin),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One recording at its full rate, for figures: all (n,), reading in ``Diagnosis.unit``, load in N."""
+
+    name: str
+    time_s: Array
+    load_n: Array
+    reading: Array
+    baseline: Array
+    extended: Array
+    usable: Mask
+    held_out: Mask
+    cycle: Index
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Summarised):
+    """What measured data says of its simulation; see the contract's section 4 for `to_dict`.
+
+    ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
+    ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
+    ``minor``: effects that are significant but immaterial; they stay in the model and are no causes.
+    ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
+    ``effect.parameter``, with their ``covariance``.
+    """
+
+    verdict: Verdict
+    says: str
+    unit: str
+    full_scale_load_n: float
+    full_scale_reading: float
+    causes: tuple[Cause, ...] = ()
+    minor: tuple[str, ...] = ()
+    data_faults: tuple[DataFault, ...] = ()
+    baseline: GoodnessOfFit | None = None
+    extended: GoodnessOfFit | None = None
+    gain: Gain | None = None
+    explainable_percent: float = 0.0
+    explained_percent: float = 0.0
+    rivals: tuple[Rival, ...] = ()
+    next_experiment: NextExperiment | None = None
+    limits: tuple[str, ...] = ()
+    leftover: str | None = None
+    screening: tuple[tuple[str, float], ...] = ()
+    likeness: Array | None = None
+    model: ExtendedModel | None = None
+    baseline_model: ExtendedModel | None = None
+    traces: tuple[Trace, ...] = field(default=())
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    covariance: tuple[tuple[float, ...], ...] = ()
+    thresholds: Thresholds = field(default_factory=Thresholds)
+
+    def calibration(self, *, unit: str = "", sample_rate_hz: float = 100.0, created: str = "") -> Calibration:
+        """The extended model as a calibration, for `compensate`, `export` and a twin.
+
+        Raises `NotIdentifiableError` where the diagnosis was refused.
+        """
+        from smartshoe.calibration import extended_calibration
+
+        if self.model is None:
+            raise NotIdentifiableError(f"there is no model to calibrate by: {self.says}")
+        return extended_calibration(
+            self.model,
+            unit=unit,
+            parameters=self.parameters,
+            covariance=self.covariance,
+            load_range_n=(0.0, self.full_scale_load_n),
+            sample_rate_hz=sample_rate_hz,
+            created=created,
+        )
+
+    def plot(self) -> Figure:
+        """A figure: by recording, what the baseline and the extended model leave of the reading over time.
+
+        Raises `NotIdentifiableError` where the diagnosis was refused.
+        """
+        if not self.traces:
+            raise NotIdentifiableError(f"there is no model to plot: {self.says}")
+        figure, axes = panels(len(self.traces))
+        for axis, trace in zip(axes, self.traces, strict=True):
+            for label, simulated, colour in (("baseline", trace.baseline, "0.6"), ("extended", trace.extended, "C0")):
+                left = np.where(trace.usable, trace.reading - simulated, np.nan)
+                axis.plot(trace.time_s, left, linewidth=0.8, color=colour, label=label)
+            axis.set(title=trace.name, xlabel="time (s)", ylabel=f"measured minus model ({self.unit})")
+            axis.legend(loc="upper right")
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        rows = [
+            [
+                cause.name.replace("_", " "),
+                significant(cause.confidence, 2),
+                significant(100.0 * cause.size, 3),
+                significant(cause.held_out.gain_percent, 3),
+            ]
+            for cause in self.causes
+        ]
+        return SummaryTable(
+            f"{self.verdict.replace('_', ' ')}: {self.says}",
+            ["cause", "confidence", "size % of full scale", "gain on held-out data %"],
+            rows,
+            self.limits,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Schema ``smartshoe.diagnosis/1``."""
+        nothing: dict[str, Any] = {"rmse": {}, "fit_percent": None, "force_rmse_n": None}
+        return {
+            "schema": "smartshoe.diagnosis/1",
+            "verdict": self.verdict,
+            "says": self.says,
+            "causes": [cause.to_dict() for cause in self.causes],
+            "minor_effects": list(self.minor),
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
+            "baseline": self.baseline.to_dict() if self.baseline else nothing,
+            "extended": self.extended.to_dict() if self.extended else nothing,
+            "held_out": self.gain.to_dict() if self.gain else None,
+            "explainable_percent": self.explainable_percent,
+            "explained_percent": self.explained_percent,
+            "rivals": [{"effect": rival.effect, "margin": finite_or_none(rival.margin)} for rival in self.rivals],
+            "next_experiment": self.next_experiment.to_dict() if self.next_experiment else None,
+            "limits": list(self.limits),
+            "leftover": self.leftover,
+            "screening": [{"effect": name, "fall": fall} for name, fall in self.screening],
+            "thresholds": described(self.thresholds),
+            "model": self.model.to_dict() if self.model else None,
+        }

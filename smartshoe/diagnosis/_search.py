@@ -1,0 +1,63 @@
+"""The set of effects with the most evidence: forward, with drops and swaps, over one linearisation."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
+
+MOST_MEMBERS = 7
+BREADTH = 5
+SWAPS = 3
+
+
+def allowed(evidence: Evidence, found: Posterior) -> bool:
+    """Whether every member's strengths lie on the side that physics allows, and no two cancel each other.
+
+    Members that are each far larger than all of them together fit by their difference, which is neither's.
+    """
+    if sum(size**2 for size in found.sizes) > (evidence.thresholds.clear * found.together) ** 2:
+        return False
+    return all(
+        evidence.given.candidates[m].has_sign_of(s)
+        for m, s in zip(found.members, found.strengths, strict=True)
+        if len(s) == 1 and evidence.given.candidates[m].name not in evidence.given.model.names
+    )
+
+
+def additions(evidence: Evidence, members: Members, breadth: int = BREADTH, banned: Collection[str] = ()) -> list[int]:
+    """Candidates that promise most beside ``members``, one shape an effect, best first."""
+    taken = {evidence.given.candidates[m].slot for m in members}
+    best: dict[str, tuple[float, int]] = {}
+    for score, k, strengths in evidence.extensions(members):
+        one = evidence.given.candidates[k]
+        if one.slot in taken or one.name in banned:
+            continue
+        if one.name not in evidence.given.model.names and len(strengths) == 1 and not one.has_sign_of(strengths):
+            continue
+        if one.name not in best or score < best[one.name][0]:
+            best[one.name] = (score, k)
+    return [k for _, k in sorted(best.values())[:breadth]]
+
+
+def step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
+    """The best set that one addition, drop or swap makes of ``start``, or ``start`` itself."""
+    best = evidence.posterior(start)
+    trials: list[Posterior] = []
+    if len(best.members) < MOST_MEMBERS:
+        trials += [evidence.posterior((*best.members, k)) for k in additions(evidence, best.members, BREADTH, banned)]
+    for member in best.members:
+        less = tuple(m for m in best.members if m != member)
+        trials.append(evidence.posterior(less))
+        trials += [evidence.posterior((*less, k)) for k in additions(evidence, less, SWAPS, banned)]
+    return min([best, *(one for one in trials if allowed(evidence, one))], key=lambda one: one.score)
+
+
+def search(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
+    """The best set that forward steps, drops and swaps find from ``start``."""
+    best = evidence.posterior(start)
+    while True:
+        found = step(evidence, best.members, banned)
+        if found.score >= best.score - 1e-6:
+            return best
+        best = found

@@ -1,0 +1,230 @@
+"""Sensitivities of the reading to everything that could be wrong: the columns that all inference works on.
+
+The model is linearised about a fit. Its own parameters, each effect of the catalogue at each point of its shapes, and
+each flexible block give columns; an effect that is already in the model gives its whole contribution. Each recording
+has nuisances of its own, an offset and what an earlier load left in the relaxing arm; they are marginalised exactly
+(flat and Gaussian priors), so that no zero is ever assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.signal import lfilter
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.models.effects import Effect, blocks, catalogue
+from smartshoe.models.extended import ExtendedModel
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect, or a flexible block, at one point of its shapes, and where its strengths' columns stand."""
+
+    effect: Effect
+    shape: Mapping[str, float]
+    columns: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """The effect's identifier."""
+        return self.effect.name
+
+    @property
+    def slot(self) -> str:
+        """Of what there is one in a set: a law, or a flexible block in its place, of each family."""
+        return self.effect.imitates or self.effect.family
+
+    def start(self, strengths: Array) -> Array:
+        """Parameter values (p,) with these changes of the strengths from null, within their bounds."""
+        values = self.effect.start(self.shape)
+        k = 0
+        for j, parameter in enumerate(self.effect.parameters):
+            if parameter.null is not None:
+                values[j] = min(max(parameter.null + strengths[k], parameter.lower), parameter.upper)
+                k += 1
+        return values
+
+    def has_sign_of(self, strengths: Array) -> bool:
+        """Whether changes (k,) of the strengths lie on the side of null that physics allows."""
+        bounded = [p for p in self.effect.parameters if p.null is not None]
+        return all(
+            (p.lower < p.null or value >= 0.0) and (p.upper > p.null or value <= 0.0)
+            for p, value in zip(bounded, strengths, strict=True)
+            if p.null is not None
+        )
+
+
+def available(sessions: Sequence[Session]) -> list[Effect]:
+    """Physical effects and flexible blocks whose channels were logged throughout.
+
+    Not those that shift load or reading by one value, which no waveform tells from a recording's own offset
+    (`smartshoe.diagnosis._zero`).
+    """
+    channels = (("temperature", "temperature_k"), ("neighbour", "neighbour"))
+    has = {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
+    flexible = [block for family in blocks().values() for block in family]
+    found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
+    return [e for e in found if e.needs <= has and not e.is_refinement]
+
+
+def nuisances(session: Session, rate_per_s: float) -> Array:
+    """(n, 2): one, and exp(-a t), the memory that the unit brings along from before the recording."""
+    time_s = session.conditions.time_s
+    return np.column_stack([np.ones(time_s.size), np.exp(-rate_per_s * (time_s - time_s[0]))])
+
+
+def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
+    """(2, 2) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
+
+    A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
+    rest still carries some of what went before.
+    """
+    held = abs(model.relaxing_share) * abs(model.gain)
+    begun = float(np.abs(session.conditions.load[0]))
+    sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
+    return np.diag([0.0, 1.0 / sd**2])
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Inner products of the target and all columns, nuisances marginalised, in order: target, then columns.
+
+    ``sessions``: one matrix (m, m) a session; ``whole`` their sum.
+    """
+
+    sessions: tuple[Array, ...]
+
+    @property
+    def whole(self) -> Array:
+        """(m, m) over all sessions."""
+        return np.asarray(sum(self.sessions))
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A model's columns over what may be fitted.
+
+    ``rows``, a session each (n, m): target, own parameters, candidates' strengths. The target is the residual with the
+    contributions of the model's effects put back. ``own``: number of baseline columns. Columns are scaled so that a
+    coefficient is the rms by which it moves the reading, in shares of full scale; ``scales`` (m,) undoes that.
+    """
+
+    model: ExtendedModel
+    sessions: tuple[Session, ...]
+    rows: tuple[Array, ...]
+    scales: Array
+    own: int
+    candidates: tuple[Candidate, ...]
+    thresholds: Thresholds
+
+    def place(self, name: str) -> tuple[int, ...]:
+        """Candidates (their numbers) of an effect."""
+        return tuple(k for k, one in enumerate(self.candidates) if one.name == name)
+
+    @cached_property
+    def gram(self) -> Gram:
+        """Inner products with flat nuisances."""
+        return Gram(tuple(marginal(rows, one, self.model) for rows, one in zip(self.rows, self.sessions, strict=True)))
+
+    def noise_sd(self) -> float:
+        """Standard deviation of what no column reaches, noise or structure, each correlation time counted once."""
+        whole = self.gram.whole
+        part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
+        found = np.linalg.solve(part, whole[1:, 0])
+        left = []
+        for session, rows in zip(self.sessions, self.rows, strict=True):
+            residual = rows[:, 0] - rows[:, 1:] @ found
+            mask = session.fitted
+            columns = nuisances(session, self.model.relaxation_rate_per_s)
+            fit = np.linalg.lstsq(columns[mask], residual[mask], rcond=None)[0]
+            left.append(residual - columns @ fit)
+        masks = [session.fitted for session in self.sessions]
+        return correlated_sd(left, masks)
+
+
+def marginal(rows: Array, session: Session, model: ExtendedModel) -> Array:
+    """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
+    seen = np.column_stack([rows, nuisances(session, model.relaxation_rate_per_s)])[session.fitted]
+    gram = seen.T @ seen
+    last = gram[-2:, -2:]
+    last += 1e-12 * max(float(np.trace(last)), 1e-12) * np.eye(2)
+    cross = gram[-2:, :-2]
+    return np.asarray(gram[:-2, :-2] - cross.T @ np.linalg.solve(last, cross))
+
+
+def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Linearised:
+    """The columns about ``model``."""
+    fitted = tuple(session for session in sessions if session.fitted.any())
+    inside = {part.name: part for part in model.parts}
+    outside = [e for e in available(fitted) if e.name not in inside]
+    candidates: list[Candidate] = []
+    place = 4
+    for part in model.parts:
+        candidates.append(Candidate(part.effect, _shape_of(part.effect, part.values), (place,)))
+        place += 1
+    for effect in outside:
+        strengths = sum(parameter.null is not None for parameter in effect.parameters)
+        for shape in effect.shapes:
+            candidates.append(Candidate(effect, shape, tuple(range(place, place + strengths))))
+            place += strengths
+    beyond = [model.extended_by(one.effect, one.effect.start(one.shape)) for one in candidates[len(model.parts) :]]
+    less = [model.without(part.name) for part in model.parts]
+    rows = []
+    for session in fitted:
+        reading, slopes = model.sensitivities(session.conditions)
+        trace = model.trace(session.conditions)
+        within = [reading - one.simulate(session.conditions) for one in less]
+        beside = [model.column_of(by, session.conditions, trace) for by in beyond]
+        target = session.reading - reading + sum(within, np.zeros(reading.size))
+        rows.append(np.column_stack([target, slopes[:, :3], *within, *beside]))
+    power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(rows, fitted, strict=True))
+    count = sum(int(s.fitted.sum()) for s in fitted)
+    scales = np.sqrt(np.asarray(power) / count)
+    scales[0] = 1.0
+    scales[scales == 0] = 1.0
+    return Linearised(model, fitted, tuple(part / scales for part in rows), scales, 3, tuple(candidates), thresholds)
+
+
+def _shape_of(effect: Effect, values: Array) -> dict[str, float]:
+    return {p.name: float(v) for p, v in zip(effect.parameters, values, strict=True) if p.null is None}
+
+
+MODULATORS = 9
+
+
+def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
+    """(n, 9) a session: the directions in which a law departs from an equation of its kind, each of the column's rms.
+
+    ``column`` (n,) is the equation's own signature. A law of the same kind has its size depend otherwise on the load,
+    the direction, the rate and the time, or follows with other time constants: the signature times smooth functions of
+    these, and its lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
+    """
+    out = []
+    for session, own in zip(given.sessions, column, strict=True):
+        load, rate = session.conditions.load, session.conditions.rate_per_s
+        time_s, step_s = session.conditions.time_s, session.conditions.step_s
+        still = given.thresholds.still_per_s
+        linear = 2.0 * load - 1.0
+        direction = rate / np.sqrt(rate**2 + still**2)
+        speed = np.log10(1.0 + np.abs(rate) / still) - 1.0
+        elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
+        factors = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5]
+        lags = [_lag(own, step_s, tau_s) - own for tau_s in given.thresholds.memory_s]
+        out.append(np.column_stack([*(own * factor for factor in factors), *lags]))
+    power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(out, given.sessions, strict=True))
+    size = sum(float(np.sum(own[s.fitted] ** 2)) for own, s in zip(column, given.sessions, strict=True))
+    ratio = np.sqrt(size / np.maximum(np.asarray(power), 1e-300))
+    return [part * np.minimum(ratio, 1e6) for part in out]
+
+
+def _lag(signal: Array, step_s: float, tau_s: float) -> Array:
+    keep = float(np.exp(-step_s / tau_s))
+    start = np.array([keep * signal[0]])
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=start)[0])

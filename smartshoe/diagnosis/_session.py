@@ -1,0 +1,315 @@
+"""Recordings made ready for diagnosis: shares of full scale, smoothed alike, thinned, cut into load cycles.
+
+Load and reading pass the same short zero-phase filter. Linear physics commutes with it, so that nothing is falsified;
+noise on the reference load, which would make a smoother prediction fit better and so imitate a lag or a dead band, is
+mostly gone; and a fit costs a fraction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from smartshoe.arrays import Array, Index, Mask
+from smartshoe.diagnosis._denoise import noise_sd, without_noise
+from smartshoe.diagnosis._jittered import as_sampled
+from smartshoe.errors import NotIdentifiableError
+from smartshoe.models.effects import Conditions
+from smartshoe.recording import Channel, Recording
+from smartshoe.signals.loading import turning_points
+from smartshoe.signals.masks import bridged, runs_of
+from smartshoe.units import Unit
+
+SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
+LEAST_WINDOW = 3  # samples on either side of the average
+MOST_SAMPLES = 12_000
+MOST_COARSENED = 6.0  # times: for the sake of speed
+# Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
+CYCLE_SHARE = 0.08
+HELD_OUT_EVERY = 3
+FEWEST_CYCLES = 6
+REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
+LOWEST_SHARE = 0.02
+REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What the shares are of, over all that is fitted: the largest load in N and the span of the reading in ``unit``.
+
+    ``reading`` is negative where the reading falls as the load grows. ``zero`` is what is taken off every reading
+    before it is made a share: a convention of numbers that decides nothing, since each recording's offset is free.
+    """
+
+    load_n: float
+    reading: float
+    unit: Unit
+    zero: float = 0.0
+
+    def share(self, values: Array) -> Array:
+        """Readings (n,) in ``unit`` as shares."""
+        return (values - self.zero) / self.reading
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One recording on an even grid, in shares of full scale (`smartshoe.models.effects.Conditions`).
+
+    ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
+    kept from every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
+    ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
+    """
+
+    recording: Recording
+    index: int
+    conditions: Conditions
+    reading: Array
+    usable: Mask
+    held_out: Mask
+    cycle: Index
+    resting: Mask
+    thinned: int
+    displacement: Array | None = None
+
+    @property
+    def fitted(self) -> Mask:
+        """(n,) the samples that a fit may use."""
+        return self.usable & ~self.held_out
+
+    @property
+    def judged(self) -> Mask:
+        """(n,) the samples that a fit must not use, for judging it."""
+        return self.usable & self.held_out
+
+
+def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask]) -> Scale:
+    """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
+
+    Raises `NotIdentifiableError` where load or reading never changes.
+    """
+    unit = recordings[0].sensor.unit
+    pairs = [
+        (recording.force_n[mask], recording.sensor.in_unit(unit)[mask])
+        for recording, mask in zip(recordings, usable, strict=True)
+        if mask.any()
+    ]
+    load = max((float(np.percentile(np.abs(force), 99.9)) for force, _ in pairs), default=0.0)
+    # The span of each recording by itself: their zeros may differ by more than the load moves the reading.
+    spans = [float(np.ptp(np.percentile(values, [0.1, 99.9]))) for _, values in pairs]
+    if load <= 0 or not spans or max(spans) <= 0:
+        raise NotIdentifiableError(
+            f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
+        )
+    slope = sum(float(np.dot(force - force.mean(), values - values.mean())) for force, values in pairs)
+    zero = 0.0
+    if unit.quantity != "pressure":
+        zero = float(np.median(np.concatenate([values[lowest(force)] for force, values in pairs])))
+    return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
+
+
+def lowest(load_n: Array) -> Mask:
+    """(n,) samples at the lowest load, within a fiftieth of its span."""
+    low, high = float(np.percentile(load_n, 0.1)), float(np.percentile(load_n, 99.9))
+    return np.asarray(load_n <= low + LOWEST_SHARE * (high - low))
+
+
+def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
+    """By how much the samples may be thinned so that the fastest ramp keeps its shape."""
+    factors = []
+    for recording in recordings:
+        step_s = recording.sample_time_s
+        load = recording.force_n / scale.load_n
+        window = max(1, round(0.05 / step_s))
+        if load.size <= 2 * window:
+            factors.append(1)
+            continue
+        slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
+        fastest = float(np.percentile(slope, 99.5))
+        ramp_s = 0.8 / fastest if fastest > 0 else recording.duration_s
+        factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s)))
+    total = sum(len(recording) for recording in recordings)
+    shape = min(factors)
+    return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))
+
+
+def prepare(
+    recordings: Sequence[Recording], usable: Sequence[Mask], held_out: Sequence[bool] | None, scale: Scale, factor: int
+) -> list[Session]:
+    """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out."""
+    sessions = []
+    left_behind: dict[str, dict[str, float]] = {}
+    for index, (recording, mask) in enumerate(zip(recordings, usable, strict=True)):
+        before = left_behind.get(recording.metadata.get("continues", ""), {})
+        session = _session(recording, index, mask, scale, factor, before)
+        left_behind[recording.name] = _left_behind(session.conditions)
+        sessions.append(session)
+    if held_out is not None:
+        return [
+            replace(session, held_out=np.full(session.reading.size, out))
+            for session, out in zip(sessions, held_out, strict=True)
+        ]
+    kept = []
+    count = 0
+    for session in sessions:
+        number = session.cycle + count
+        kept.append(replace(session, held_out=number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1))
+        count = int(number[-1]) + 1
+    return kept
+
+
+def at_full_rate(sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale) -> list[Session]:
+    """The same sessions without thinning: cycles and what is held out as they are."""
+    return [
+        _session(one.recording, one.index, mask, scale, 1, one.conditions.before, one)
+        for one, mask in zip(sessions, usable, strict=True)
+    ]
+
+
+def _session(
+    recording: Recording,
+    index: int,
+    usable: Mask,
+    scale: Scale,
+    factor: int,
+    before: Mapping[str, float],
+    like: Session | None = None,
+) -> Session:
+    time_s = recording.time_s - recording.time_s[0]
+    step_s = recording.sample_time_s
+    load_n, load_present = recording.force_n, recording.load.present
+    reading = recording.sensor.in_unit(scale.unit)
+    good = usable & recording.sensor.present & load_present
+    reading = bridged(time_s, reading, good)
+    load_n = bridged(time_s, load_n, load_present)
+    extra = {}
+    temperature = _named(recording, "temperature")
+    if temperature is not None:
+        extra["temperature_k"] = temperature.si - temperature.si[0]
+    neighbour = _neighbour(recording)
+    if neighbour is not None:
+        extra["neighbour"] = neighbour.in_unit(scale.unit) / abs(scale.reading)
+    crosshead = _named(recording, "displacement")
+    displacement = crosshead.si if crosshead is not None else None
+    if not recording.is_uniform:
+        even = step_s * np.arange(int(time_s[-1] / step_s) + 1)
+        nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
+        good = good[nearest] & (np.abs(time_s[nearest] - even) < step_s)
+        load_n, reading = np.interp(even, time_s, load_n), np.interp(even, time_s, reading)
+        extra = {name: np.interp(even, time_s, values) for name, values in extra.items()}
+        displacement = None if displacement is None else np.interp(even, time_s, displacement)
+        time_s = even
+    # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
+    weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
+    raw = load_n / scale.load_n
+    raw_noise = noise_sd(raw)
+    load, noise = without_noise(raw, step_s, raw_noise)
+    load = as_sampled(load, scale.share(reading), step_s)
+    low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
+    base = min(low, REST_SHARE)
+    beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
+    conditions = Conditions(
+        time_s[::factor],
+        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, raw_noise), weights, factor),
+        step_s * factor,
+        noise * float(np.sqrt(np.sum(weights**2))),
+        temperature_k=beside.get("temperature_k"),
+        neighbour=beside.get("neighbour"),
+        before=before,
+    )
+    kept = smoothed(good.astype(float), weights, factor) > 0.7
+    load = conditions.load
+    if like is None:
+        held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions)
+    else:
+        nearest = np.minimum((np.arange(load.size) + like.thinned // 2) // like.thinned, like.cycle.size - 1)
+        held_out, cycle = like.held_out[nearest], like.cycle[nearest]
+    return Session(
+        recording,
+        index,
+        conditions,
+        smoothed(scale.share(reading), weights, factor),
+        kept,
+        held_out,
+        cycle,
+        np.abs(load - base) < REST_SHARE,
+        factor,
+        smoothed(displacement, weights, factor) if displacement is not None else None,
+    )
+
+
+def _rests_levelled(load: Array, level: float, noise: float) -> Array:
+    """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise."""
+    out = load.copy()
+    for first, last in zip(*runs_of(load < level), strict=True):
+        part = load[first:last]
+        middle = float(np.median(part))
+        still = np.abs(part - middle) < REST_NOISE * noise
+        if still.sum() > 10:
+            out[first:last][still] = part[still].mean()
+    return out
+
+
+def kernel(factor: int) -> Array:
+    """A Hann window over two thinned steps: weights of a zero-phase average, sum one."""
+    if factor <= 1:
+        return np.ones(1)
+    window = np.hanning(2 * factor + 1)[1:-1]
+    return np.asarray(window / window.sum())
+
+
+def smoothed(signal: Array, weights: Array, factor: int) -> Array:
+    """(m,) ``signal`` (n,) averaged and thinned; the ends are mirrored through their end points, slope kept."""
+    half = weights.size // 2
+    if not half:
+        return np.array(signal[::factor], dtype=float)
+    left = 2 * signal[0] - signal[half:0:-1]
+    right = 2 * signal[-1] - signal[-2 : -half - 2 : -1]
+    return np.convolve(np.concatenate([left, signal, right]), weights, "valid")[::factor]
+
+
+def _named(recording: Recording, name: str) -> Channel | None:
+    found = recording.channels.get(name)
+    return found if found is not None and found.role == "auxiliary" else None
+
+
+def _neighbour(recording: Recording) -> Channel | None:
+    """Another unit's reading beside the one that is diagnosed."""
+    quantity = recording.sensor.unit.quantity
+    others = [c for c in recording.of_role("auxiliary") if c.unit.quantity == quantity and c.name != "reference"]
+    return others[0] if others else None
+
+
+def _cycles(conditions: Conditions) -> Index:
+    load = conditions.load
+    threshold = CYCLE_SHARE * min(1.0, max(float(np.ptp(load)), 1e-9))
+    points = turning_points(load, threshold)
+    # A cycle begins at the foot of a rise; the foot of a rest is its last sample at the low level.
+    feet = [p for p, q in pairwise(points) if load[q] - load[p] > threshold]
+    starts = []
+    for foot in feet:
+        level = load[foot] + 0.25 * threshold
+        end = foot
+        while end + 1 < load.size and load[end + 1] <= level:
+            end += 1
+        starts.append(end)
+    if len(starts) < FEWEST_CYCLES:
+        parts = np.arange(load.size) * (2 * FEWEST_CYCLES) // load.size
+        return np.asarray(parts, dtype=np.intp)
+    cycle = np.zeros(load.size, dtype=np.intp)
+    cycle[starts[1:]] = 1
+    return np.cumsum(cycle)
+
+
+def _left_behind(conditions: Conditions) -> dict[str, float]:
+    load = conditions.load
+    before = conditions.before
+    rises = sum(load[b] > load[a] for a, b in pairwise(turning_points(load, CYCLE_SHARE)))
+    return {
+        "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
+        "cycles": before.get("cycles", 0.0) + rises,
+        "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
+        "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),
+    }

@@ -1,0 +1,145 @@
+"""Offset and tare: what a recording's own zero may be called a cause for, by evidence of its own.
+
+Every recording's offset is free in every fit, so that no effect depends on it. It is named where it is seen: a gauge
+sensor's reading of an unloaded unit is its zero; an unloaded machine's load is its cell's tare. Where the unit is
+never unloaded, either may make the same offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._session import REST_SHARE, Scale, Session
+from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.extended import ExtendedModel
+
+FIRST_REST_S = 0.5
+MOST_REST_S = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Zero:
+    """``value`` of the effect's one parameter (share of full scale) with its standard deviation.
+
+    ``size`` it moves the reading by; ``alternatives`` that this data cannot tell from it.
+    """
+
+    effect: Effect
+    value: float
+    sd: float
+    size: float
+    alternatives: tuple[str, ...] = ()
+
+
+def shift_of(signal: str) -> Effect:
+    """The catalogue's effect that adds one value to the "load" or to the "reading"."""
+    return next(e for e in catalogue().values() if e.shifts == signal)
+
+
+def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
+    """(fitted sessions,) each recording's own offset under ``model``, shares of full scale."""
+    return np.array(
+        [own_of(one, model, one.reading - model.simulate(one.conditions))[0][0] for one in sessions if one.fitted.any()]
+    )
+
+
+def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
+    """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
+
+    Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
+    by then, which is taken out: the third column is how much that is.
+    """
+    found = []
+    for session in sessions:
+        load = session.conditions.load
+        resting = session.resting.copy()
+        command = session.recording.command_n
+        if command is not None:
+            # By the command alone: a large tare lifts the load out of what looks like a rest.
+            full = float(np.max(np.abs(command))) or 1.0
+            nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
+            resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < REST_SHARE)
+        moved = np.flatnonzero(~resting)
+        most = max(1, round(MOST_REST_S / session.conditions.step_s))  # drifts have not begun
+        first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
+        kept = session.fitted[first]
+        if kept.sum() * session.conditions.step_s >= FIRST_REST_S:
+            drifted = float(np.mean(_drifted(session, model)[first][kept]))
+            reading = float(np.mean(session.reading[first][kept])) - drifted
+            found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
+    return np.array(found).reshape(-1, 3)
+
+
+def _drifted(session: Session, model: ExtendedModel) -> Array:
+    """(n,) by how much the model's effects that move the reading at rest have moved it."""
+    still = model
+    for part in model.parts:
+        if part.effect.is_seen_at_rest:
+            still = still.without(part.name)
+    return model.simulate(session.conditions) - still.simulate(session.conditions)
+
+
+def zeros_of(
+    sessions: Sequence[Session],
+    model: ExtendedModel,
+    scale: Scale,
+    left: float,
+    remembered: float,
+    thresholds: Thresholds,
+) -> tuple[Zero, ...]:
+    """What is named of the zeros, largest first; ``left``: rms of the structure that the model does not explain.
+
+    Such structure may lie at rest as anywhere. ``remembered``: size of the effects with a memory of the wall.
+    """
+    if scale.unit.quantity != "pressure":
+        return ()
+    rests = first_rests(sessions, model)
+    sensor, machine = shift_of("reading"), shift_of("load")
+    if not rests.size:
+        return _unseen(sessions, model, left, remembered, sensor, machine, thresholds)
+    loads, readings, drifted = rests.T
+    sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
+    load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
+    reading_sd = float(np.hypot(reading_sd, thresholds.departure * np.mean(np.abs(drifted))))
+    load, reading = float(np.mean(loads)), float(np.mean(readings))
+    many = thresholds.zero_deviations
+    if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
+        return ()  # a convention of the sensor's; or the reading agrees with the load, and the unit bears it
+    named = []
+    if abs(load) >= many * load_sd:
+        named.append(Zero(machine, -load, load_sd, abs(load * model.gain)))
+    if abs(reading) >= many * reading_sd:
+        named.append(Zero(sensor, reading * model.gain, reading_sd, abs(reading * model.gain)))
+    return tuple(sorted(named, key=lambda one: -one.size))
+
+
+def _unseen(
+    sessions: Sequence[Session],
+    model: ExtendedModel,
+    left: float,
+    remembered: float,
+    sensor: Effect,
+    machine: Effect,
+    thresholds: Thresholds,
+) -> tuple[Zero, ...]:
+    """The zero of a unit that is never seen unloaded at first: by its model, and either of the two may be it."""
+    found = offsets(sessions, model)
+    mean = float(np.mean(found))
+    fitted = [one for one in sessions if one.fitted.any()]
+    begun = float(np.mean([abs(one.conditions.load[0]) for one in fitted]))
+    lowest = min(float(np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01)) for one in fitted)
+    scatter = float(np.std(found, ddof=1) / np.sqrt(found.size)) if found.size > 1 else 0.0
+    # What the unit remembers of an unknown past, beyond what its one arm does; the curve below the lowest load; drifts.
+    past = begun * (thresholds.departure * abs(model.relaxing_share) + remembered)
+    below = thresholds.departure * lowest
+    drifted = thresholds.departure * float(np.mean([np.ptp(_drifted(one, model)) for one in fitted]))
+    sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
+    if abs(mean) > thresholds.foreign_zero or abs(mean) < thresholds.zero_deviations * sd:
+        return ()
+    return (Zero(sensor, mean, sd, abs(mean), (machine.name,)),)

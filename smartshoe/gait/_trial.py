@@ -1,0 +1,233 @@
+"""A trial's shoes: recordings sorted into feet, each on an even time base with its units' loads."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.errors import InputError, MissingChannelError, UnitError, UsageError
+from smartshoe.gait._estimate import UnitLoad, calibration_of, estimate
+from smartshoe.gait._flag import Flag
+from smartshoe.recording import REGIONS, UNITS_OF_A_SHOE, Channel, Recording
+
+if TYPE_CHECKING:
+    from smartshoe.calibration import Calibration
+
+
+FEET = ("left", "right")
+GAP_STEPS = 2.5
+NEGATIVE = 10.0  # times further below zero than above it, loads count tension
+FEWEST_STEPS_PER_S = 0.2
+CALM_S, CALM_SHARE = 0.1, 0.2  # a fifth of the time at least a foot is in the air
+LEAST_RATE_HZ = 40.0
+FEWEST_SAMPLES = 8
+_QUANTITIES = frozenset({"force", "pressure", "voltage", "counts", "resistance", "length", "unknown", "dimensionless"})
+
+
+@dataclass(frozen=True, eq=False)
+class Foot:
+    """One shoe's loads: ``load`` (n, r) on the even times ``time_s`` (n,), a column a region, or fewer.
+
+    ``turned`` says that its loads came negative and their sign was turned.
+    """
+
+    name: str
+    time_s: Array
+    rate_hz: float
+    units: tuple[UnitLoad, ...]
+    source: str
+    turned: bool = False
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """The units' regions, in the columns' order."""
+        return tuple(unit.name.split("_", 1)[-1] for unit in self.units)
+
+    @property
+    def load(self) -> Array:
+        """(n, r) loads as estimated, floors and all."""
+        return np.column_stack([unit.load for unit in self.units])
+
+    @property
+    def sd_n(self) -> Array | None:
+        """(n,) the error bar of the units' sum in N; None without an estimator that gives one."""
+        known = [unit.sd_n for unit in self.units if unit.sd_n is not None]
+        return np.asarray(np.sqrt(np.sum(np.square(known), axis=0))) if len(known) == len(self.units) else None
+
+    @property
+    def is_force(self) -> bool:
+        """Whether every unit's load is in N."""
+        return all(unit.is_force for unit in self.units)
+
+    @property
+    def missing(self) -> Mask:
+        """(n,) where any unit has no sample."""
+        return np.asarray(np.any([unit.missing for unit in self.units], axis=0))
+
+
+def feet_of(
+    recordings: Sequence[Recording], calibrations: Sequence[Calibration], estimator: str | None = None
+) -> tuple[dict[str, Foot], list[Flag]]:
+    """The feet of one trial, and what was noticed on the way.
+
+    One recording may hold both shoes; two recordings hold one each. Columns without a side belong to the side that
+    the recording's unit, name or file gives away. Raises `InputError` where no unit of a shoe is there, `UsageError`
+    where two recordings or two calibrations claim the same unit, `UnitError` for units that are no loads.
+    """
+    if not recordings:
+        raise UsageError("a trial needs at least one recording: give one")
+    by_name = _by_unit(calibrations)
+    feet: dict[str, Foot] = {}
+    flags: list[Flag] = []
+    used: set[str] = set()
+    for number, recording in enumerate(recordings):
+        sides, said = _sides(recording, number, set(feet))
+        flags += said
+        for foot, channels in sides.items():
+            if foot in feet:
+                raise UsageError(
+                    f"{recording.label} and {feet[foot].source} both hold the {foot} shoe: give one trial at a time"
+                )
+            feet[foot] = _foot(foot, recording, channels, by_name, estimator)
+            used |= {u.name for u in feet[foot].units} | set(feet[foot].regions)
+    for name in sorted(set(by_name) - used):
+        flags.append(
+            Flag("unused_calibration", f"the calibration of {name or 'an unnamed unit'} fits no column of the trial")
+        )
+    return {name: feet[name] for name in FEET if name in feet}, flags
+
+
+def _by_unit(calibrations: Sequence[Calibration]) -> Mapping[str, Calibration]:
+    found: dict[str, Calibration] = {}
+    for calibration in calibrations:
+        if calibration.unit in found:
+            raise UsageError(
+                f"two calibrations are for unit {calibration.unit or '(unnamed)'!r}: give one, or name their units"
+                " with identify --unit"
+            )
+        found[calibration.unit] = calibration
+    return found
+
+
+def _sides(
+    recording: Recording, number: int, taken: set[str]
+) -> tuple[dict[str, list[tuple[str, Channel]]], list[Flag]]:
+    named = {name: channel for name, channel in recording.channels.items() if name in UNITS_OF_A_SHOE}
+    if not named:
+        raise MissingChannelError(
+            f"{recording.label} has no column of a shoe's unit: name them like left_heel_mbar or right_toe_n"
+            f" (columns: {', '.join(recording.channels) or 'none'})"
+        )
+    for name, channel in named.items():
+        if channel.unit.quantity not in _QUANTITIES:
+            raise UnitError(
+                f"{recording.label}: {name} is in {channel.unit.symbol}, which is no load and no reading of one: give"
+                " newton, or millibar with --calibration"
+            )
+    sides: dict[str, list[tuple[str, Channel]]] = {}
+    for foot in FEET:
+        found = [(f"{foot}_{region}", named[f"{foot}_{region}"]) for region in REGIONS if f"{foot}_{region}" in named]
+        if found:
+            sides[foot] = found
+    bare = [(region, named[region]) for region in REGIONS if region in named]
+    if not bare:
+        return sides, []
+    named_side = _side_named(recording)
+    foot = named_side or next((side for side in FEET if side not in taken and side not in sides), FEET[number % 2])
+    if foot in sides:
+        raise InputError(
+            f"{recording.label} holds {bare[0][0]} and {sides[foot][0][0]}: put left_ or right_ before the columns"
+        )
+    sides[foot] = [(f"{foot}_{region}", channel) for region, channel in bare]
+    if named_side is not None:
+        return sides, []
+    return sides, [
+        Flag(
+            "side_unknown",
+            f"{recording.label} does not say which foot it is and is taken as the {foot} one: put left_ or right_"
+            " before its columns",
+            foot=foot,
+        )
+    ]
+
+
+def _side_named(recording: Recording) -> str | None:
+    for text in (recording.unit or "", recording.metadata.get("side", ""), recording.name, recording.source):
+        found = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", text.casefold())}
+        if len(found) == 1:
+            return found.pop()
+    return None
+
+
+def _foot(
+    foot: str,
+    recording: Recording,
+    channels: Sequence[tuple[str, Channel]],
+    by_name: Mapping[str, Calibration],
+    estimator: str | None,
+) -> Foot:
+    if len(recording) < FEWEST_SAMPLES:
+        raise InputError(f"{recording.label} holds {len(recording)} samples: a trial needs some seconds of them")
+    time_s, rate_hz, on_grid = _even(recording)
+    units = tuple(
+        estimate(n, on_grid(channel), rate_hz, calibration_of(by_name, n), estimator) for n, channel in channels
+    )
+    kinds = {unit.is_force for unit in units}
+    if len(kinds) == 2:
+        # Forces and readings cannot be added: loads of the units without a calibration count as readings of none.
+        bare = [unit.name for unit in units if not unit.is_force]
+        raise InputError(
+            f"{recording.label}: {', '.join(bare)} has no calibration and is not in N, the other units' loads are in N:"
+            " give its --calibration, or leave out its column"
+        )
+    turned = kinds == {True} and _is_upside_down(np.sum([unit.load for unit in units], axis=0), rate_hz)
+    if turned:
+        units = tuple(replace(unit, load=-unit.load) for unit in units)
+    return Foot(foot, time_s, rate_hz, units, recording.label, bool(turned))
+
+
+def _is_upside_down(load: Array, rate_hz: float) -> bool:
+    """Whether compression is negative in ``load`` (n,): mostly below zero, and at rest at its top where it steps.
+
+    A zero that is far off makes a load negative too; but a foot in the air is calm, and that is its lowest load.
+    """
+    low, high = (float(level) for level in np.quantile(load, [0.01, 0.99]))
+    if -low <= NEGATIVE * max(high, 0.0):
+        return False
+    above = load > 0.5 * (low + high)
+    steps = np.count_nonzero(above[1:] & ~above[:-1])
+    if steps < max(2.0, FEWEST_STEPS_PER_S * load.size / rate_hz):
+        return True
+    half = max(1, round(0.5 * CALM_S * rate_hz))
+    moves = np.abs(load[2 * half :] - load[: -2 * half])
+    calm = load[half:-half][moves <= np.quantile(moves, CALM_SHARE)]
+    return float(np.median(calm)) > 0.5 * (low + high)
+
+
+def _even(recording: Recording):  # type: ignore[no-untyped-def]  # the third is a function of a channel
+    """Even times (n,) with the recording's median step, their rate, and the way of a channel on to them."""
+    time_s = recording.time_s
+    step = recording.sample_time_s
+    if recording.is_uniform:
+        count = time_s.size
+        grid = time_s[0] + np.arange(count) * (time_s[-1] - time_s[0]) / (count - 1)
+        # Nine digits: a clock that starts elsewhere must not change the rate by its rounding.
+        return grid, float(f"{(count - 1) / (time_s[-1] - time_s[0]):.9g}"), lambda channel: channel
+    count = int(np.floor((time_s[-1] - time_s[0]) / step + 1e-6)) + 1
+    grid = time_s[0] + step * np.arange(count)
+    after = np.clip(np.searchsorted(time_s, grid), 1, time_s.size - 1)
+    hole = (time_s[after] - time_s[after - 1] > GAP_STEPS * step) & (np.abs(time_s[after] - grid) > 0.5 * step)
+    hole &= np.abs(time_s[after - 1] - grid) > 0.5 * step
+
+    def placed(channel: Channel) -> Channel:
+        present = channel.present
+        values = np.interp(grid, time_s[present], channel.values[present]) if present.any() else np.zeros(count)
+        missing = hole | (np.interp(grid, time_s, (~present).astype(float)) > 0.5)
+        return replace(channel, values=values, missing=missing if missing.any() else None)
+
+    return grid, 1.0 / step, placed

@@ -1,0 +1,122 @@
+"""`SwingZero`: while a foot is surely in swing its units bear nothing, so what they show then is their zero."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from smartshoe.arrays import Array
+from smartshoe.errors import UsageError
+from smartshoe.gait.field._swings import swings
+
+WINDOW_S, HOP_S = 4.0, 0.5  # two strides of a slow walk; how often it is looked at
+AGREEING, WITHIN_S = 3, 10.0  # so many swings, within so long, must agree before anything moves
+AGREE = 0.03  # of the rise: how far the swings' levels may lie apart
+SLEW_PER_S = 0.001  # of full scale: 8 K in ten minutes move sealed air by a quarter of that
+MOST = 0.35  # of full scale: 8 K are 16 % of what 800 N read in a 200 mbar range, 32 % in the toe's 100 mbar
+LEAST_RISE = 0.15  # of full scale, all units together: no sway of a standing person makes that
+
+
+class SwingZero:
+    """Forces of one foot's units in, the same less their zero out, on a stream; the zero is renewed in swing only.
+
+    The zero moves when three swings within ten seconds, each a flat valley of 0.15 to 1 s between two stances, agree;
+    then by at most ``slew_per_s`` of full scale, and never further than ``most`` of it. A load that stays (standing,
+    a bag in the shoe, a foot that rests for more than a second) has no such valleys, so it is kept for ever. What it
+    cannot tell from a zero is a load that is the same in every swing (tight lacing).
+
+    Feed it compensated forces: in raw readings the silicone's relaxation is still there in swing.
+    """
+
+    def __init__(
+        self,
+        units: int = 4,
+        *,
+        sample_rate_hz: float,
+        full_scale: float = 800.0,
+        slew_per_s: float = SLEW_PER_S,
+        most: float = MOST,
+    ) -> None:
+        for name, value in (("sample_rate_hz", sample_rate_hz), ("full_scale", full_scale), ("slew_per_s", slew_per_s)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise UsageError(f"{name} is {value:g}: give a number above 0")
+        if units < 1:
+            raise UsageError(f"{units} units: give the units of one foot, one at least")
+        self.sample_rate_hz, self.full_scale = float(sample_rate_hz), float(full_scale)
+        self.slew, self.most = slew_per_s * full_scale, most * full_scale
+        self._hop = max(1, round(HOP_S * sample_rate_hz))
+        self._window = max(2, round(WINDOW_S * sample_rate_hz))
+        self._units = units
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to a zero of 0, nothing seen."""
+        self.zero: Array = np.zeros(self._units)
+        self.swings = 0
+        self._recent = np.empty((0, self._units))
+        self._last = np.zeros(self._units)
+        self._count = 0
+        self._used = 0
+        self._moved_at = 0
+        self._levels: list[tuple[int, Array, float]] = []
+
+    def push(self, forces: ArrayLike) -> Array:
+        """Forces (n, units) less the zero as it was known at each sample; any chunking gives the same.
+
+        A value that is not finite holds the last one. Raises `UsageError` for another number of units.
+        """
+        block = np.atleast_2d(np.asarray(forces, dtype=float))
+        if block.ndim != 2 or block.shape[1] != self._units:
+            raise UsageError(f"forces are of shape {block.shape}: give (samples, {self._units})")
+        block = self._held(block)
+        out = np.empty_like(block)
+        at = 0
+        while at < block.shape[0]:
+            take = min(self._hop - self._count % self._hop, block.shape[0] - at)
+            part = block[at : at + take]
+            out[at : at + take] = part - self.zero
+            self._recent = np.concatenate([self._recent, part])[-self._window :]
+            self._count += take
+            at += take
+            if self._count % self._hop == 0:
+                self._look()
+        return out
+
+    def _held(self, block: Array) -> Array:
+        finite = np.isfinite(block)
+        if not finite.all():
+            whole = np.vstack([self._last, block])
+            there = np.vstack([np.ones(self._units, dtype=bool), finite])
+            index = np.maximum.accumulate(np.where(there, np.arange(whole.shape[0])[:, None], 0), axis=0)
+            block = np.take_along_axis(whole, index, axis=0)[1:]
+        if block.shape[0]:
+            self._last = block[-1].copy()
+        return block
+
+    def _look(self) -> None:
+        first = self._count - self._recent.shape[0]
+        total = self._recent.sum(axis=1)
+        for swing in swings(total, self.sample_rate_hz, LEAST_RISE * self.full_scale):
+            if first + swing.start < self._used:
+                continue
+            self._used = first + swing.stop
+            rise = float(np.quantile(total, 0.98) - np.quantile(total, 0.02))
+            self._levels.append((self._used, self._recent[swing.middle].mean(axis=0), rise))
+            self._renew()
+
+    def _renew(self) -> None:
+        oldest = self._used - round(WITHIN_S * self.sample_rate_hz)
+        self._levels = [level for level in self._levels if level[0] >= oldest][-AGREEING:]
+        if len(self._levels) < AGREEING:
+            return
+        seen = np.array([level for _, level, _ in self._levels])
+        rise = min(level[2] for level in self._levels)
+        if float(np.ptp(seen, axis=0).max()) > AGREE * rise:
+            return
+        self.swings += 1
+        # A pause counts as ten seconds at most: what moved meanwhile is followed from here on.
+        passed = min(self._used - self._moved_at, self._used - oldest)
+        most = self.slew * passed / self.sample_rate_hz
+        step = np.clip(np.median(seen, axis=0) - self.zero, -most, most)
+        self.zero = np.clip(self.zero + step, -self.most, self.most)
+        self._moved_at = self._used

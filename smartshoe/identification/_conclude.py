@@ -1,0 +1,234 @@
+"""From a fit to an `Identification`: parameters with intervals, nuisances with error bars, refusals with reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.errors import NotIdentifiableError
+from smartshoe.identification._estimator import ParameterFit
+from smartshoe.identification._experiment import kept_of
+from smartshoe.identification._identification import Identification
+from smartshoe.identification._parametrisation import GreyBox
+from smartshoe.identification._prediction_error import LARGEST_DELAY_S
+from smartshoe.identification._uncertainty import CURVED, Function, profile_interval, t_quantile
+from smartshoe.models import X_OVER_NRT, Parameter
+from smartshoe.signals.loading import rate_range
+from smartshoe.units import Unit
+
+WORST_RELATIVE_SD = 1.0  # of the pole; beyond it the interval holds every relaxation time
+WORST_RELATIVE_GAIN_SD = 0.2
+NAMES = ("a1", "b0", "b1", "k1", "k2", "c")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the caller asked for, as far as the result tells of it. ``newtons`` N per reading unit, None: estimated."""
+
+    unit: str
+    method: str
+    structure: str
+    reading_unit: Unit
+    newtons: float | None
+    load_zero_free: bool
+    sources: tuple[str, ...]
+
+
+def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
+    """Parameters with covariance (delta method, or likelihood profile) at the fit's theta."""
+    problem, theta = fit.problem, fit.theta
+    settings, experiments = problem.settings, problem.experiments
+    if fit.degrees < 1:
+        raise NotIdentifiableError(f"{where}: {problem.count} samples for {problem.size} unknowns: record more")
+    notes = list(fit.notes)
+    quantile = t_quantile(fit.degrees)
+    values, slope, scale = _parameters(fit, choice)
+    if not np.isfinite(values).all() or values[0] <= 0:
+        raise NotIdentifiableError(
+            f"{where}: the fit ends at a1 = {values[0]:.3g}, which is no stable model: check the load's sign and which"
+            " column is the reading"
+        )
+    covariance = slope @ fit.covariance @ slope.T
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    spread = _spread_of_output(fit)
+    _require_determined(where, fit, values, sd, spread)
+    intervals = [(value - quantile * d, value + quantile * d) for value, d in zip(values, sd, strict=True)]
+    if sd[0] > CURVED * values[0] and fit.evaluation is not None:
+        intervals = [
+            profile_interval(problem, theta, fit.evaluation, fit.variance, quantile, _function(fit, choice, index))
+            if sd[index] > 0
+            else interval
+            for index, interval in enumerate(intervals)
+        ]
+        notes.append("the pole is poorly determined: its intervals are those of the likelihood profile")
+    unit_text = f"N/{choice.reading_unit.symbol}"
+    units = ("1/s", unit_text, f"N/({choice.reading_unit.symbol} s)", "1", "1", "s")
+    parameters = {
+        name: Parameter(float(value), float(d), (float(low), float(high)), text)
+        for name, value, d, (low, high), text in zip(NAMES, values, sd, intervals, units, strict=True)
+    }
+    output_unit = "N" if settings.direction == "inverse" else choice.reading_unit.symbol
+    offsets, load_offsets = _offsets(fit, choice, float(values[2] / values[0]), slope, quantile)
+    states = {}
+    for index, experiment in enumerate(experiments):
+        at = None if problem.state_at is None else problem.state_at + index
+        spread_of_state = 0.0 if at is None else np.sqrt(max(fit.covariance[at, at], 0.0))
+        states[experiment.name] = Parameter.from_sd(problem.state(theta, index), spread_of_state, output_unit, quantile)
+    delay_s, delay_sd = problem.delay_s(theta), 0.0
+    if problem.delay_at is not None:
+        delay_sd = float(np.sqrt(max(fit.covariance[problem.delay_at, problem.delay_at], 0.0)))
+        if abs(delay_s) > 0.98 * LARGEST_DELAY_S:
+            notes.append(f"the delay ran to its limit of {LARGEST_DELAY_S:g} s: check that the logs start together")
+    if values[4] < 0:
+        notes.append("k2 is negative: the reading leads the load, which no standard linear solid does")
+    used = [experiment for experiment in experiments if experiment.kept.any()]
+    loads = [kept_of(experiment.load_n, experiment.kept) for experiment in used]
+    cost = fit.cost if fit.estimator == "output_error" else _plain_cost(fit)
+    return Identification(
+        unit=choice.unit,
+        direction=settings.direction,
+        method=choice.method,
+        structure=choice.structure,
+        estimator=fit.estimator,
+        parameters=parameters,
+        covariance=covariance,
+        offsets=offsets,
+        load_offsets=load_offsets,
+        delay_s=Parameter.from_sd(delay_s, delay_sd, "s", quantile),
+        initial_states=states,
+        noise={
+            "load": Parameter.from_sd(fit.noise.get("load", 0.0), 0.0, "N"),
+            "reading": Parameter.from_sd(fit.noise.get("reading", 0.0), 0.0, choice.reading_unit.symbol),
+        },
+        fit_percent=100.0 * (1.0 - float(np.sqrt(cost / spread))) if spread > 0 else float("nan"),
+        rmse=float(np.sqrt(cost / problem.count)),
+        rmse_unit=output_unit,
+        iterations=fit.iterations,
+        converged=fit.converged,
+        sample_rate_hz=float(f"{1.0 / experiments[0].sample_time_s:.6g}"),  # free of rounding in the time stamps
+        reading_unit=choice.reading_unit,
+        scale=scale,
+        n_samples=problem.count,
+        n_missing=sum(experiment.n_missing for experiment in experiments),
+        load_range_n=(min(float(load.min()) for load in loads), max(float(load.max()) for load in loads)),
+        rate_range_n_per_s=rate_range((one.time_s, one.load_n) for one in experiments),
+        sources=choice.sources,
+        remarks=tuple(note for note in notes if note),
+        fit=fit,
+    )
+
+
+def _parameters(fit: ParameterFit, choice: Choice, theta: Array | None = None) -> tuple[Array, Array, float]:
+    """(a1, b0, b1, k1, k2, c), their derivative (6, size) over theta, and the scale."""
+    problem = fit.problem
+    theta = fit.theta if theta is None else theta
+    coefficients, to_coefficients = problem.coefficients(theta)
+    form = problem.form
+    if isinstance(form, GreyBox):
+        solid, to_solid = form.solid(theta[: problem.shape_size])
+        scale = form.scale
+    else:
+        solid, by_coefficients, scale = solid_of(coefficients, choice.newtons)
+        to_solid = by_coefficients @ to_coefficients
+    slope = np.zeros((6, problem.size))
+    slope[:3, : problem.shape_size], slope[3:, : problem.shape_size] = to_coefficients, to_solid
+    return np.concatenate([coefficients, solid]), slope, scale
+
+
+def _function(fit: ParameterFit, choice: Choice, index: int) -> Function:
+    def parameter(theta: Array) -> tuple[float, Array]:
+        values, slope, _ = _parameters(fit, choice, theta)
+        return float(values[index]), slope[index]
+
+    return parameter
+
+
+def solid_of(coefficients: Array, newtons: float | None) -> tuple[Array, Array, float]:
+    """(k1, k2, c), their Jacobian (3, 3) over (a1, b0, b1), and the scale; newtons None: c = 1 and scale free."""
+    a1, b0, b1 = (float(value) for value in coefficients)
+    static = b1 / a1
+    static_slope = np.array([-static / a1, 0.0, 1 / a1])
+    difference = b0 - static
+    difference_slope = np.array([0.0, 1.0, 0.0]) - static_slope
+    if newtons is None:
+        scale = difference / (X_OVER_NRT * a1)
+        scale_slope = difference_slope / (X_OVER_NRT * a1) - np.array([scale / a1, 0.0, 0.0])
+    else:
+        scale, scale_slope = newtons, np.zeros(3)
+    k1 = (static / scale - 1) / X_OVER_NRT
+    k1_slope = (static_slope - static / scale * scale_slope) / (scale * X_OVER_NRT)
+    k2 = difference / (scale * X_OVER_NRT)
+    k2_slope = (difference_slope - difference / scale * scale_slope) / (scale * X_OVER_NRT)
+    c_slope = k2_slope / a1 - np.array([k2 / a1**2, 0.0, 0.0])
+    if newtons is None:
+        return np.array([k1, k2, 1.0]), np.stack([k1_slope, k2_slope, np.zeros(3)]), scale
+    return np.array([k1, k2, k2 / a1]), np.stack([k1_slope, k2_slope, c_slope]), scale
+
+
+def _offsets(
+    fit: ParameterFit, choice: Choice, static: float, slope: Array, quantile: float
+) -> tuple[dict[str, Parameter], dict[str, Parameter]]:
+    """Per recording the reading at no load and the load cell's zero.
+
+    The one free constant stands for either: in the inverse direction it is the load's, and minus the static gain
+    times the reading's; in the forward direction the reading's, and minus the load's over the static gain.
+    """
+    problem, settings = fit.problem, fit.problem.settings
+    inverse = settings.direction == "inverse"
+    reading_fixed = Parameter.from_sd(settings.offset or 0.0, 0.0, choice.reading_unit.symbol)
+    load_fixed = Parameter.from_sd(settings.load_offset_n, 0.0, "N")
+    # The static gain b1/a1 as a function of theta, for the constant that has passed it.
+    a1 = float(problem.coefficients(fit.theta)[0][0])
+    gain_slope = (slope[2] - static * slope[0]) / a1
+    readings, loads = {}, {}
+    for index, experiment in enumerate(problem.experiments):
+        readings[experiment.name], loads[experiment.name] = reading_fixed, load_fixed
+        if problem.offset_at is None:
+            continue
+        own = np.zeros(problem.size)
+        own[problem.offset_at + index] = 1.0
+        constant = problem.constant(fit.theta, index)
+        if inverse == choice.load_zero_free:
+            value, gradient = constant, own
+        elif inverse:
+            value, gradient = -constant / static, -own / static + constant / static**2 * gain_slope
+        else:
+            value, gradient = -constant * static, -own * static - constant * gain_slope
+        sd = float(np.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0)))
+        if choice.load_zero_free:
+            loads[experiment.name] = Parameter.from_sd(value, sd, "N", quantile)
+        else:
+            readings[experiment.name] = Parameter.from_sd(value, sd, choice.reading_unit.symbol, quantile)
+    return readings, loads
+
+
+def _spread_of_output(fit: ParameterFit) -> float:
+    """Sum of squares of the output about its mean, over all samples that count."""
+    outputs = [kept_of(y, kept) for y, kept in zip(fit.problem.outputs, fit.problem.kept, strict=True)]
+    count = sum(output.size for output in outputs)
+    mean = sum(float(output.sum()) for output in outputs) / max(count, 1)
+    return sum(float(np.dot(output - mean, output - mean)) for output in outputs)
+
+
+def _plain_cost(fit: ParameterFit) -> float:
+    errors = [fit.problem.model_error(fit.theta, index)[kept] for index, kept in enumerate(fit.problem.kept)]
+    return sum(float(error @ error) for error in errors)
+
+
+def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array, spread: float) -> None:
+    """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself."""
+    static = values[2] / values[0]
+    gain_sd = float(np.sqrt(max(fit.covariance[fit.problem.shape_size - 1, fit.problem.shape_size - 1], 0.0)))
+    loose = gain_sd > WORST_RELATIVE_GAIN_SD * abs(fit.theta[fit.problem.shape_size - 1])
+    if static == 0.0 or (fit.cost > 0.5 * spread and (fit.degenerate or loose)):
+        raise NotIdentifiableError(
+            f"{where}: the reading does not follow the load, so that no gain can be found: record a load that rises and"
+            " falls well above the noise"
+        )
+    if fit.degenerate or not np.isfinite(sd).all() or sd[0] > WORST_RELATIVE_SD * values[0]:
+        raise NotIdentifiableError(
+            f"{where}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be told from these data:"
+            " record more triangles, at several rates, with rests between"
+        )

@@ -1,0 +1,274 @@
+"""Which noise the fit allows for, and the fit itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, cast
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.identification._instruments import Instruments, Source, solve_instrumental
+from smartshoe.identification._noise import MATTERS, input_noise_bias, noise_sds, output_variance
+from smartshoe.identification._prediction_error import EDGE_SAMPLES, PredictionError
+from smartshoe.identification._solve import Evaluation, Minimum, Solver, minimise
+from smartshoe.identification._srivc import srivc
+from smartshoe.identification._start import COARSE_SAMPLES, start, theta_at
+from smartshoe.identification._uncertainty import inverse_normal
+from smartshoe.recording import Recording
+
+Estimator = Literal["auto", "output_error", "errors_in_variables", "command", "cycles"]
+RATIO_ROUNDS = 4  # of fit and variance; the ratio enters weakly
+MOST_RATIO = 1e8
+DELAYS_TRIED = (-2.0, -1.0, 0.0, 1.0, 2.0)
+WEAK = 4.0  # standard errors by instruments over those of the plain fit
+
+
+@dataclass(frozen=True)
+class Termination:
+    """When a fit ends: at a relative change of theta, or after so many iterations."""
+
+    tolerance: float
+    max_iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterFit:
+    """theta of ``problem`` with its covariance, and how it was come by."""
+
+    problem: PredictionError
+    theta: Array
+    covariance: Array
+    variance: float
+    degrees: int
+    cost: float
+    degenerate: bool
+    iterations: int
+    converged: bool
+    estimator: str
+    noise: Mapping[str, float]
+    evaluation: Evaluation | None
+    notes: tuple[str, ...] = ()
+
+
+def estimate(
+    problem: PredictionError,
+    recordings: Sequence[Recording],
+    method: str,
+    estimator: Estimator,
+    noise: Mapping[str, float | None],
+    *,
+    prefilter_rad_s: float,
+    tolerance: float,
+    max_iterations: int,
+) -> ParameterFit:
+    """The fit by the ``estimator`` asked for, or by the one that the data ask for.
+
+    ``noise`` holds the standard deviations of load (N) and reading, None where they are to be estimated.
+    """
+    limits = Termination(tolerance, max_iterations)
+    fit = _output_error(problem, method, prefilter_rad_s, limits)
+    if not np.isfinite(fit.theta).all() or not np.isfinite(fit.cost):
+        return fit
+    known = _noise(problem, noise)
+    fit = replace(fit, noise=known)
+    input_sd = known["reading"] if problem.settings.direction == "inverse" else known["load"]
+    chosen = estimator
+    if estimator in ("auto", "output_error"):
+        concern = _concern(fit, input_sd)
+        if estimator == "output_error" or not concern or method == "srivc":
+            return replace(fit, notes=(*fit.notes, f"{concern}: choose another estimator")) if concern else fit
+        chosen = "command" if _has_command(problem) else "errors_in_variables"
+        fit = replace(fit, notes=(*fit.notes, f"{concern}: {_WHY[chosen]}"))
+    if chosen in ("command", "cycles"):
+        instrumental = _instrumental(fit, chosen, recordings, limits)
+        if estimator != "auto" or (instrumental.converged and not _is_weak(instrumental, fit)):
+            return instrumental
+        fit = replace(fit, notes=(*fit.notes[:-1], f"{concern}: {_WHY['errors_in_variables']}"))
+    return _errors_in_variables(fit, method, noise, limits)
+
+
+_WHY = {
+    "command": "so the commanded load was taken for the instruments",
+    "errors_in_variables": "so the noise of both signals was allowed for (errors in variables)",
+}
+
+
+def _noise(problem: PredictionError, noise: Mapping[str, float | None]) -> dict[str, float]:
+    load, reading = noise["load"], noise["reading"]
+    if load is None or reading is None:
+        seen = noise_sds(problem.experiments)
+        load, reading = (seen[0] if load is None else load), (seen[1] if reading is None else reading)
+    return {"load": load, "reading": reading}
+
+
+def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float, limits: Termination) -> ParameterFit:
+    theta = start(problem, prefilter_rad_s)
+    solver = "gn" if method == "srivc" else method
+    if method != "srivc" or problem.delay_at is not None:
+        found = _minimise(problem, theta, solver, limits)
+        iterations, converged = found.iterations, found.converged
+        # A delay of many samples reaches beyond the edges that were left out at first.
+        shortest_s = min(experiment.sample_time_s for experiment in problem.experiments)
+        edge = int(np.ceil(abs(problem.delay_s(found.theta)) / shortest_s)) + EDGE_SAMPLES
+        if problem.delay_at is not None and edge > EDGE_SAMPLES + 1:
+            problem.drop_edges(edge)
+            found = _minimise(problem, found.theta, solver, limits)
+            iterations, converged = iterations + found.iterations, found.converged
+        theta, seen = found.theta, found.evaluation
+    if method == "srivc":
+        # SRIVC has no delay of its own: it is found by prediction error, then SRIVC runs on the aligned signals.
+        delay_s = problem.delay_s(theta)
+        alpha, p1, p2, _, iterations, converged = srivc(
+            problem,
+            prefilter_rad_s=prefilter_rad_s,
+            tolerance=limits.tolerance,
+            max_iterations=limits.max_iterations,
+            delay_s=delay_s,
+        )
+        theta = theta_at(problem, alpha, p1, p2, delay_s, exact=True)
+        seen = problem.evaluate(theta)
+    return _settle(problem, theta, seen, iterations, converged, "output_error")
+
+
+def _minimise(problem: PredictionError, theta: Array, method: str, limits: Termination) -> Minimum:
+    return minimise(
+        problem, theta, cast(Solver, method), tolerance=limits.tolerance, max_iterations=limits.max_iterations
+    )
+
+
+def _settle(
+    problem: PredictionError, theta: Array, seen: Evaluation, iterations: int, converged: bool, estimator: str
+) -> ParameterFit:
+    degrees = problem.count - problem.size
+    inverse, degenerate = inverse_normal(seen.normal)
+    variance = seen.cost / max(degrees, 1)
+    return ParameterFit(
+        problem, theta, variance * inverse, variance, degrees, seen.cost, degenerate, iterations, converged,
+        estimator, {}, seen,
+    )  # fmt: skip
+
+
+def _concern(fit: ParameterFit, input_sd: float) -> str:
+    """What the input's noise does to the fit, in one clause; '' where it does not matter."""
+    if input_sd == 0.0 or fit.degrees < 1 or fit.degenerate or fit.evaluation is None:
+        return ""
+    problem = fit.problem
+    bias = input_noise_bias(problem, fit.theta, fit.evaluation.normal, input_sd)
+    values, slope = problem.coefficients(fit.theta)
+    shape = slice(0, problem.shape_size)
+    moved = slope @ bias[shape]
+    sd = np.sqrt(np.maximum(np.diag(slope @ fit.covariance[shape, shape] @ slope.T), 1e-300))
+    if np.max(np.abs(moved) / sd) < MATTERS:
+        return ""
+    signal = "reading" if problem.settings.direction == "inverse" else "load"
+    return (
+        f"the {signal} is noisy as well (about {input_sd:.3g}), which would move a1 by"
+        f" {100 * moved[0] / values[0]:.2g} % of itself in a fit that takes it for exact"
+    )
+
+
+def _has_command(problem: PredictionError) -> bool:
+    for experiment in problem.experiments:
+        command_n = experiment.command_n
+        if command_n is None or not np.isfinite(command_n).all() or np.ptp(command_n) == 0.0:
+            return False
+        if np.corrcoef(command_n, experiment.load_n)[0, 1] < 0.9:
+            return False
+    return True
+
+
+def _errors_in_variables(
+    fit: ParameterFit, method: str, noise: Mapping[str, float | None], limits: Termination
+) -> ParameterFit:
+    problem, inverse = fit.problem, fit.problem.settings.direction == "inverse"
+    input_sd, output_sd = (fit.noise["reading"], noise["load"]) if inverse else (fit.noise["load"], noise["reading"])
+    theta, iterations, converged = fit.theta.copy(), 0, fit.converged
+    # Means of neighbours first: they hold a fraction of the noise, above all of that in the delay's gradient.
+    for level in [problem.coarse(COARSE_SAMPLES), problem]:
+        factor = problem.count / max(level.count, 1)
+        for number in range(1 if output_sd else RATIO_ROUNDS):
+            # What the input's noise does not explain is the output's, model errors included: to call them input noise
+            # would overcorrect.
+            variance = factor * _mean_square(level, theta)
+            output = output_sd**2 if output_sd else output_variance(problem, theta, variance, input_sd)
+            ratio = min(input_sd**2 / output, MOST_RATIO) if output > 0 else MOST_RATIO
+            level = level.with_noise_ratio(ratio)
+            if number == 0:
+                # The likelihood may have several optima along the delay: every method sets out from the same one.
+                if level.settings.delay_s is None and iterations == 0:
+                    theta = _best_delay(level, theta, problem.experiments[0].sample_time_s)
+                else:
+                    theta = minimise(level, theta, "trf", tolerance=1e-6, max_iterations=100).theta
+            found = _minimise(level, theta, method, limits)
+            iterations, converged = iterations + found.iterations, found.converged
+            moved = float(np.max(np.abs(found.theta - theta) / (np.sqrt(np.diag(fit.covariance)) + 1e-300)))
+            theta = found.theta
+            if moved < 1e-3:
+                break
+    problem = level
+    settled = _settle(problem, theta, found.evaluation, fit.iterations + iterations, converged, "errors_in_variables")
+    # The noise in the gradient adds to the estimate's spread what it does not add to the curvature.
+    jacobian = problem.jacobian(theta)
+    inverse_of_signal = settled.covariance / settled.variance
+    covariance = settled.variance * inverse_of_signal @ (jacobian.T @ jacobian) @ inverse_of_signal
+    return replace(settled, covariance=covariance, noise=fit.noise, notes=fit.notes)
+
+
+def _best_delay(problem: PredictionError, theta: Array, sample_time_s: float) -> Array:
+    """The best of the optima about ``theta`` and a few samples of delay to either side.
+
+    Below a sample a plain fit's delay may be the noise's, and every method should set out from one place.
+    """
+    found = []
+    for samples in DELAYS_TRIED:
+        trial = theta.copy()
+        trial[problem.delay_at] = samples * sample_time_s + (
+            theta[problem.delay_at] if abs(theta[problem.delay_at]) > sample_time_s else 0.0
+        )
+        found.append(minimise(problem, trial, "trf", tolerance=1e-6, max_iterations=30))
+    return min(found, key=lambda minimum: minimum.evaluation.cost).theta
+
+
+def _is_weak(instrumental: ParameterFit, fit: ParameterFit) -> bool:
+    """Whether the instruments leave the response several times less certain than the plain fit does."""
+    shape = fit.problem.shape_size
+    return bool(np.any(np.diag(instrumental.covariance)[:shape] > WEAK**2 * np.diag(fit.covariance)[:shape]))
+
+
+def _mean_square(problem: PredictionError, theta: Array) -> float:
+    errors = [problem.model_error(theta, index)[kept] for index, kept in enumerate(problem.kept)]
+    return sum(float(error @ error) for error in errors) / max(problem.count - problem.size, 1)
+
+
+def _instrumental(
+    fit: ParameterFit, source: Source, recordings: Sequence[Recording], limits: Termination
+) -> ParameterFit:
+    readings = None
+    if source == "cycles":
+        from smartshoe.identification._cycles import averaged_reading
+
+        readings = [np.asarray(values, dtype=float) for values in averaged_reading(recordings)]
+    instruments = Instruments(fit.problem, source, readings)
+    theta, covariance, variance, iterations, converged = solve_instrumental(
+        instruments,
+        fit.theta,
+        np.sqrt(np.diag(fit.covariance)),
+        tolerance=limits.tolerance,
+        max_iterations=limits.max_iterations,
+    )
+    problem = fit.problem.with_noise_ratio(0.0)
+    problem.kept = instruments.usable
+    return replace(
+        fit,
+        problem=problem,
+        theta=theta,
+        covariance=covariance,
+        variance=variance,
+        cost=variance * fit.degrees,
+        iterations=fit.iterations + iterations,
+        converged=converged,
+        estimator=source,
+        evaluation=None,
+    )

@@ -1,0 +1,320 @@
+"""`Identification`: what the data say of a unit, and how well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.calibration import Calibration, Compensator
+from smartshoe.calibration.provenance import sha256_of
+from smartshoe.display import Summarised, SummaryTable, panels, significant
+from smartshoe.errors import RefusedError, UsageError
+from smartshoe.identification._consistency import ConsistencyTest, consistency_test
+from smartshoe.identification._estimator import ParameterFit
+from smartshoe.identification._experiment import Direction
+from smartshoe.identification._residual_tests import ResidualTest, residual_tests
+from smartshoe.kernels.blas import on_one_thread
+from smartshoe.models import Parameter, StandardLinearSolid, discretise
+from smartshoe.models.parameter import finite_or_none
+from smartshoe.recording import Recording
+from smartshoe.units import Unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SCHEMA = "smartshoe.identification/1"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Summarised):
+    """force / reading = (b0 s + b1)/(s + a1), Chinimilli 2016 (13), with its uncertainty.
+
+    ``parameters`` a1, b0, b1 (readings in ``reading_unit``) and k1, k2, c, whatever the ``direction``, which says
+    only which signal's error was minimised, and the ``estimator``, which says what noise was allowed for;
+    ``covariance`` (6, 6) in their order. By recording, ``offsets`` are the readings at no load, ``load_offsets`` the
+    load cell's zero (one of the two is fixed), ``initial_states`` the coefficients of the fading start. ``delay_s`` is
+    positive where the reading is later than the load. ``noise`` is the white noise of load and reading, ``scale`` N
+    per reading unit of the paper's force. ``rmse`` in N (inverse) or reading units (forward).
+    """
+
+    unit: str
+    direction: Direction
+    method: str
+    structure: str
+    estimator: str
+    parameters: Mapping[str, Parameter]
+    covariance: Array
+    offsets: Mapping[str, Parameter]
+    load_offsets: Mapping[str, Parameter]
+    delay_s: Parameter
+    initial_states: Mapping[str, Parameter]
+    noise: Mapping[str, Parameter]
+    fit_percent: float
+    rmse: float
+    rmse_unit: str
+    iterations: int
+    converged: bool
+    sample_rate_hz: float
+    reading_unit: Unit
+    scale: float
+    n_samples: int
+    n_missing: int
+    load_range_n: tuple[float, float]
+    rate_range_n_per_s: tuple[float, float]
+    sources: tuple[str, ...]
+    remarks: tuple[str, ...]
+    fit: ParameterFit = field(repr=False)
+
+    # -- what is left ----------------------------------------------------------------------------------------
+    @cached_property
+    def errors(self) -> Mapping[str, Array]:
+        """By recording, model minus measured (n,) at every sample, those that did not count too."""
+        problem = self.fit.problem
+        return {
+            experiment.name: experiment.of_recording(problem.model_error(self.fit.theta, index))
+            for index, experiment in enumerate(problem.experiments)
+        }
+
+    def predicted(self, recording: str | Recording) -> Array:
+        """What the model says of a recording of this fit.
+
+        Parameters
+        ----------
+        recording
+            Its name, or the recording itself.
+
+        Returns
+        -------
+        (n,) the reading in ``reading_unit`` (forward) or the load in N (inverse) at every sample, with the offsets,
+        the delay and the initial state as fitted.
+
+        Raises
+        ------
+        UsageError
+            Where the fit did not use this recording, or ``recording`` is neither a name nor a `Recording`.
+        """
+        if not isinstance(recording, (str, Recording)):
+            raise UsageError(f"recording is of type {type(recording).__name__}: give its name or the Recording")
+        name = recording if isinstance(recording, str) else recording.name
+        if name not in self.errors:
+            raise UsageError(f"recording {name!r} is not of this fit: use one of {', '.join(self.errors)}")
+        if isinstance(recording, Recording) and len(recording) != self.errors[name].size:
+            raise UsageError(
+                f"recording {name!r} has {len(recording)} samples, the one of that name in this fit"
+                f" {self.errors[name].size}: give the recording that was fitted"
+            )
+        return self._measured[name][1] + self.errors[name]
+
+    @cached_property
+    def _measured(self) -> Mapping[str, tuple[Array, Array]]:
+        """By recording, times (n,) from its start and the output, fixed zeros in it: errors are model minus this."""
+        settings = self.fit.problem.settings
+        inverse = settings.direction == "inverse"
+        zero = (settings.load_offset_n if inverse else settings.offset) or 0.0
+        return {
+            experiment.name: (
+                experiment.of_recording(experiment.time_s),
+                experiment.of_recording(output) + zero,
+            )
+            for experiment, output in zip(self.fit.problem.experiments, self.fit.problem.outputs, strict=True)
+        }
+
+    def plot(self) -> Figure:
+        """A figure: by recording, the measured signal with the model's, and below it measured minus model."""
+        figure, axes = panels(2 * len(self._measured), height=2.0)
+        quantity = "load" if self.direction == "inverse" else "reading"
+        for upper, lower, (name, (time_s, measured)) in zip(axes[::2], axes[1::2], self._measured.items(), strict=True):
+            upper.plot(time_s, measured, color="0.6", label="measured")
+            upper.plot(time_s, self.predicted(name), linewidth=1.0, label="model")
+            upper.set(title=name, ylabel=f"{quantity} ({self.rmse_unit})")
+            upper.legend(loc="upper right")
+            lower.plot(time_s, self.residuals[name], linewidth=0.8)
+            lower.set(xlabel="time (s)", ylabel=f"residual ({self.rmse_unit})")
+        return figure
+
+    def _summary_table(self) -> SummaryTable:
+        shown = {
+            **self.parameters,
+            "delay": self.delay_s,
+            **{f"offset ({name})": one for name, one in self.offsets.items()},
+        }
+        rows = [
+            [
+                name,
+                significant(one.value, 6),
+                significant(one.sd, 2),
+                *(significant(end, 6) for end in one.ci95),
+                one.unit,
+            ]
+            for name, one in shown.items()
+        ]
+        return SummaryTable(
+            f"{self.unit}: {self.direction} fit by {self.method}, {self.estimator.replace('_', ' ')},"
+            f" fit {self.fit_percent:.2f} %, RMSE {significant(self.rmse)} {self.rmse_unit}",
+            ["parameter", "value", "sd", "95 % from", "to", "unit"],
+            rows,
+            self.notes,
+        )
+
+    @property
+    def residuals(self) -> Mapping[str, Array]:
+        """By recording, measured minus model (n,), NaN where a sample did not count."""
+        problem = self.fit.problem
+        return {
+            experiment.name: np.where(experiment.of_recording(kept), -self.errors[experiment.name], np.nan)
+            for experiment, kept in zip(problem.experiments, problem.kept, strict=True)
+        }
+
+    @cached_property
+    def fit_percent_by_recording(self) -> Mapping[str, float]:
+        """``fit_percent`` of each recording."""
+        problem = self.fit.problem
+        return {
+            experiment.name: fit_percent(y[kept], problem.model_error(self.fit.theta, index)[kept])
+            for index, (experiment, y, kept) in enumerate(
+                zip(problem.experiments, problem.outputs, problem.kept, strict=True)
+            )
+        }
+
+    @cached_property
+    def residual_tests(self) -> Mapping[str, ResidualTest]:
+        """Whiteness, and independence of the input."""
+        problem = self.fit.problem
+        errors = [problem.model_error(self.fit.theta, index) for index in range(len(problem.experiments))]
+        return residual_tests(problem, self.fit.theta, errors)
+
+    @cached_property
+    def consistency(self) -> ConsistencyTest:
+        """Whether c = 1, the paper's two-parameter form, agrees with the three coefficients (free structure only)."""
+        if self.structure != "free":
+            raise RefusedError("a grey box holds c by itself: ask for the consistency of a free fit")
+        return consistency_test(self.coefficients, self.covariance[:3, :3], scale=self.scale)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of this result, one sentence each."""
+        if self.residual_tests["whiteness"].p_value < 0.01:
+            return (
+                *self.remarks,
+                "the residual is not white: the error bars hold for white noise only and are too small here",
+            )
+        return self.remarks
+
+    @property
+    def coefficients(self) -> tuple[float, float, float]:
+        """a1 in 1/s, b0 in N per reading unit, b1 in that per s."""
+        return self.parameters["a1"].value, self.parameters["b0"].value, self.parameters["b1"].value
+
+    @property
+    def solid(self) -> StandardLinearSolid:
+        """The standard linear solid of the parameters k1, k2, c."""
+        return StandardLinearSolid(*(self.parameters[name].value for name in ("k1", "k2", "c")))
+
+    @property
+    def correlation(self) -> Array:
+        """(6, 6) correlations in the order of ``parameters``; 0 beside a fixed parameter."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        safe = np.where(sd > 0, sd, 1.0)
+        matrix: Array = np.clip(self.covariance / np.outer(safe, safe), -1.0, 1.0)
+        np.fill_diagonal(matrix, 1.0)
+        return matrix
+
+    @property
+    def offset(self) -> float:
+        """The reading at no load, the mean over recordings, in ``reading_unit``."""
+        return float(np.mean([parameter.value for parameter in self.offsets.values()]))
+
+    def discrete(self, sample_rate_hz: float | None = None) -> tuple[Array, Array]:
+        """Numerator and denominator of the bilinear filter, by default at the data's rate."""
+        return discretise(*self.coefficients, sample_rate_hz or self.sample_rate_hz, "bilinear")
+
+    def compensator(self, sample_rate_hz: float = 100.0) -> Compensator:
+        """The filter that turns readings (in ``reading_unit``) into force in N."""
+        a1, b0, b1 = self.coefficients
+        return Compensator(
+            a1, b0, b1, offset=self.offset, sample_rate_hz=sample_rate_hz, reading_unit=self.reading_unit
+        )
+
+    def calibration(self, created: str = "", *, unit: str | None = None) -> Calibration:
+        """The calibration to save, of ``unit`` (the recordings' own where it is not given).
+
+        ``created`` is an ISO date where the caller wants one in the file.
+        """
+        from smartshoe.version import __version__
+
+        a1, b0, b1 = self.coefficients
+        return Calibration(
+            a1=a1,
+            b0=b0,
+            b1=b1,
+            reading_unit=self.reading_unit,
+            offset=self.offset,
+            unit=self.unit if unit is None else unit,
+            parameters=dict(self.parameters),
+            covariance=tuple(tuple(float(value) for value in row) for row in self.covariance),
+            scale=self.scale,
+            delay_s=self.delay_s.value,
+            load_range_n=self.load_range_n,
+            rate_range_n_per_s=self.rate_range_n_per_s,
+            sample_rate_hz=self.sample_rate_hz,
+            sources=tuple({"name": source, "sha256": sha256_of(source)} for source in self.sources),
+            created=created,
+            smartshoe_version=__version__,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's object, schema smartshoe.identification/1; null where a number is not finite."""
+        numerator, denominator = self.discrete()
+        names = list(self.parameters)
+        return {
+            "schema": SCHEMA,
+            "unit": self.unit,
+            "direction": self.direction,
+            "method": self.method,
+            "parameters": {name: parameter.to_dict() for name, parameter in self.parameters.items()},
+            "offsets": {name: parameter.to_dict() for name, parameter in self.offsets.items()},
+            "delay_s": self.delay_s.to_dict(),
+            "correlation": {
+                "names": names,
+                "matrix": [[finite_or_none(value) for value in row] for row in self.correlation],
+            },
+            "fit_percent": finite_or_none(self.fit_percent),
+            "rmse": {"value": finite_or_none(self.rmse), "unit": self.rmse_unit},
+            "iterations": self.iterations,
+            "converged": self.converged,
+            "residual_tests": {name: test.to_dict() for name, test in self.residual_tests.items()},
+            "discrete": {
+                "sample_rate_hz": self.sample_rate_hz,
+                "numerator": [float(value) for value in numerator],
+                "denominator": [float(value) for value in denominator],
+            },
+            "structure": self.structure,
+            "initial_states": {name: state.to_dict() for name, state in self.initial_states.items()},
+            "fit_percent_by_recording": {
+                name: finite_or_none(value) for name, value in self.fit_percent_by_recording.items()
+            },
+            "covariance": [[finite_or_none(value) for value in row] for row in self.covariance],
+            "reading_unit": self.reading_unit.symbol,
+            "scale": self.scale,
+            "n_samples": self.n_samples,
+            "n_missing": self.n_missing,
+            "load_range_n": list(self.load_range_n),
+            "rate_range_n_per_s": list(self.rate_range_n_per_s),
+            "estimator": self.estimator,
+            "load_offsets": {name: parameter.to_dict() for name, parameter in self.load_offsets.items()},
+            "noise": {name: parameter.to_dict() for name, parameter in self.noise.items()},
+            "consistency": self.consistency.to_dict() if self.structure == "free" else None,
+            "notes": list(self.notes),
+        }
+
+
+@on_one_thread
+def fit_percent(y: Array, error: Array) -> float:
+    """100 (1 - ||error||/||y - mean y||), as MATLAB's compare has it."""
+    spread = float(np.linalg.norm(y - y.mean())) if y.size else 0.0
+    return 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0 else float("nan")

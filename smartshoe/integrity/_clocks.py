@@ -1,0 +1,268 @@
+"""Two clocks: a lag between load and reading that no relaxation, lag or friction of the unit explains.
+
+Increments of load and reading over equal bins are correlated window by window; a window's lag is the smallest one
+that correlates as well as the best. A unit with friction stands still after each reversal, which makes a plateau of
+lags from zero on, and a unit with relaxation answers a corner at once: both give zero. The lags are then a straight
+line over time (an offset and a rate). Last, the line must *earn* its place: load passed through a bank of relaxations,
+powers and stop operators must fit the reading much better on the shifted clock than on the given one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._scales import five_point_median
+from smartshoe.integrity._view import Signal, View
+from smartshoe.kernels.blas import on_one_thread
+
+LEAST_LAG_S = 0.2  # a lag of the sensor itself may look like half of that
+LEAST_LAG_SAMPLES = 5.0  # less is the delay of a logger, which a model holds
+LARGEST_LAG_S = 6.0
+LONG_LAG_S = 0.4  # no pressure sensor is so slow, and a unit that relaxes answers a corner at once
+UNANIMOUS = 4  # windows
+LEAST_CORRELATION = 0.3
+CLEAR = 0.7  # correlation
+MIRRORED = 0.5  # of the best correlation, negative at the opposite lag
+ONE_SINE = 0.9  # of the increments' power within five frequencies
+AS_GOOD = 0.98  # of the best correlation
+SMOOTH_S = (0.1, 0.3, 0.6)
+BINS = 4000
+MOVING = 0.05  # of the largest increment
+CUT = 6.0  # of the median increment
+WINDOWS = 8
+REPEATING = 0.8  # autocorrelation of the load's increments at a lag
+EARNED = 0.8  # of the squared error that is left without the shift
+EARNED_ALONE = 0.6  # the same where zero lag correlates nearly as well, as it does on long even ramps
+TIME_CONSTANTS_S = (0.05, 0.1, 0.2, 0.5, 1.5, 5.0, 15.0, 60.0)
+PLAY_WIDTHS = (0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.12, 0.16)  # of the load's span
+
+
+def align(view: View) -> View:
+    """The view with its load on the reading's clock, where the clocks differ; else as it was."""
+    line = _lag_line(view)
+    if line is None:
+        return view
+    offset_s, rate = line
+    middle = 0.5 * (view.time_s[0] + view.time_s[-1])
+    moved = view.time_s - offset_s - rate * (view.time_s - middle)
+    load = np.interp(moved, view.time_s, view.load.values)
+    return replace(view, load=Signal(load), offset_s=offset_s, rate=rate)
+
+
+def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
+    """Kind ``two_clocks``: every sample is late or early; nothing is masked."""
+    if view.offset_s == 0.0 and view.rate == 0.0:
+        return
+    half = 0.5 * float(view.time_s[-1] - view.time_s[0])
+    first, last = view.offset_s - view.rate * half, view.offset_s + view.rate * half
+    drift = abs(last - first) > max(LEAST_LAG_S, LEAST_LAG_SAMPLES * view.step_s)
+    course = f" (from {first:+.2f} s at the start to {last:+.2f} s at the end)" if drift else ""
+    yield Finding(
+        "two_clocks",
+        np.ones(len(view.recording), dtype=bool),
+        f"load and reading come from two clocks: the reading is {abs(view.offset_s):.2f} s"
+        f" {'late' if view.offset_s >= 0 else 'early'}{course}, at rising and at falling edges alike, more than the"
+        " unit's relaxation explains; align the clocks before any physics is named",
+    )
+
+
+def _lag_line(view: View) -> tuple[float, float] | None:
+    """Lag in s in the middle and its growth in s per s, or None where the clocks agree."""
+    duration_s = float(view.time_s[-1] - view.time_s[0])
+    if duration_s < 5.0 or np.ptp(view.load.values) == 0.0 or np.ptp(view.reading.values) == 0.0:
+        return None
+    bins = int(min(BINS, view.time_s.size // 2))
+    width_s = duration_s / bins
+    grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
+    load = _binned(view.time_s, five_point_median(view.load.values), grid, width_s)
+    reading = _binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
+    if _is_one_sine(load):
+        return None
+    for smooth_s in SMOOTH_S:  # as little as the noise allows, since smoothing blunts the edges
+        places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s)
+        if weights.size and float(np.median(weights)) >= CLEAR:
+            break
+    least = max(LEAST_LAG_S, LEAST_LAG_SAMPLES * view.step_s)
+    middle = 0.5 * (view.time_s[0] + view.time_s[-1])
+    before, repeating = None, _repeats_itself(load)
+    for lags, earned in ((smallest, EARNED), (best, EARNED_ALONE)):
+        if places.size == 0 or np.max(np.abs(lags)) <= least:
+            continue
+        offered = []
+        for offset_s, rate in _lines(places - middle, lags, weights):
+            ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
+            if np.max(np.abs(ends)) <= least:
+                continue
+            shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
+            after = _unexplained(grid, shifted, reading, smooth_s)
+            if lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate):
+                return offset_s, rate
+            offered.append((after, offset_s, rate))
+        if not offered:
+            continue
+        before = _unexplained(grid, load, reading, smooth_s) if before is None else before
+        after, offset_s, rate = min(offered)
+        if after < earned * before:
+            return offset_s, rate
+    return None
+
+
+def _is_one_sine(load: Array) -> bool:
+    """Whether the load is little more than one sine: its lag is a phase, which any relaxation has."""
+    power = np.abs(np.fft.rfft(np.diff(load))) ** 2
+    best = int(np.argmax(power))
+    return bool(power[max(best - 2, 0) : best + 3].sum() > ONE_SINE * power.sum())
+
+
+def _repeats_itself(load: Array) -> bool:
+    """Whether the load is periodic: windows then agree on a lag that may be wrong by a period."""
+    from scipy.signal import correlate
+
+    d = np.diff(load)
+    correlation = correlate(d, d, mode="full", method="fft")[d.size - 1 :]
+    correlation = correlation[: d.size // 2] / (correlation[0] * (1.0 - np.arange(d.size // 2) / d.size))
+    fallen = int(np.argmax(correlation < 0.0)) or correlation.size
+    return bool(np.max(correlation[fallen:], initial=0.0) > REPEATING)
+
+
+def _unanimous(places: Array, lags: Array, offset_s: float, rate: float) -> bool:
+    """Whether windows agree on a lag too long for a sensor's own: then edges need not be sharp enough to tell the two.
+
+    Counted are the windows in which the line itself is a long lag; hardly any of them may allow zero.
+    """
+    line = offset_s + rate * places
+    far = np.abs(line) > LONG_LAG_S
+    if far.sum() < UNANIMOUS or np.mean(lags[far] != 0.0) < 0.75:
+        return False
+    return bool(np.median(np.abs(lags - line)) < 0.25 * np.max(np.abs(line)))
+
+
+def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
+    """Means over bins, empty ones interpolated."""
+    place = np.minimum(((time_s - time_s[0]) / width_s).astype(np.intp), grid.size - 1)
+    count = np.bincount(place, minlength=grid.size)
+    total = np.bincount(place, weights=values, minlength=grid.size)
+    filled = count > 0
+    out: Array = np.interp(grid, grid[filled], total[filled] / count[filled])
+    return out
+
+
+def _window_lags(
+    grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float
+) -> tuple[Array, Array, Array, Array]:
+    """Middle, smallest and best lag in s and correlation, (w,) each, of windows in which load and reading both move."""
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth = max(smooth_s / width_s, 1.0)
+    d_load = gaussian_filter1d(load, smooth, order=1)
+    d_reading = gaussian_filter1d(reading, smooth, order=1)
+    moving = np.abs(d_load) > MOVING * np.max(np.abs(d_load))
+    limit = CUT * float(np.median(np.abs(d_reading[moving]))) + 1e-300
+    d_reading = np.clip(d_reading, -limit, limit)  # edges of dropouts and jumps
+    most = min(int(np.ceil(LARGEST_LAG_S / width_s)), grid.size // 6)
+    windows = int(max(1, min(WINDOWS, grid.size * width_s / 15.0)))
+    lags_bins = np.arange(-most, most + 1)
+    cumulated = np.cumsum(d_load**2)
+    cuts = np.searchsorted(cumulated, np.linspace(0.0, cumulated[-1], windows + 1))
+    places, smallest, peaks, weights = [], [], [], []
+    for first, last in pairwise(cuts):
+        low, high = max(int(first) - most, 0), min(int(last) + most, grid.size)
+        if high - low < 4 * most:
+            continue
+        correlation = _correlation(d_load[low:high], d_reading[low:high], most)
+        best = int(np.argmax(correlation))
+        if correlation[best] < LEAST_CORRELATION or correlation[-1 - best] < -MIRRORED * correlation[best]:
+            continue  # as much against it as for it, on both sides of zero: one is the other's rate, as in friction
+        good = np.flatnonzero(correlation >= AS_GOOD * correlation[best])
+        chosen = int(good[np.argmin(np.abs(lags_bins[good]))])
+        # Where zero is not as good as the best there is no plateau from zero on: the peak itself is the lag.
+        peak = float(lags_bins[best]) * width_s
+        power = d_load[low:high] ** 2
+        places.append(float(np.dot(power, grid[low:high]) / power.sum()))
+        smallest.append(peak if lags_bins[chosen] != 0 else 0.0)
+        peaks.append(peak)
+        weights.append(float(correlation[best]))
+    return np.array(places), np.array(smallest), np.array(peaks), np.array(weights)
+
+
+def _correlation(load: Array, reading: Array, most: int) -> Array:
+    """(2 most + 1,) correlation at lags -most..most bins; the reading's tail may lie beyond the window."""
+    from scipy.signal import correlate
+
+    load, reading = load - load.mean(), reading - reading.mean()
+    size = float(np.sqrt(np.dot(load, load) * np.dot(reading, reading)))
+    if size == 0.0:
+        return np.zeros(2 * most + 1)
+    full = correlate(reading, load, mode="full", method="fft") / size
+    middle = load.size - 1
+    out: Array = full[middle - most : middle + most + 1]
+    return out
+
+
+def _lines(places: Array, lags: Array, weights: Array) -> list[tuple[float, float]]:
+    """Offset and rate to try.
+
+    With four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), where it halves the scatter; then
+    the constant.
+    """
+    found = []
+    if places.size >= 4:
+        i, j = np.triu_indices(places.size, 1)
+        apart = places[j] - places[i] > 0.2 * np.ptp(places)
+        rate = float(np.median((lags[j] - lags[i])[apart] / (places[j] - places[i])[apart]))
+        left = lags - rate * places
+        if np.median(np.abs(left - np.median(left))) < 0.5 * np.median(np.abs(lags - np.median(lags))):
+            found.append((_middle(left, weights), rate))
+    return [*found, (_middle(lags, weights), 0.0)]
+
+
+def _middle(values: Array, weights: Array) -> float:
+    """The weighted median."""
+    order = np.argsort(values)
+    return float(values[order][np.searchsorted(np.cumsum(weights[order]) / weights.sum(), 0.5)])
+
+
+@on_one_thread
+def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float) -> float:
+    """Mean square of the reading's increments after all that a unit without a second clock might do to the load.
+
+    Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
+    """
+    from scipy.ndimage import gaussian_filter1d
+    from scipy.signal import lfilter
+
+    step_s = float(grid[1] - grid[0])
+    f = (load - load.min()) / np.ptp(load)
+    columns = [f, f**2, f**3]
+    for tau_s in TIME_CONSTANTS_S:
+        keep = float(np.exp(-step_s / tau_s))
+        columns.append(lfilter([1.0 - keep], [1.0, -keep], f, zi=[keep * f[0]])[0])
+    columns += list(_play(f))
+    smooth = max(smooth_s / step_s, 1.0)
+    matrix = gaussian_filter1d(np.stack(columns, axis=1), smooth, axis=0, order=1)
+    target = gaussian_filter1d(reading, smooth, order=1)
+    limit = CUT * float(np.median(np.abs(target[np.abs(matrix[:, 0]) > MOVING * np.max(np.abs(matrix[:, 0]))])))
+    target = np.clip(target, -limit, limit)
+    matrix /= np.linalg.norm(matrix, axis=0) + 1e-300
+    normal = matrix.T @ matrix
+    normal[np.diag_indices_from(normal)] += 1e-6
+    left = target - matrix @ np.linalg.solve(normal, matrix.T @ target)
+    return float(np.mean(left**2))
+
+
+def _play(load: Array) -> Array:
+    """(widths, n) play operators of the load, each of one width."""
+    width = np.array(PLAY_WIDTHS)
+    out = np.empty((load.size, width.size))
+    state = np.full(width.size, load[0])
+    low, high = load[:, None] - width, load[:, None] + width
+    for k in range(load.size):
+        state = np.minimum(np.maximum(state, low[k]), high[k])
+        out[k] = state
+    return out.T

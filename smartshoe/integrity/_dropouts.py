@@ -1,0 +1,164 @@
+"""Dropouts: the reading falls to the unloaded value, or to nothing, while the load stays.
+
+What is lost is the whole reading: it falls to one level, from whatever load. A reading that falls by one amount from
+whatever load (a level that switches), or that falls and wanders back (a draught over a sensor), has not dropped out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._held import held
+from smartshoe.integrity._spikes import isolated_beside
+from smartshoe.integrity._view import View
+from smartshoe.signals.masks import runs_of
+
+GONE = 0.25  # of the expected reading at most is left
+LEAST_EXPECTED = 0.03  # of the span: below, a dropout cannot be told from rest
+EDGE, BESIDE = 0.5, 5
+LET_GO = 0.3  # of the span
+BELOW_REST = 0.05  # of the span
+MOST_PASSES = 10  # two are usual; each finds less, since fewer are left
+LEVEL = 0.01  # of the span: within which dropouts end at one level
+CLEAR = 6.5  # standard deviations of noise, as of spikes
+STANDS = 0.005  # of the span: how far a level may wander within a dropout
+AT_LEVEL = 0.8  # of the samples: edges may be caught halfway
+COMMON, MOST_COMMON = 0.02, 20  # share of the samples, and how many such values
+FEWEST = 3  # falls of two samples at most
+
+
+def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
+    """Kind ``dropouts``; masked.
+
+    A value that another recording of the unit dropped to (``view.dropped_to``) needs no fall from a large load here.
+    """
+    if view.span == 0.0:
+        return
+    at = dropped(view)
+    if at.any() and not _one_level(view, at):
+        at[:] = False
+    known = np.union1d(view.sign * view.dropped_to, common_values(view.reading.values[at]))
+    for _ in range(MOST_PASSES):  # with those known cut out the noise is known better
+        more = _also_gone(view, at, known) & ~at
+        if not more.any():
+            break
+        at |= more
+    if not at.any():
+        return
+    starts, stops = runs_of(at)
+    yield Finding(
+        "dropouts",
+        view.whole(at),
+        f"the reading drops out {starts.size} times, for up to"
+        f" {float(np.max(view.time_s[stops - 1] - view.time_s[starts])) + view.step_s:.3g} s,"
+        f" to about {float(np.median(view.sign * view.reading.values[at])):.4g}"
+        f" {view.recording.sensor.unit.symbol}, while the load stays: {int(at.sum())} samples are left out",
+        masks=True,
+        values=view.sign * known,
+    )
+
+
+def dropped(view: View) -> Mask:
+    """(m,) samples of runs that are low although the load is on, or below rest, and begin and end abruptly."""
+    y = view.reading.values
+    above = view.expected - view.rest
+    noise = view.reading.noise
+    loaded = above > np.maximum(LEAST_EXPECTED * view.span, 8.0 * view.reading.quiet_noise)
+    low = loaded & (y < view.rest + GONE * above)
+    below = y < view.rest - np.maximum(BELOW_REST * view.span, 10.0 * noise)
+    out = np.zeros(y.size, dtype=bool)
+    jump, gap = view.jump, np.diff(view.time_s) > 1.6 * view.step_s
+    lost = np.where(below, view.rest - y, view.expected - y)
+    for first, stop in zip(*runs_of(low | below), strict=True):
+        ends_open = stop == y.size or bool(gap[stop - 1])
+        # Both edges make up most of what is lost. A spike just before or after is no edge.
+        falls = first > 0 and jump[first - 1] < -EDGE * lost[first]
+        falls = falls and _stood(y[max(first - BESIDE, 0) : first], y[first] + EDGE * lost[first])
+        rises = not ends_open and jump[stop - 1] > EDGE * lost[stop - 1]
+        rises = rises and _stood(y[stop : stop + BESIDE], y[stop - 1] + EDGE * lost[stop - 1])
+        if falls and rises:
+            out[first:stop] = True
+        elif falls and (ends_open or not loaded[stop]):
+            # The load went while the reading was gone. A contact that lets go at a low load jumps too.
+            out[first:stop] = above[first] > LET_GO * view.span or below[first]
+    return out
+
+
+def _stood(beside: Array, level: float) -> bool:
+    """Whether readings stood above a level: the second largest did, since one may be a spike and others be gone."""
+    return bool(np.sort(beside)[max(beside.size - 2, 0)] > level)
+
+
+def _also_gone(view: View, at: Mask, known: Array) -> Mask:
+    """(m,) samples at the level of known dropouts where load is too low to tell: isolated ones and held runs."""
+    y = view.reading.values
+    exact = np.isin(y, known)
+    near = exact | _near(view, float(np.median(y[at]))) if at.any() else exact
+    if not near.any():
+        return near
+    repeated = held(view, at)
+    repeated[:-1] |= repeated[1:] & (y[1:] == y[:-1])
+    out: Mask = (near & isolated_beside(view, at)) | (exact & repeated) | _fallen(view, exact)
+    return out
+
+
+def _fallen(view: View, exact: Mask) -> Mask:
+    """(m,) runs of ``exact`` values that stand clear of the noise of what is beside them."""
+    y = view.reading.values
+    out = np.zeros(y.size, dtype=bool)
+    for first, stop in zip(*runs_of(exact), strict=True):
+        beside = np.concatenate([y[max(first - BESIDE, 0) : first], y[stop : stop + BESIDE]])
+        out[first:stop] = beside.size > 0 and float(np.min(beside)) > y[first] + CLEAR * view.reading.noise[first]
+    return out
+
+
+def common_values(y: Array) -> Array:
+    """The values that dropouts take exactly, where they do: a rail, a zero, an error code."""
+    values, count = np.unique(y, return_counts=True)
+    common: Array = values[count >= max(COMMON * y.size, FEWEST)]
+    return common if common.size <= MOST_COMMON else common[:0]
+
+
+def _near(view: View, level: float) -> Mask:
+    out: Mask = np.abs(view.reading.values - level) <= 3.0 * view.reading.quiet_noise + LEVEL * view.span
+    return out
+
+
+def _one_level(view: View, at: Mask) -> bool:
+    """Whether falls end at one level, whatever the load was: the levels scatter less than what was lost.
+
+    One fall, or several from much the same load, must have taken most of a large reading. Short falls must be several
+    and from different loads: a spike may fall anywhere.
+    """
+    y = view.reading.values
+    starts, stops = runs_of(at)
+    if _near(view, float(np.median(y[at])))[at].mean() < AT_LEVEL:
+        return False
+    still = [_stands(y[a:b], view) for a, b in zip(starts, stops, strict=True)]
+    if float(np.average(still, weights=stops - starts)) < AT_LEVEL:
+        return False
+    before = y[np.maximum(starts - 1, 0)]
+    after = np.array([float(np.median(y[a:b])) for a, b in zip(starts, stops, strict=True)])
+    lost = np.maximum(before, view.expected[starts]) - after
+    noise = view.reading.quiet_noise + view.reading.step
+    if lost.max() < LET_GO * view.span or (starts.size > 2 and _scatter(after) > max(_scatter(lost), noise)):
+        return False
+    short = int((stops - starts).max()) <= 2
+    return not short or (starts.size >= FEWEST and float(np.ptp(view.expected[at])) > 0.2 * view.span)
+
+
+def _stands(part: Array, view: View) -> bool:
+    """Whether the reading stays where it fell to: it has lost its sensor, and is not on its way back."""
+    third = part.size // 3
+    if third < 2:
+        return True
+    moved = abs(float(part[-third:].mean() - part[:third].mean()))
+    return bool(moved <= 5.0 * view.reading.quiet_noise * (2.0 / third) ** 0.5 + STANDS * view.span)
+
+
+def _scatter(values: Array) -> float:
+    return float(np.median(np.abs(values - np.median(values))))

@@ -1,0 +1,156 @@
+"""`examine`: every detector over every recording, in an order in which none takes another's fault for its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.errors import InputError
+from smartshoe.integrity._clocks import align, two_clocks
+from smartshoe.integrity._dropouts import dropouts
+from smartshoe.integrity._fault import DataFault, Finding, Integrity
+from smartshoe.integrity._following import does_not_follow_load, wrong_sign
+from smartshoe.integrity._held import held_samples
+from smartshoe.integrity._lattice import quantisation
+from smartshoe.integrity._lines import hum
+from smartshoe.integrity._rails import low_rail, saturation
+from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
+from smartshoe.integrity._spikes import spikes
+from smartshoe.integrity._view import Signal, View
+from smartshoe.recording import Recording
+
+OF_RECORDING: tuple[Callable[[Recording], Iterator[Finding]], ...] = (
+    short_recording,
+    missing_samples,
+    gaps,
+    uneven_sampling,
+)
+# A saturated reading may follow too little: both are said. Dropouts and rails before held samples and spikes, which
+# they also look like; spikes where readings are not held.
+OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
+    saturation,
+    does_not_follow_load,
+    two_clocks,
+    wrong_sign,
+    dropouts,
+    low_rail,
+    held_samples,
+    spikes,
+    quantisation,
+    hum,
+)
+LEAST_USABLE = 0.5
+NONE: Array = np.zeros(0)
+
+
+def examine(recordings: Sequence[Recording]) -> Integrity:
+    """What is wrong with the data of ``recordings``, before any model; deterministic.
+
+    Each recording has one reference load and one reading; where it has not, that is its refusal. Raises `InputError`
+    where there is no recording at all.
+    """
+    if not recordings:
+        raise InputError("there is no recording to examine: give at least one file")
+    faults: list[DataFault] = []
+    usable: list[Mask] = []
+    offsets: list[tuple[float, float]] = []
+    refusals: list[str] = []
+    examined = [_examined(recording) for recording in recordings]
+    dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
+    if dropped_to.size and len(recordings) > 1:
+        # What one recording teaches about the unit holds for the others.
+        examined = [_examined(recording, dropped_to) for recording in recordings]
+    for number, (recording, (findings, mask, clock)) in enumerate(zip(recordings, examined, strict=True)):
+        faults += [_fault(number, recording, finding) for finding in findings]
+        refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
+        if not refused and mask.mean() < LEAST_USABLE:
+            refused = [
+                f"{recording.label}: {100 * (1 - float(mask.mean())):.0f} % of the samples are faulty"
+                f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
+            ]
+        usable.append(np.zeros_like(mask) if refused else mask)
+        offsets.append(clock)
+        refusals += refused[:1]
+    if len(refusals) < len(recordings):
+        refusals = []
+    return Integrity(
+        tuple(faults), tuple(usable), tuple(c[0] for c in offsets), tuple(c[1] for c in offsets), tuple(refusals)
+    )
+
+
+def _examined(recording: Recording, dropped_to: Array = NONE) -> tuple[list[Finding], Mask, tuple[float, float]]:
+    """The findings of one recording, its usable samples, its clock's offset and rate; ``dropped_to`` as in `View`."""
+    findings = [finding for detect in OF_RECORDING for finding in detect(recording)]
+    usable = np.ones(len(recording), dtype=bool)
+    for finding in findings:
+        if finding.masks:
+            usable &= ~finding.at
+    view = None
+    lacking = _lacking(recording)
+    if lacking is not None:
+        findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
+    elif not any(finding.refuses for finding in findings):
+        view = _view(recording, dropped_to)
+        if view is None:
+            says = "load and reading are hardly ever there at the same time: record them together"
+            findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
+    if view is None:
+        return findings, usable, (0.0, 0.0)
+    for detect in OF_VIEW:
+        bad = ~usable[view.index]
+        for finding in detect(view, bad):
+            findings.append(finding)
+            if finding.masks:
+                usable &= ~finding.at
+        if any(finding.severity == "fatal" for finding in findings):
+            break
+    return findings, usable, (view.offset_s, view.rate)
+
+
+def _lacking(recording: Recording) -> str | None:
+    """Why there is no pair of load and reading, or None."""
+    if not recording.of_role("load"):
+        commanded = recording.of_role("command")
+        said = f" ({commanded[0].name} is what was asked for, not what was measured)" if commanded else ""
+        return (
+            f"there is no reference load{said}: without it an error of the unit cannot be told from the load; name its"
+            " column with --force"
+        )
+    count = len(recording.sensors)
+    if count == 1:
+        return None
+    return (
+        f"there are {count} readings: name one with --sensor" if count else "there is no reading: name it with --sensor"
+    )
+
+
+def _view(recording: Recording, dropped_to: Array = NONE) -> View | None:
+    """The recording where load and reading are both present, on one clock, the reading rising with load."""
+    load, sensor = recording.load, recording.sensor
+    index = np.flatnonzero(load.present & sensor.present)
+    if index.size < 64:
+        return None
+    time_s, load_n, reading = recording.time_s[index], load.si[index], sensor.values[index]
+    view = View(recording, index, time_s, Signal(load_n), Signal(reading), 1, dropped_to=dropped_to)
+    at, middle, _ = view.curve
+    turned = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
+    if turned:
+        view = View(recording, index, time_s, Signal(load_n), Signal(-reading), -1, dropped_to=dropped_to)
+    return align(view)
+
+
+def _fault(number: int, recording: Recording, finding: Finding) -> DataFault:
+    at = np.flatnonzero(finding.at)
+    first, last = (int(at[0]), int(at[-1])) if at.size else (0, len(recording) - 1)
+    return DataFault(
+        finding.kind,
+        number,
+        recording.label,
+        float(recording.time_s[first]),
+        float(recording.time_s[last]),
+        float(finding.at.mean()),
+        finding.says,
+        finding.severity,
+    )

@@ -1,0 +1,192 @@
+"""Spectral lines: hum at any frequency, its own or folded, looked for where the load rests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._view import View
+from smartshoe.signals.masks import runs_of
+
+BLOCK_S = 0.25
+LEAST_STRETCH_S = 1.0
+LEAST_HZ = 3.0  # below, a line is drift or physics
+QUIET_MOVE = 0.003  # of the load's span, from one block to the next
+NEIGHBOURHOOD_HZ = 3.0
+SURE = 14.0  # beyond ln(frequencies) in units of the local mean power: a chance of 1e-6
+LEAST_SHARE = 0.0001  # of the span
+BESIDE_LATTICE = 0.6  # of the step, where noise does not dither it
+STEADY = 2.5  # first halves of the stretches against second ones: a ringing dies, a hum does not
+MAINS_COHERENT = 0.3  # of the parts' amplitude: mains wander by some hundredths of a hertz
+COHERENT, DOUBTS = 0.7, 3.0  # the same of any other line; standard deviations
+AS_STEADY = 1.5  # in power; 3 Hz with 1 % of damping loses more from half to half of a stretch of four seconds
+CLEAR, FEWEST_PARTS = 0.25, 4  # noise over the line in a part that must show it
+UNEVEN = 2.5  # times; that much noise makes it 1.7
+MAINS_HZ = (50.0, 60.0)
+HARMONICS = 3
+MOST_LINES = 5
+
+
+def hum(view: View, bad: Mask) -> Iterator[Finding]:
+    """Kind ``hum``: one finding for all lines; nothing is masked, since every sample has it."""
+    found = lines(view, bad)
+    if not found:
+        return
+    rate_hz = 1.0 / view.step_s
+    parts = []
+    for frequency_hz, amplitude in found:
+        folded = aliases(frequency_hz, rate_hz, float(view.time_s[-1] - view.time_s[0]))
+        origin = f" ({' or '.join(folded)})" if folded else ""
+        parts.append(f"{frequency_hz:.4g} Hz{origin} with {100 * amplitude / view.span:.2g} %")
+    yield Finding(
+        "hum",
+        np.ones(len(view.recording), dtype=bool),
+        f"a hum stands in the reading also while the load rests: at {', at '.join(parts)} of its span; another"
+        " sampling rate would tell a folded line from a true one",
+    )
+
+
+def aliases(frequency_hz: float, rate_hz: float, duration_s: float) -> list[str]:
+    """Harmonics of 50 and 60 Hz that appear at ``frequency_hz`` when sampled at ``rate_hz``."""
+    near = 0.05 + 2.0 / duration_s
+    names = []
+    for mains in MAINS_HZ:
+        for harmonic in range(1, HARMONICS + 1):
+            true = harmonic * mains
+            folded = abs(true - rate_hz * np.rint(true / rate_hz))
+            if abs(folded - frequency_hz) <= near + 0.001 * true:
+                names.append(f"{true:g} Hz mains" if harmonic == 1 else f"{true:g} Hz, {harmonic} x {mains:g} Hz")
+                break
+    return names
+
+
+def lines(view: View, bad: Mask) -> list[tuple[float, float]]:
+    """Frequency in Hz and amplitude (of the reading) of each spectral line, the strongest first."""
+    if view.span == 0.0:
+        return []
+    stretches = _quiet_stretches(view)
+    size = sum(last - first for first, last in stretches)
+    if size < 128:
+        return []
+    residual, weight = _residual(view, bad, stretches)
+    found: list[tuple[float, float]] = []
+    for _ in range(MOST_LINES):
+        line = _strongest(view, residual, weight, stretches)
+        if line is None:
+            break
+        found.append(line[:2])
+        residual = residual - weight * line[2]
+    return found
+
+
+def _quiet_stretches(view: View) -> list[tuple[int, int]]:
+    """Stretches (first, past last) of at least a second in which the block means of the load stand still."""
+    n = view.load.values.size
+    block = max(4, round(BLOCK_S / view.step_s))
+    count = n // block
+    if count < 4:
+        return []
+    blocks = view.load.values[: count * block].reshape(count, block)
+    mean = blocks.mean(axis=1)
+    noise = view.load.quiet_noise
+    still = np.abs(np.diff(mean)) <= max(QUIET_MOVE * view.load_span, 4.0 * noise / np.sqrt(block))
+    calm = blocks.std(axis=1) <= QUIET_MOVE * view.load_span + 1.5 * noise  # a sine of four cycles a second is not
+    still &= calm[1:] & calm[:-1]
+    gap = np.flatnonzero((np.diff(view.time_s) > 1.6 * view.step_s) | (view.jump != 0.0)) // block
+    still[np.minimum(gap, still.size - 1)] = False
+    quiet = np.zeros(count, dtype=bool)
+    quiet[1:-1] = still[1:] & still[:-1]
+    starts, stops = runs_of(quiet)
+    least = max(4, round(LEAST_STRETCH_S / (block * view.step_s)))
+    return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a - 1 >= least]
+
+
+def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[Array, Array]:
+    """Reading less a cubic in each stretch under a Hann window, 0 elsewhere; and the window (m,)."""
+    y = view.reading.values
+    limit = 8.0 * view.reading.noise + 3.0 * view.reading.step
+    residual, weight = np.zeros(y.size), np.zeros(y.size)
+    for first, last in stretches:
+        x = np.linspace(-1.0, 1.0, last - first)
+        basis = np.polynomial.legendre.legvander(x, 5)
+        part, good = y[first:last], ~bad[first:last]
+        if good.sum() < 32:
+            continue
+        left = part - basis @ np.linalg.lstsq(basis[good], part[good], rcond=None)[0]
+        window = np.hanning(last - first) * good
+        window *= np.abs(left) <= np.maximum(limit[first:last], 6.0 * np.median(np.abs(left)) * 1.4826)
+        residual[first:last], weight[first:last] = left * window, window
+    return residual, weight
+
+
+def _lasts(whole: float, own: Array, weight: Array, noise_power: Array) -> bool:
+    """Whether one phase and one power hold in all parts.
+
+    A ringing begins anew with each move of the load, larger or smaller, and dies.
+    ``whole`` amplitude over all parts, ``own`` (p,) and ``weight`` (p,) of each, first and second half of a stretch in
+    turn; ``noise_power`` (p,) of what noise beside the line adds to its square.
+    """
+    share = weight**2
+    power = share * (own**2 - noise_power)
+    doubt = DOUBTS * float(np.sqrt(share**2 @ (noise_power**2 + 2.0 * whole**2 * noise_power)))
+    coherent = whole**2 * float(share.sum()) > COHERENT**2 * (float(power.sum()) - doubt)
+    clear = own[noise_power < (CLEAR * max(whole, float(np.median(own)))) ** 2]
+    if clear.size >= FEWEST_PARTS and np.quantile(clear, 0.9) > UNEVEN * np.quantile(clear, 0.1):
+        return False
+    return coherent and float(power[0::2].sum()) < AS_STEADY * float(power[1::2].sum()) + doubt
+
+
+def _strongest(
+    view: View, residual: Array, weight: Array, stretches: list[tuple[int, int]]
+) -> tuple[float, float, Array] | None:
+    """Frequency, amplitude and course (m,) of the strongest line that passes every test, or None."""
+    from scipy.fft import next_fast_len, rfft
+    from scipy.ndimage import median_filter
+
+    n = residual.size
+    size = 2 * int(next_fast_len((n + 1) // 2, real=True))
+    power = np.abs(rfft(residual, size)) ** 2
+    frequency = np.fft.rfftfreq(size, view.step_s)
+    first = int(np.searchsorted(frequency, LEAST_HZ))
+    if power.size - first < 64 or not power[first:].any():
+        return None
+    width = max(1, round(NEIGHBOURHOOD_HZ / float(frequency[1])) // 64)
+    coarse = power[: power.size // width * width].reshape(-1, width)
+    smooth = median_filter(np.median(coarse, axis=1), 65, mode="mirror") / np.log(2.0)
+    local = smooth[np.minimum(np.arange(power.size) // width, smooth.size - 1)]
+    ratio = power / np.maximum(local, 1e-300)
+    ratio[:first] = 0.0
+    best = int(np.argmax(np.where(np.isfinite(ratio), power * (ratio > SURE + np.log(n)), 0.0)))
+    if ratio[best] <= SURE + np.log(n):
+        return None
+    carrier = np.exp(-2j * np.pi * float(frequency[best]) * view.step_s * np.arange(n))
+    folded = 2.0 if 0 < best < size // 2 else 1.0
+    whole = folded * np.dot(residual, carrier) / weight.sum()
+    own, halves = [], np.zeros(2)
+    weights, noise_power = [], []
+    level = folded**2 * float(local[best]) / float(np.dot(weight, weight))
+    for low, high in stretches:
+        middle = (low + high) // 2
+        for i, (a, b) in enumerate(pairwise((low, middle, high))):
+            total = float(weight[a:b].sum())
+            if total > 0:
+                part = folded * np.dot(residual[a:b], carrier[a:b]) / total
+                halves[i] += abs(part) ** 2
+                own.append(abs(part))
+                weights.append(total)
+                noise_power.append(level * float(np.dot(weight[a:b], weight[a:b])) / total**2)
+    amplitude = max(abs(whole), float(np.median(own)))
+    step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
+    least = max(LEAST_SHARE * view.span, BESIDE_LATTICE * step if noise < 0.5 * step else 0.0)
+    steady = halves[0] < STEADY**2 * halves[1]
+    if amplitude < least or not steady or abs(whole) < MAINS_COHERENT * amplitude:
+        return None
+    from_mains = aliases(float(frequency[best]), 1.0 / view.step_s, float(n * view.step_s))
+    if not from_mains and not _lasts(abs(whole), *map(np.array, (own, weights, noise_power))):
+        return None
+    course: Array = np.real(whole * np.conj(carrier))
+    return float(frequency[best]), float(amplitude), course

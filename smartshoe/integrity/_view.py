@@ -1,0 +1,258 @@
+"""`View`: one recording as the detectors see it: load and reading on one clock, their scales, the static curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from smartshoe.arrays import Array, Index, Mask
+from smartshoe.integrity._scales import (
+    SECOND_DIFFERENCE,
+    five_point_median,
+    lattice_step,
+    local_scale,
+    slope_change,
+    white_noise,
+)
+from smartshoe.recording import Recording
+
+CURVE_BINS = 40
+NEAR_S = 0.1  # corners of load and reading this near to each other are taken for one
+NEAR_SAMPLES = 3
+UPPER_QUARTILE = 1.15  # of a normal deviate's absolute value
+LEAST_NOISE = 1e-4  # of the range: less is arithmetic
+STEEP, FLAT, FEWEST = 0.5, 0.05, 50  # of a steep slope; samples
+JITTERY = 3.0  # times: a second difference holds a ramp's corners too, which do not treble a median
+JITTERS = 5.0  # standard deviations
+DITHERED = 0.7  # of a lattice step: less noise than this may be the toggling between two levels
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A channel at the samples where load and reading are both present: ``values`` (m,) with their scales."""
+
+    values: Array
+
+    @cached_property
+    def levels(self) -> tuple[Array, Index]:
+        """The values that occur, increasing, and how often each does."""
+        values, count = np.unique(self.values, return_counts=True)
+        return values, count.astype(np.intp)
+
+    @cached_property
+    def step(self) -> float:
+        """The lattice's step, 0 where there is none."""
+        return lattice_step(*self.levels)
+
+    @cached_property
+    def least_gap(self) -> float:
+        """The smallest difference between two values that differ: no lattice's step is larger."""
+        gaps = np.diff(self.levels[0])
+        return float(gaps.min()) if gaps.size else 0.0
+
+    @cached_property
+    def is_noisy(self) -> bool:
+        """Whether second differences change sign more often than not: noise above one lattice step, not curvature."""
+        second = np.diff(self.values, 2)
+        product = second[1:] * second[:-1]
+        least = max(DITHERED * self.step, LEAST_NOISE * float(np.ptp(self.values)))
+        return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > least
+
+    @cached_property
+    def outlying(self) -> Array:
+        """(m,) values less their running five-point median: 0 at both ends and on monotone stretches without noise."""
+        out: Array = self.values - five_point_median(self.values)
+        out[:2] = out[-2:] = 0.0
+        return out
+
+    @cached_property
+    def noise(self) -> Array:
+        """(m,) local standard deviation of white noise."""
+        return white_noise(self.values, self.step)
+
+    @cached_property
+    def quiet_noise(self) -> float:
+        """The recording's usual noise: median of the local ones."""
+        return float(np.median(self.noise))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A recording with both signals.
+
+    ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
+    is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
+    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out.
+    """
+
+    recording: Recording
+    index: Index
+    time_s: Array
+    load: Signal
+    reading: Signal
+    sign: int
+    offset_s: float = 0.0
+    rate: float = 0.0
+    dropped_to: Array = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def step_s(self) -> float:
+        """Median sampling step."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @cached_property
+    def near(self) -> int:
+        """Samples within which a corner of the load and its echo in the reading may lie."""
+        return max(NEAR_SAMPLES, round(NEAR_S / self.step_s))
+
+    @cached_property
+    def curve(self) -> tuple[Array, Array, Array]:
+        """Loads (bins,), median reading and robust spread at each: the static curve, whatever its shape."""
+        load, reading = self.load.values, self.reading.values
+        low, high = np.quantile(load, [0.001, 0.999])
+        edges = np.linspace(low, high, CURVE_BINS + 1)[1:-1]
+        place = np.searchsorted(edges, load)
+        order = np.lexsort((reading, place))
+        counts = np.bincount(place, minlength=CURVE_BINS)
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        filled = counts > 0
+        first, size = starts[filled], counts[filled]
+        sorted_reading = reading[order]
+        middle = sorted_reading[first + size // 2]
+        spread = 0.5 * (sorted_reading[first + (size * 4) // 5] - sorted_reading[first + size // 5])
+        at = np.bincount(place, weights=load, minlength=CURVE_BINS)[filled] / size
+        return at, middle, spread
+
+    @cached_property
+    def noise_at_load(self) -> Array:
+        """(m,) the usual noise at each sample's load, by the upper quartile: also that of a rest beside a ramp."""
+        edges = self.curve[0][:-1] + 0.5 * np.diff(self.curve[0])
+        place = np.searchsorted(edges, self.load.values)
+        second = np.zeros(place.size)
+        second[1:-1] = np.abs(np.diff(self.reading.values, 2))
+        usual = np.zeros(edges.size + 1)
+        order = np.argsort(place, kind="stable")
+        cuts = np.searchsorted(place[order], np.arange(edges.size + 2))
+        for i in range(usual.size):
+            if cuts[i + 1] > cuts[i]:
+                part, rank = second[order[cuts[i] : cuts[i + 1]]], 3 * (cuts[i + 1] - cuts[i]) // 4
+                usual[i] = np.partition(part, rank)[rank]
+        out: Array = usual[place] / (UPPER_QUARTILE * SECOND_DIFFERENCE)
+        return out
+
+    @cached_property
+    def expected(self) -> Array:
+        """(m,) the static curve at each sample's load."""
+        at, middle, _ = self.curve
+        out: Array = np.interp(self.load.values, at, middle)
+        return out
+
+    @cached_property
+    def rest(self) -> float:
+        """The reading of the unloaded unit."""
+        return float(self.curve[1][0])
+
+    @cached_property
+    def span(self) -> float:
+        """What the reading covers, by the static curve."""
+        return float(np.ptp(self.curve[1]))
+
+    @cached_property
+    def load_span(self) -> float:
+        """What the load covers, spikes left out."""
+        return float(np.ptp(self.curve[0]))
+
+    @cached_property
+    def gain(self) -> float:
+        """Reading per load that no stretch of the static curve exceeds much: the steepest of its quarters."""
+        at, middle, _ = self.curve
+        if at.size < 2 or self.load_span == 0.0:
+            return 0.0
+        low = np.linspace(at[0], at[-1] - 0.25 * self.load_span, 16)
+        rise = np.interp(low + 0.25 * self.load_span, at, middle) - np.interp(low, at, middle)
+        return float(np.max(np.abs(rise)) / (0.25 * self.load_span))
+
+    @cached_property
+    def load_corner(self) -> Array:
+        """(m,) change of the load's increment nearby: what a corner of the load may do to the reading, in load."""
+        return slope_change(self.load.values, self.load.noise, self.near)
+
+    @cached_property
+    def reading_corner(self) -> Array:
+        """(m,) the same of the reading."""
+        return slope_change(self.reading.values, self.reading.noise, self.near)
+
+    @cached_property
+    def steady_load(self) -> Array:
+        """(m,) the load's mean over ``near`` samples."""
+        from scipy.ndimage import uniform_filter1d
+
+        out: Array = uniform_filter1d(self.load.values, self.near, mode="nearest")
+        return out
+
+    @cached_property
+    def load_move(self) -> Array:
+        """(m - 1,) largest increment of the load nearby, noise left out."""
+        from scipy.ndimage import maximum_filter1d
+
+        step = np.abs(np.diff(self.steady_load))
+        sharp = np.maximum(np.abs(np.diff(self.load.values)) - 8.0 * self.load.quiet_noise - self.load.step, 0.0)
+        out: Array = maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
+        return out
+
+    @cached_property
+    def reading_move(self) -> Array:
+        """(m - 1,) usual increment of the reading nearby."""
+        return local_scale(np.diff(self.reading.values), block=16)
+
+    @cached_property
+    def jump(self) -> Array:
+        """(m - 1,) increments of the reading beyond what load, local slope, noise and lattice explain; signed, else 0.
+
+        Increments over gaps of time count as explained.
+        """
+        step = np.diff(self.reading.values)
+        noise = np.maximum(self.reading.noise[1:], self.reading.noise[:-1])
+        allowed = 2.0 * self.gain * self.load_move + 4.0 * self.reading_move + 7.0 * noise + 3.0 * self.reading.step
+        allowed = np.maximum(allowed, 0.005 * self.span)
+        excess = np.where(np.abs(step) > allowed, step, 0.0)
+        excess[np.diff(self.time_s) > 1.6 * self.step_s] = 0.0
+        out: Array = excess
+        return out
+
+    @cached_property
+    def jitter_reach(self) -> Array:
+        """(m,) what an error of the sampling time may bring into each reading; 0 unless noise follows the slope.
+
+        Where ramps are much noisier than rests, noise over slope is an error of time, and a rest beside a ramp may
+        hold any reading that the ramp takes within a few of those.
+        """
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+        nothing = np.zeros(self.time_s.size)
+        slope = np.abs(np.gradient(self.expected_steadily, self.step_s))
+        usual = float(np.quantile(slope, 0.99))  # not the one corner that a step of load makes
+        steep, flat = slope > STEEP * usual, slope < FLAT * usual
+        if steep.sum() < FEWEST or flat.sum() < FEWEST:
+            return nothing
+        if np.median(self.reading.noise[steep]) < JITTERY * np.median(self.reading.noise[flat]):
+            return nothing
+        jitter_s = float(np.median(self.reading.noise[steep] / slope[steep]))
+        size = 2 * int(np.ceil(JITTERS * jitter_s / self.step_s)) + 1
+        high = maximum_filter1d(self.expected_steadily, size, mode="nearest")
+        out: Array = high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
+        return out
+
+    @cached_property
+    def expected_steadily(self) -> Array:
+        """(m,) the static curve at each sample's load, the load's noise averaged."""
+        out: Array = np.interp(self.steady_load, *self.curve[:2])
+        return out
+
+    def whole(self, at: Mask) -> Mask:
+        """A mask (m,) over this view as one over all of the recording's samples."""
+        out = np.zeros(len(self.recording), dtype=bool)
+        out[self.index[at]] = True
+        return out

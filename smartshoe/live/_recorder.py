@@ -1,0 +1,210 @@
+"""What is recorded: a plain table a shoe and a journal of notes, written by a thread of its own, whole at any moment.
+
+Every sample goes to ``FILE`` (with two shoes ``FILE_left``, ``FILE_right``, or ``_1`` and ``_2``), every mark, zero and
+event of a shoe to ``FILE.smj`` beside it. What was acknowledged is on disk: neither a kill nor a pulled plug takes it.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.devices import Block
+from smartshoe.errors import InputError, SmartShoeError, UsageError
+from smartshoe.files.journal import AppendedFile, Journal, read_journal
+
+NOTE, END = 1, 2
+WRITE_EVERY_S = 0.1
+MOST_WAITING = 20_000  # pieces: minutes of a disk that stands still
+JOURNAL = ".smj"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A shoe's table: its file, ``name_unit`` columns behind the time, ``# key: value`` lines."""
+
+    path: Path
+    columns: tuple[str, ...]
+    facts: Mapping[str, str]
+
+
+@dataclass
+class Interrupted:
+    """A recording that was not ended: its notes, and the sentence that says so."""
+
+    path: Path
+    notes: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        return f"the recording {self.path.name} was interrupted; all that was acknowledged is in it"
+
+
+def table_paths(path: Path, sides: Sequence[str]) -> list[Path]:
+    """A file for each shoe: ``path`` itself for one, with the side (or a number) in its name for several."""
+    if len(sides) == 1:
+        return [path]
+    told = sides if all(sides) and len(set(sides)) == len(sides) else [str(k + 1) for k in range(len(sides))]
+    return [path.with_name(f"{path.stem}_{side}{path.suffix}") for side in told]
+
+
+def journal_path(path: Path) -> Path:
+    """The journal beside a recording."""
+    return path.with_name(path.name + JOURNAL)
+
+
+def is_taken(path: Path, sides: Sequence[str]) -> bool:
+    """Whether a file of the recording ``path`` is there already."""
+    return any(p.exists() for p in [journal_path(path), *table_paths(path, sides)])
+
+
+def free_path(path: Path, sides: Sequence[str]) -> Path:
+    """``path``, or the first of ``path_2``, ``path_3``, ... of which no file is there."""
+    number, found = 1, path
+    while is_taken(found, sides):
+        number += 1
+        found = path.with_name(f"{path.stem}_{number}{path.suffix}")
+    return found
+
+
+def interrupted_at(path: Path, sides: Sequence[str]) -> Interrupted | None:
+    """What a killed session left at ``path``, its tables cut to whole rows; None where nothing is there.
+
+    Raises `UsageError` where a recording is there that was ended, or a file that is none.
+    """
+    if not is_taken(path, sides):
+        return None
+    beside = journal_path(path)
+    records = read_journal(beside).records if beside.exists() else ()
+    if not beside.exists() or any(record.kind == END for record in records):
+        raise UsageError(f"{path} is there already and is not overwritten: choose another name for --record")
+    for table in table_paths(path, sides):
+        if table.exists():
+            _cut_to_whole_rows(table)
+    return Interrupted(path, [json.loads(record.payload) for record in records if record.kind == NOTE])
+
+
+def _cut_to_whole_rows(path: Path) -> None:
+    data = path.read_bytes()[-(1 << 16) :]
+    torn = len(data) - (data.rfind(b"\n") + 1)
+    if torn:
+        with AppendedFile(path) as file:
+            file.cut(file.size - torn)
+
+
+class LiveRecording:
+    """A recording under way. `samples` and `note` may be called from any thread and never wait for the disk.
+
+    ``acknowledge(shoe, count)`` is called, from the writing thread, once samples are on disk; ``fail`` once where the
+    disk takes no more.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        layouts: Sequence[Layout],
+        acknowledge: Callable[[int, int], None],
+        fail: Callable[[str], None],
+    ) -> None:
+        """New files; raises `UsageError` where one cannot be made."""
+        self.path, self.count = path, 0
+        self._acknowledge, self._fail = acknowledge, fail
+        self._pieces: queue.Queue[tuple[int, bytes, int] | None] = queue.Queue(MOST_WAITING)
+        self._error: str | None = None
+        self._files: list[AppendedFile] = []
+        # The journal first: by it what a kill leaves is known for a recording that was interrupted.
+        beside = journal_path(path)
+        is_new = not beside.exists()
+        self._journal = Journal(beside)
+        try:
+            for layout in layouts:
+                file = AppendedFile(layout.path, new=True)
+                self._files.append(file)
+                head = [f"# {key}: {value}\n" for key, value in layout.facts.items()]
+                file.append("".join([*head, ",".join(["time_s", *layout.columns]), "\n"]).encode())
+        except SmartShoeError:
+            for file in self._files:
+                file.close()
+                file.path.unlink()
+            self._journal.close()
+            if is_new:
+                beside.unlink()
+            raise
+        self._thread = threading.Thread(target=self._run, name=f"writer of {path}", daemon=True)
+        self._thread.start()
+
+    def samples(self, shoe: int, block: Block, columns: Sequence[Array] = ()) -> None:
+        """Samples of a shoe: its readings and further ``columns`` (n,), in the layout's order."""
+        readings = np.where(block.missing, np.nan, block.readings)
+        table = np.column_stack([block.time_s, readings, *columns])
+        rows = (",".join("" if value != value else repr(value) for value in row) for row in table.tolist())
+        self._put((shoe, "".join(f"{row}\n" for row in rows).encode(), len(block)))
+
+    def note(self, note: Mapping[str, Any]) -> None:
+        """A mark, a zero, an event."""
+        self._put((-1, json.dumps(note, allow_nan=False).encode(), 0))
+
+    def close(self) -> None:
+        """Write what waits, end the journal, close every file; raises `InputError` where the disk did not take all."""
+        self._pieces.put(None)
+        self._thread.join()
+        if self._error is not None:
+            raise InputError(self._error)
+
+    def _put(self, piece: tuple[int, bytes, int]) -> None:
+        if self._error is not None:
+            return
+        try:
+            self._pieces.put_nowait(piece)
+        except queue.Full:
+            self._failed(
+                f"{self.path}: the disk stands still and the recording ends here; what was acknowledged is kept"
+            )
+
+    def _run(self) -> None:
+        is_over = False
+        while not is_over and self._error is None:
+            pieces = [self._pieces.get()]
+            if pieces[0] is not None:
+                time.sleep(WRITE_EVERY_S)  # several blocks share one synchronisation of the disk
+            while not self._pieces.empty():
+                pieces.append(self._pieces.get_nowait())
+            is_over = None in pieces
+            try:
+                self._write([piece for piece in pieces if piece is not None])
+            except (SmartShoeError, OSError) as error:
+                self._failed(f"the recording ends here: {error}")
+        try:
+            if self._error is None:
+                self._journal.append(END, b"{}")
+        finally:
+            self._journal.close()
+            for file in self._files:
+                file.close()
+
+    def _write(self, pieces: Sequence[tuple[int, bytes, int]]) -> None:
+        for shoe, file in enumerate(self._files):
+            own = [piece for piece in pieces if piece[0] == shoe]
+            if own:
+                file.append(b"".join(data for _, data, _ in own))
+                count = sum(count for _, _, count in own)
+                self.count += count
+                self._acknowledge(shoe, count)
+        for shoe, data, _ in pieces:
+            if shoe < 0:
+                self._journal.append(NOTE, data)
+
+    def _failed(self, says: str) -> None:
+        if self._error is None:
+            self._error = says
+            self._fail(says)

@@ -1,0 +1,112 @@
+"""Whether a unit's calibration can be trusted, in one word and one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from smartshoe.calibration.validation import RateResult, Validation
+from smartshoe.report.calibration._unit_report import UnitReport
+from smartshoe.report.numbers import plain
+
+Grade = Literal["good", "look", "bad"]
+
+# Error (rms) in percent of full scale: 0.5 is the class of a good industrial load cell; 2 is what a table of weights
+# gets from these units without any model.
+GOOD_PERCENT, BAD_PERCENT = 0.5, 2.0
+LOOP_PERCENT = 1.0  # of full scale, between loading and unloading after correction
+WORTH_PERCENT = 5.0  # less than this below the static line is no gain worth a filter
+FRICTION_SHARE = 0.5  # of the widest loop that is left at the slowest rate: a lag's loop closes there
+
+WORST_FIRST: tuple[Grade, ...] = ("bad", "look", "good")
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """A unit's grade, why in a few words, and what to do; ``does`` is empty where nothing needs doing."""
+
+    unit: str
+    grade: Grade
+    says: str
+    does: str = ""
+
+    @property
+    def whole(self) -> str:
+        """Reason and advice as one clause."""
+        return f"{self.says}: {self.does}" if self.does else self.says
+
+
+def error_percent(validation: Validation) -> float:
+    """What correction leaves (rms), in percent of full scale."""
+    return 100.0 * validation.overall.rmse_compensated_n / validation.full_scale_n
+
+
+def looks_like_friction(rates: Sequence[RateResult]) -> bool:
+    """Whether a wide loop is left at every rate, the slowest too."""
+    widths = [rate.hysteresis_compensated_percent for rate in rates]
+    known = [width for width in widths if width is not None]
+    if len(known) < 2 or widths[0] is None:
+        return False
+    return max(known) > LOOP_PERCENT and widths[0] >= FRICTION_SHARE * max(known)
+
+
+def against_static(overall: RateResult) -> str:
+    """How the corrected error compares with the best static line's."""
+    gain = overall.improvement_over_static_percent
+    static, left = plain(overall.rmse_static_n), plain(overall.rmse_compensated_n)
+    if gain is None:
+        return "a static line leaves no error here"
+    if gain <= -0.5:
+        more = plain(-gain, 2)
+        return f"the filter is worse than a static line: it leaves {left} N, the line {static} N ({more} % more)"
+    if gain < WORTH_PERCENT:
+        return f"the filter gains hardly anything: it leaves {left} N, a static line {static} N"
+    return f"the filter leaves {left} N where the best static line leaves {static} N: {plain(gain, 2)} % less"
+
+
+def judge(unit: UnitReport) -> Judgement:
+    """The unit's grade: bad is not to be used, look is to be understood first."""
+    overall, share = unit.validation.overall, error_percent(unit.validation)
+    gain = overall.improvement_over_static_percent
+    loop = max((rate.hysteresis_compensated_percent or 0.0 for rate in unit.validation.rates), default=0.0)
+    left = f"{plain(overall.rmse_compensated_n)} N left ({plain(share, 2)} % of full scale)"
+    if set(unit.judged) <= set(unit.fitted):
+        left += " on the very data that was fitted"
+    look_into = "see its diagnosis" if unit.diagnosis else "diagnose it"
+    if not unit.identification["converged"]:
+        return Judgement(
+            unit.name, "bad", "the fit did not converge", "record more rates and loads, then identify again"
+        )
+    if gain is not None and gain <= -0.5:
+        return Judgement(unit.name, "bad", against_static(overall), f"use a static gain meanwhile, and {look_into}")
+    if share > BAD_PERCENT:
+        return Judgement(unit.name, "bad", left, look_into)
+    if looks_like_friction(unit.validation.rates):
+        says = f"a loop of {plain(loop, 2)} % stays at every rate, as friction leaves it"
+        return Judgement(unit.name, "look", says, look_into)
+    if loop > LOOP_PERCENT:
+        return Judgement(unit.name, "look", f"a loop of {plain(loop, 2)} % of full scale stays", look_into)
+    if share > GOOD_PERCENT:
+        return Judgement(unit.name, "look", left, look_into)
+    if gain is not None and gain < WORTH_PERCENT:
+        return Judgement(unit.name, "good", f"{left}; {against_static(overall)}", "a static gain would do as well")
+    return Judgement(unit.name, "good", left)
+
+
+def headline(judgements: Sequence[Judgement]) -> tuple[Grade, str]:
+    """The whole calibration's grade and one sentence: how many are good, and what is to be done with the rest."""
+    worst = min((one.grade for one in judgements), key=WORST_FIRST.index)
+    good = sum(one.grade == "good" for one in judgements)
+    if len(judgements) == 1:
+        one = judgements[0]
+        return worst, f"{one.unit} is {grade_word(one.grade)}: {one.says}{'; ' + one.does if one.does else ''}"
+    said = f"{good} of {len(judgements)} units good" if good < len(judgements) else f"All {good} units good"
+    rest = sorted((one for one in judgements if one.grade != "good"), key=lambda one: WORST_FIRST.index(one.grade))
+    told = "; ".join(f"{one.unit}: {one.whole}" for one in rest)
+    return worst, f"{said}; {told}" if told else said
+
+
+def grade_word(grade: Grade) -> str:
+    """The grade in a sentence."""
+    return {"good": "good", "look": "to be looked at", "bad": "not to be used"}[grade]

@@ -1,0 +1,119 @@
+"""The page of a calibration: the verdict first, a card a unit, worst first, and each unit's story below."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+
+from smartshoe.report.calibration import _charts as charts
+from smartshoe.report.calibration import _judgement as judgement
+from smartshoe.report.calibration._judgement import Judgement
+from smartshoe.report.calibration._unit_report import UnitReport
+from smartshoe.report.charts import Chart
+from smartshoe.report.document import polylines, write_document
+
+if TYPE_CHECKING:
+    from smartshoe.report.trial import TrialSection
+
+CARD_WIDTH, CARD_HEIGHT = 120.0, 56.0
+
+
+@dataclass(frozen=True, eq=False)
+class UnitCard:
+    """A unit as the page shows it; ``anchor`` is its place there."""
+
+    unit: UnitReport
+    judged: Judgement
+    anchor: str
+    loop: Markup | None
+    shown: Sequence[Chart]
+    folded: Sequence[Chart]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the unit's story is unfolded from the start."""
+        return self.judged.grade != "good"
+
+    @property
+    def gain_says(self) -> str:
+        """How the corrected error compares with the static line's."""
+        return judgement.against_static(self.unit.validation.overall)
+
+    @property
+    def left_percent(self) -> float:
+        """What is left, in percent of full scale."""
+        return judgement.error_percent(self.unit.validation)
+
+
+def _small_loop(loop: charts.ResidualLoop, most_n: float) -> Markup:
+    """The loop without axes, all units on one scale of ``most_n`` newton either way."""
+    at_n, errors = loop.at_n, loop.errors_n
+    x = CARD_WIDTH * (at_n - at_n[0]) / max(float(np.ptp(at_n)), 1e-12)
+    curves = []
+    for kind in ("raw", "corrected"):
+        around = np.concatenate([errors[f"{kind} up"], errors[f"{kind} down"][::-1], errors[f"{kind} up"][:1]])
+        y = CARD_HEIGHT / 2 * (1 + around / most_n)
+        points = list(zip(np.concatenate([x, x[::-1], x[:1]])[::2].tolist(), y[::2].tolist(), strict=True))
+        curves.append((kind, points))
+    return polylines(
+        [("axis", [(0, CARD_HEIGHT / 2), (CARD_WIDTH, CARD_HEIGHT / 2)]), *curves], CARD_WIDTH, CARD_HEIGHT
+    )
+
+
+def cards(units: Sequence[UnitReport]) -> list[UnitCard]:
+    """A card a unit, worst first, by grade and then by what is left."""
+    loops = [charts.residual_loops(unit.validation) for unit in units]
+    widest, errors = charts.common_limits(units, [loop for own in loops for loop in own])
+    made = []
+    for number, (unit, own) in enumerate(zip(units, loops, strict=True), 1):
+        by_rate = charts.error_by_rate(unit, errors)
+        shown = [*([] if by_rate is None else [by_rate]), *(charts.loop_chart(unit, loop, widest) for loop in own)]
+        folded = [charts.signals(unit, recording) for recording in unit.recordings] + [charts.response(unit)]
+        made.append(
+            UnitCard(
+                unit, judgement.judge(unit), f"unit-{number}", _small_loop(own[-1], widest[1]) if own else None,
+                shown, folded,
+            )
+        )  # fmt: skip
+    return sorted(made, key=lambda card: (judgement.WORST_FIRST.index(card.judged.grade), -card.left_percent))
+
+
+def write_page(
+    path: Path,
+    title: str,
+    about: str,
+    facts: Mapping[str, str],
+    units: Sequence[UnitReport],
+    trial: TrialSection | None = None,
+    commands: Sequence[str] = (),
+    session: Sequence[tuple[str, str]] = (),
+) -> Path:
+    """Write the report to ``path``, whole or not at all, and return it.
+
+    ``commands`` made it and what it shows; ``session`` is what a session's card says, by what it is about.
+    """
+    made = cards(units)
+    grade, says = judgement.headline([card.judged for card in made])
+    return write_document(
+        path,
+        "calibration.html",
+        {
+            "title": title,
+            "about": about,
+            "facts": facts,
+            "grade": grade,
+            "headline": says,
+            "cards": made,
+            "trial": trial,
+            "commands": commands,
+            "session": session,
+            "good_percent": judgement.GOOD_PERCENT,
+            "bad_percent": judgement.BAD_PERCENT,
+            "loop_percent": judgement.LOOP_PERCENT,
+        },
+    )

@@ -1,0 +1,157 @@
+"""The HTML page of a diagnosis: how far off, why, what it gained, what to do next; then where the error sits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from smartshoe.diagnosis import Cause, Diagnosis, described
+from smartshoe.report.charts import Chart
+from smartshoe.report.diagnosis import _charts as charts
+from smartshoe.report.diagnosis import _sentences as sentences
+from smartshoe.report.diagnosis import grids
+from smartshoe.report.diagnosis.views import EvidenceView, by_load_and_rate, by_place_and_cycle, evidence
+from smartshoe.report.document import write_document
+from smartshoe.report.numbers import plain
+from smartshoe.report.wording import sentence, words
+
+GRADES = {"adequate": "good", "explained": "look", "partly_explained": "look", "unexplained": "bad", "refused": "bad"}
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A cause as the page shows it."""
+
+    title: str
+    cause: Cause
+    sure: str
+    gain: str
+    parameters: Sequence[tuple[str, str, str]]
+    why: str
+    equivalents: Sequence[sentences.Neighbour]
+    rivals: Sequence[sentences.Neighbour]
+
+
+def write_diagnosis_page(
+    path: Path, diagnosis: Diagnosis, title: str, facts: Mapping[str, str], protocol_file: str | None = None
+) -> Path:
+    """Write the page to ``path``, whole or not at all, and return it.
+
+    ``facts``: small print by name (files, version). ``protocol_file``: name of the file beside the page that holds
+    the next experiment's protocol.
+    """
+    said = sentences.HEADINGS[diagnosis.verdict], sentence(diagnosis.says)
+    following, found = diagnosis.next_experiment, evidence(diagnosis.traces, diagnosis.full_scale_load_n)
+    shown: dict[str, Any] = {
+        "title": title,
+        "facts": facts,
+        "diagnosis": diagnosis,
+        "grade": GRADES[diagnosis.verdict],
+        "headline": sentences.how_much(diagnosis),
+        "said": said,
+        "numbers": _numbers(diagnosis),
+        "comparison": sentences.comparison(diagnosis),
+        "shares": sentences.shares_text(diagnosis),
+        "parts": _parts(diagnosis),
+        "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
+        "minor": sentences.listed(sorted(diagnosis.minor), "and"),
+        "bars": [(words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
+        "likeness": grids.likeness(diagnosis),
+        "separates": sentences.listed(following.separates, "and") if following else "",
+        "protocol_file": protocol_file,
+        "next_load": charts.protocol(following.steps) if following and following.steps else None,
+        "fault_lines": [sentence(sentences.fault_text(fault)) + (" (Minor.)" if fault.severity == "minor" else "")
+                        for fault in diagnosis.data_faults],
+        "fault_charts": charts.faults(diagnosis),
+        "thresholds": [(words(one["name"]), _value(one["value"]), one["unit"], one["meaning"], one["origin"])
+                       for one in described(diagnosis.thresholds)],
+    }  # fmt: skip
+    return write_document(path, "diagnosis.html", {**shown, **_of_traces(diagnosis, found)})
+
+
+def _of_traces(diagnosis: Diagnosis, found: EvidenceView | None) -> dict[str, Any]:
+    """Charts and grids of the signals; empty where no sample can be used."""
+    traces, unit = diagnosis.traces, diagnosis.unit
+    if found is None:
+        return {"before_after": [], "over": [], "loops": [], "left": []}
+    over = [*charts.over_state(found, unit), charts.over_cycles(found, unit), charts.over_frequency(found, unit)]
+    maps = by_load_and_rate(found, found.after, traces), by_place_and_cycle(found, found.after)
+    return {
+        "before_after": _there([charts.over_time(found, unit), charts.worst(traces, unit)]),
+        "over": _there(over),
+        "loops": charts.loops(traces, unit),
+        "left": grids.left_grids(*maps, unit),
+    }
+
+
+def _there(given: Sequence[Chart | None]) -> list[Chart]:
+    return [chart for chart in given if chart is not None]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(_value(one) for one in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
+    """The baseline's error variance: what each part is called, its colour, its percent."""
+    if diagnosis.baseline is None:
+        return []
+    part = sentences.shares(diagnosis)
+    return [
+        ("explained", "corrected", part.explained),
+        ("could be explained, and is left", "raw", part.left),
+        ("noise", "soft", part.noise),
+    ]
+
+
+def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """The few numbers that stand in large letters: (number, what it is)."""
+    before, after = diagnosis.baseline, diagnosis.extended
+    if before is None or after is None:
+        return []
+    said = [
+        (
+            f"{plain(sentences.share_of_full_scale(diagnosis, before.rmse), 2)} %",
+            "of full scale: error of the simulation",
+        )
+    ]
+    if diagnosis.causes:
+        said.append(
+            (
+                f"{plain(sentences.share_of_full_scale(diagnosis, after.rmse), 2)} %",
+                "of full scale: error with the causes added",
+            )
+        )
+        part = sentences.shares(diagnosis)
+        said.append(
+            (
+                f"{100 * part.explained / max(part.explained + part.left, 1e-9):.0f} %",
+                "of what could be explained is explained",
+            )
+        )
+    else:
+        said.append((f"{plain(sentences.shares(diagnosis).noise, 3)} %", "of the error's variance is noise"))
+    count = len(diagnosis.causes)
+    said.append((str(count), "cause named" if count == 1 else "causes named"))
+    return said
+
+
+def _card(number: int, cause: Cause) -> Card:
+    says = {parameter.name: parameter.says for parameter in cause.effect.parameters}
+    return Card(
+        f"{number}. {words(cause.name).capitalize()}",
+        cause,
+        sentences.how_sure(cause),
+        sentences.gain_sentence(cause.held_out),
+        [
+            (words(name), sentences.parameter_text(parameter), says.get(name, ""))
+            for name, parameter in cause.parameters.items()
+        ],
+        sentence(sentences.why_this_one(cause)),
+        sentences.neighbours(cause, cause.equivalents),
+        sentences.other_rivals(cause),
+    )

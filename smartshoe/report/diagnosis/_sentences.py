@@ -1,0 +1,276 @@
+"""A diagnosis in words: headings, intervals, gains, neighbours; the page and the terminal say the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+
+from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
+from smartshoe.integrity import DataFault
+from smartshoe.models.effects import catalogue, told_apart_by
+from smartshoe.models.effects.exposure import SAYS
+from smartshoe.models.parameter import Parameter
+from smartshoe.report.numbers import plain
+from smartshoe.report.wording import sentence, words
+
+HEADINGS = {
+    "adequate": "The simulation is good enough",
+    "explained": "The simulation is wrong, and it is known why",
+    "partly_explained": "The simulation is wrong, and part of it is explained",
+    "unexplained": "The simulation is wrong, and no known effect explains it",
+    "refused": "No diagnosis: this data does not allow one",
+}
+SUREST = 0.99
+NO_STRUCTURE = "none beyond noise"
+
+
+def listed(names: Sequence[str], last: str = "or") -> str:
+    """Identifiers as "a, b or c"."""
+    said = [words(name) for name in names]
+    return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} {last} {said[-1]}" if said else ""
+
+
+def sure(confidence: float) -> str:
+    """A probability as a person takes it; never a hundred percent."""
+    if not math.isfinite(confidence):
+        return "–"
+    return f"over {100 * SUREST:.0f} %" if confidence > SUREST else f"{100 * confidence:.0f} %"
+
+
+def how_sure(cause: Cause) -> str:
+    """The confidence of a cause, and where others may be meant how far it is this one."""
+    said = f"{sure(cause.confidence)} sure"
+    meant = listed(("this", *cause.equivalents))
+    return f"{said} that it is {meant}, {sure(cause.law_confidence)} for this one" if cause.equivalents else said
+
+
+def unit_of(symbol: str) -> str:
+    """A unit behind its number; nothing for a pure number."""
+    return "" if symbol in ("", "1") else f" {symbol}"
+
+
+def interval(value: float, low: float, high: float) -> str:
+    """``value [low, high]``, all to two digits of half the interval's width."""
+    half = 0.5 * (high - low)
+    if not all(math.isfinite(number) for number in (value, low, high)) or half <= 0:
+        return plain(value, 4)
+    decimals = 1 - math.floor(math.log10(half))
+    if decimals > 8 or abs(value) >= 1e7:
+        return f"{value:.4g} [{low:.4g}, {high:.4g}]"
+    shown = (_rounded(number, max(decimals, 0)) for number in (value, low, high))
+    return "{} [{}, {}]".format(*shown)
+
+
+def _rounded(value: float, places: int) -> str:
+    """``value`` to ``places``, or to a digit where nothing but zeros would be left of it."""
+    said = f"{value:.{places}f}"
+    return plain(value, 1) if value != 0 and float(said) == 0 else said.replace("-", "−")
+
+
+def two_numbers(first: float, second: float) -> tuple[str, str]:
+    """Two numbers to as many digits as it takes to see that they differ, three to five."""
+    for digits in (3, 4, 5):
+        said = plain(first, digits), plain(second, digits)
+        if said[0] != said[1]:
+            break
+    return said
+
+
+def parameter_text(parameter: Parameter) -> str:
+    """Value, 95 % interval and unit; a parameter without an interval was held where it is."""
+    low, high = parameter.ci95
+    if low == high:
+        return f"held at {plain(parameter.value)}{unit_of(parameter.unit)}"
+    return interval(parameter.value, *parameter.ci95) + unit_of(parameter.unit)
+
+
+def gain_text(gain: Gain) -> str:
+    """By how many percent the error falls, with its interval."""
+    low, high = gain.ci95
+    span = f" [{plain(low, 2)}, {plain(high, 2)}]" if high > low else ""
+    return f"{plain(gain.gain_percent, 2)} %{span}".replace("-", "−")
+
+
+def gain_sentence(gain: Gain) -> str:
+    """The error without and with something, on data that was not fitted."""
+    without, within = two_numbers(gain.rmse_before, gain.rmse_after)
+    outcome = "falls by" if gain.gain_percent > 0 else "does not fall:"
+    return (
+        f"On data that was not fitted, the error is {without} {gain.unit} without it and {within} {gain.unit} with it:"
+        f" it {outcome} {gain_text(gain)}."
+    )
+
+
+def share_of_full_scale(diagnosis: Diagnosis, value: float) -> float:
+    """``value`` (reading's unit) in percent of the full-scale reading; NaN where that is not known."""
+    return 100.0 * value / diagnosis.full_scale_reading if diagnosis.full_scale_reading > 0 else math.nan
+
+
+def how_much(diagnosis: Diagnosis) -> str | None:
+    """One sentence: the error on held-out data before and after, in the reading's unit and of full scale."""
+    before, after = diagnosis.baseline, diagnosis.extended
+    if before is None or after is None:
+        return None
+    said = (
+        f"on data that was not fitted, the simulated reading is off by {plain(before.rmse)} {before.unit}"
+        f" ({plain(share_of_full_scale(diagnosis, before.rmse), 2)} % of full scale, rms)"
+    )
+    if after.rmse < 0.98 * before.rmse:
+        said += (
+            f"; with what was found it is off by {plain(after.rmse)} {after.unit}"
+            f" ({plain(share_of_full_scale(diagnosis, after.rmse), 2)} %)"
+        )
+    return sentence(said)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A line of the comparison: the figure's name, before, after, and the change in percent (None: no sense in one)."""
+
+    name: str
+    before: str
+    after: str
+    change: str
+
+
+def comparison(diagnosis: Diagnosis) -> list[Row]:
+    """The baseline and the extended simulation, side by side, on held-out data."""
+    before, after = diagnosis.baseline, diagnosis.extended
+    if before is None or after is None:
+        return []
+
+    def of_scale(standing: GoodnessOfFit, value: float) -> str:
+        return f"{plain(value)} {standing.unit} ({plain(share_of_full_scale(diagnosis, value), 2)} %)"
+
+    rows = [
+        Row(
+            "error of the simulated reading, rms (of full scale)",
+            of_scale(before, before.rmse),
+            of_scale(after, after.rmse),
+            _change(before.rmse, after.rmse),
+        ),
+        Row("fit", f"{before.fit_percent:.2f} %", f"{after.fit_percent:.2f} %", ""),
+    ]
+    if math.isfinite(before.force_rmse_n) and math.isfinite(after.force_rmse_n):
+        rows.append(
+            Row(
+                "error of the compensated force, rms",
+                f"{plain(before.force_rmse_n)} N",
+                f"{plain(after.force_rmse_n)} N",
+                _change(before.force_rmse_n, after.force_rmse_n),
+            )
+        )
+    rows.append(
+        Row(
+            "structure that is left in the error, rms (of full scale)",
+            of_scale(before, before.structure_rms) if before.structure_rms > 0 else NO_STRUCTURE,
+            of_scale(after, after.structure_rms) if after.structure_rms > 0 else NO_STRUCTURE,
+            _change(before.structure_rms, after.structure_rms),
+        )
+    )
+    return rows
+
+
+def _change(before: float, after: float) -> str:
+    if not before > 0:
+        return "–"
+    percent = 100.0 * (after / before - 1.0)
+    return "none" if abs(percent) < 0.5 else f"{percent:+.0f} %".replace("-", "−")
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbour:
+    """Another effect that a cause might be: what it is, how much worse it fits, what would tell the two apart."""
+
+    name: str
+    says: str
+    margin: str
+    told_apart_by: str
+
+
+def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
+    """What is known of the effects ``names`` beside ``cause``."""
+    margins = {rival.effect: rival.margin for rival in cause.rivals}
+    known = catalogue()
+    found = []
+    for name in names:
+        other = known.get(name)
+        apart = sorted(SAYS[word] for word in told_apart_by(cause.effect, other)) if other else []
+        found.append(
+            Neighbour(
+                words(name),
+                other.says if other else "",
+                plain(margins[name], 2) if name in margins else "–",
+                "; ".join(apart),
+            )
+        )
+    return found
+
+
+def other_rivals(cause: Cause) -> list[Neighbour]:
+    """The effects that came near and can be ruled out."""
+    return neighbours(cause, [rival.effect for rival in cause.rivals if rival.effect not in cause.equivalents])
+
+
+def why_this_one(cause: Cause) -> str:
+    """One sentence on how far the name can be trusted against its neighbours."""
+    if cause.equivalents:
+        return (
+            f"this data cannot tell it from {listed(cause.equivalents)}: take the name as one of"
+            f" {len(cause.equivalents) + 1} that fit alike"
+        )
+    others = other_rivals(cause)
+    if others:
+        return (
+            f"no other effect of the catalogue does as well; the nearest, {others[0].name}, fits worse by"
+            f" {others[0].margin} in −2 log likelihood"
+        )
+    return "no other effect of the catalogue comes near"
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """Percent of the baseline's held-out error variance."""
+
+    explained: float
+    left: float
+    noise: float
+
+
+def shares(diagnosis: Diagnosis) -> Shares:
+    """How the baseline's error divides into what was explained, what could be, and what is noise; the sum is 100."""
+    explained = min(max(diagnosis.explained_percent, 0.0), 100.0)
+    explainable = min(max(diagnosis.explainable_percent, explained), 100.0)
+    return Shares(explained, explainable - explained, 100.0 - explainable)
+
+
+def shares_text(diagnosis: Diagnosis) -> str:
+    """The same in a sentence."""
+    part = shares(diagnosis)
+    explainable = part.explained + part.left
+    if explainable < 0.5:
+        return "Hardly any of the error's variance could be explained at all: the rest is noise."
+    said = f"{plain(explainable, 3)} % of the error's variance could be explained at all, the rest is noise;"
+    if part.explained < 0.05:
+        return f"{said} none of it is explained."
+    return f"{said} {plain(part.explained, 3)} % is explained: {100 * part.explained / explainable:.0f} % of that."
+
+
+def fault_text(fault: DataFault) -> str:
+    """Kind, place, share and what it means."""
+    span = f"{file_name(fault.label)}, {fault.start_s:.6g}–{fault.stop_s:.6g} s"
+    return f"{words(fault.kind)}, {span} ({share_text(fault.share)} of the samples): {fault.says}"
+
+
+def file_name(label: str) -> str:
+    """A recording's label without the folders before it."""
+    return PurePath(label).name or label
+
+
+def share_text(share: float) -> str:
+    """A fraction in percent."""
+    if share >= 0.9995:
+        return "all"
+    return f"{plain(100 * share, 2)} %" if share >= 5e-5 else "under 0.01 %"

@@ -1,0 +1,82 @@
+"""The HTML page of a trial: what was done, how, how regular, how hard, and what to be careful with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from smartshoe.gait import GaitResult
+from smartshoe.report.document import write_document
+from smartshoe.report.gait import charts, shapes
+from smartshoe.report.gait.terminal import COVERAGE_NOTE, by_foot, depends_on_coverage, weight_mark
+from smartshoe.report.numbers import plain, with_sd
+
+UNUSABLE = frozenset({"implausible_weight", "too_short", "no_stance"})  # kinds of flags: the numbers mean nothing
+
+
+def write_gait_page(path: Path, found: GaitResult, title: str, facts: Mapping[str, str]) -> Path:
+    """Write the page to ``path``, whole or not at all, and return it. ``facts``: small print by name."""
+    grade, headline = verdict(found)
+    both, by_stride = charts.left_and_right(found), charts.variability(found)
+    return write_document(
+        path,
+        "gait.html",
+        {
+            "title": title,
+            "facts": facts,
+            "found": found,
+            "grade": grade,
+            "headline": headline,
+            "feet": list(found.feet),
+            "numbers": _numbers(found),
+            "rows": by_foot(found),
+            "strides": charts.mean_strides(found),
+            "insoles": shapes.insoles(found),
+            "trial": charts.trial(found),
+            "coverage_note": COVERAGE_NOTE if depends_on_coverage(found) else "",
+            "more": [chart for chart in (both, *charts.units(found), by_stride) if chart is not None],
+            "folded": [*charts.phases(found), *charts.memberships(found)],
+        },
+    )
+
+
+def verdict(found: GaitResult) -> tuple[str, str]:
+    """The trial's grade (good, look, bad) and one sentence."""
+    summary: Mapping[str, Any] = found.summary
+    said = [found.activity.capitalize()]
+    if summary["cadence_steps_per_min"] is not None:
+        said.append(f"{plain(summary['cadence_steps_per_min'])} steps a minute")
+    if summary["asymmetry_percent"] is not None:
+        said.append(f"asymmetry {plain(summary['asymmetry_percent'], 2)} %")
+    counted = sum(summary["strides"].values())
+    if counted:
+        said.append(f"{counted} strides counted")
+    sentence = ", ".join(said)
+    kinds = [flag.kind for flag in found.flags]
+    if not kinds:
+        return "good", f"{sentence}; nothing to be careful with was found"
+    grade = "bad" if UNUSABLE & set(kinds) else "look"
+    words = ", ".join(dict.fromkeys(kind.replace("_", " ") for kind in kinds))
+    return grade, f"{sentence}; be careful with: {words}"
+
+
+def _numbers(found: GaitResult) -> list[tuple[str, str]]:
+    """The few numbers that stand in large letters."""
+    summary: Mapping[str, Any] = found.summary
+    said: list[tuple[str, str]] = []
+    if summary["cadence_steps_per_min"] is not None:
+        said.append((plain(summary["cadence_steps_per_min"]), "steps a minute"))
+    if found.activity == "running" and summary["flight_percent"] is not None:
+        said.append((f"{plain(summary['flight_percent'])} %", "of a stride in flight"))
+    elif summary["double_support_percent"] is not None:
+        said.append((f"{plain(summary['double_support_percent'])} %", "of a stride on both feet"))
+    if summary["asymmetry_percent"] is not None:
+        said.append((f"{plain(summary['asymmetry_percent'], 2)} %", "asymmetry, left to right"))
+    weight = found.forces.body_weight
+    if weight is not None:
+        text = f"{with_sd({'value': weight.value, 'sd': weight.sd})} N"
+        said.append((text, f"body weight{weight_mark(found)} ({weight.source.replace('_', ' ')})"))
+    if found.forces.standing_total_n is not None:
+        said.append((f"{found.forces.standing_total_n:.1f} N", "total while standing"))
+    return said

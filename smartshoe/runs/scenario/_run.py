@@ -1,0 +1,279 @@
+"""Carrying a scenario out: devices, protocols, identification, compensation, validation."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smartshoe.calibration import Calibration
+from smartshoe.calibration.validation import Validation, validate
+from smartshoe.devices import TestMachine, open_machine
+from smartshoe.errors import LimitError, OptionError, SmartShoeError
+from smartshoe.files.logs import read
+from smartshoe.identification import Identification, identify
+from smartshoe.protocol import Protocol
+from smartshoe.recording import Recording
+from smartshoe.runs.scenario._schema import DiagnoseTable, Scenario, ScenarioText
+from smartshoe.runs.scenario._trial import RecordedTrial, TrialResult, analyse_trial, opened_shoe, record_trial
+from smartshoe.version import __version__
+
+if TYPE_CHECKING:
+    from smartshoe.diagnosis import Diagnosis
+
+Progress = Callable[[str], None]
+
+
+def _silent(_: str) -> None:
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class UnitResult:
+    """What came out for one unit: its recordings by experiment, and each step's result."""
+
+    name: str
+    recordings: dict[str, Recording]
+    identification: Identification
+    calibration: Calibration
+    validation: Validation
+    fitted: tuple[str, ...]
+    judged: tuple[str, ...]
+    truth: dict[str, Any] = field(default_factory=dict)
+    diagnosis: Diagnosis | None = None
+
+    @cached_property
+    def identified(self) -> dict[str, Any]:
+        """`Identification.to_dict`, which result, page and terminal all show."""
+        return self.identification.to_dict()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The unit's part of ``result.json``."""
+        return {
+            "unit": self.name,
+            "recordings": {
+                name: {
+                    "samples": len(recording),
+                    "duration_s": recording.duration_s,
+                    "source": recording.source,
+                }
+                for name, recording in self.recordings.items()
+            },
+            "fitted": list(self.fitted),
+            "judged": list(self.judged),
+            "device": self.truth,
+            "identification": self.identified,
+            "validation": self.validation.to_dict(),
+            "diagnosis": self.diagnosis.to_dict() if self.diagnosis else None,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioResult:
+    """All units of a scenario, and its trial."""
+
+    scenario: Scenario
+    source: Path
+    units: tuple[UnitResult, ...]
+    trial: TrialResult | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The whole result: schema ``smartshoe.run/1``."""
+        trial = {"trial": self.trial.to_dict()} if self.trial is not None else {}
+        return {
+            "schema": "smartshoe.run/1",
+            "scenario": self.source.name,
+            "title": self.scenario.title,
+            "seed": self.scenario.seed,
+            "version": __version__,
+            "units": [unit.to_dict() for unit in self.units],
+            **trial,
+        }
+
+
+def _seed_of(scenario: Scenario, name: str) -> int:
+    """A unit's own seed: it depends on the unit's name, so that adding a unit leaves the others' noise alone."""
+    return int(np.random.SeedSequence([scenario.seed, zlib.crc32(name.encode())]).generate_state(1)[0])
+
+
+def protocols_of(scenario: Scenario, source: ScenarioText) -> dict[str, Protocol]:
+    """The scenario's protocols by name; raises `ScenarioError` for one that exceeds its limits."""
+    built: dict[str, Protocol] = {}
+    for name, table in scenario.protocol.items():
+        try:
+            built[name] = table.build(name)
+        except LimitError as error:
+            raise source.error(("protocol", name), str(error)) from error
+    return built
+
+
+def _record(
+    scenario: Scenario, source: ScenarioText, index: int, protocols: dict[str, Protocol], progress: Progress
+) -> dict[str, Recording]:
+    unit = scenario.unit[index]
+    if unit.recordings:
+        found: dict[str, Recording] = {}
+        for name in unit.recordings:
+            path = Path(name) if Path(name).is_absolute() else source.path.parent / name
+            progress(f"{unit.name}: reading {path.name}")
+            found[path.stem] = read(
+                path,
+                time=unit.columns.time,
+                force=unit.columns.force,
+                sensors=[unit.columns.sensor] if unit.columns.sensor else [],
+                unit=unit.name,
+                name=path.stem,
+            )
+        return found
+    recordings: dict[str, Recording] = {}
+    with _machine_of(scenario, source, index) as machine:
+        # Every protocol is checked before the first one moves anything.
+        _check_protocols(machine, protocols, source)
+        for name, protocol in protocols.items():
+            progress(f"{unit.name}: {name}")
+            recordings[name] = machine.run(protocol)
+    return recordings
+
+
+def _machine_of(scenario: Scenario, source: ScenarioText, index: int) -> TestMachine:
+    """The machine with the unit under it; raises `ScenarioError` for an option that is none."""
+    unit = scenario.unit[index]
+    options = _beside(source, {**scenario.machine.options, **unit.options})
+    try:
+        return open_machine(scenario.machine.backend, unit=unit.name, seed=_seed_of(scenario, unit.name), **options)
+    except OptionError as error:
+        in_machine = error.keys[:1] != () and error.keys[0] in {*scenario.machine.options} - {*unit.options}
+        raise source.from_option(error, ("machine",) if in_machine else ("unit", index)) from error
+
+
+def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], source: ScenarioText) -> None:
+    for name, protocol in protocols.items():
+        try:
+            machine.check(protocol)
+        except LimitError as error:
+            raise source.error(("protocol", name), str(error)) from error
+
+
+def check_simulated(scenario: Scenario, source: ScenarioText) -> None:
+    """Open every simulated device of the scenario and check its protocols, and move nothing.
+
+    So a misspelt option is told before the first experiment. Devices that are not simulated are left alone. Raises
+    `ScenarioError`, which points into the scenario.
+    """
+    protocols = protocols_of(scenario, source)
+    if scenario.machine.backend.startswith("sim:"):
+        for index, unit in enumerate(scenario.unit):
+            if not unit.recordings:
+                with _machine_of(scenario, source, index) as machine:
+                    _check_protocols(machine, protocols, source)
+    if scenario.trial is not None and scenario.trial.shoe.startswith("sim:"):
+        with opened_shoe(scenario, source, scenario.seed):
+            pass
+
+
+def _beside(source: ScenarioText, options: dict[str, Any]) -> dict[str, Any]:
+    """``options`` with a twin's calibration taken from the scenario's folder, as recordings are."""
+    bladder = options.get("bladder")
+    if not isinstance(bladder, dict) or not isinstance(bladder.get("twin"), str):
+        return options
+    return {**options, "bladder": {**bladder, "twin": str(source.path.parent / bladder["twin"])}}
+
+
+def simulate(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> dict[str, dict[str, Recording]]:
+    """Only the devices: recordings by unit and experiment."""
+    protocols = protocols_of(scenario, source)
+    return {
+        unit.name: _record(scenario, source, index, protocols, progress) for index, unit in enumerate(scenario.unit)
+    }
+
+
+def simulate_trial(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> RecordedTrial | None:
+    """Only the shoes: what the scenario's trial recorded; None where there is no ``[trial]``."""
+    if scenario.trial is None:
+        return None
+    progress(f"{scenario.trial.name}: recording")
+    return record_trial(scenario, source, _seed_of(scenario, f"trial/{scenario.trial.name}"))
+
+
+def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str, ...]:
+    names = tuple(name for name in use if name in recordings)
+    return names or tuple(recordings)
+
+
+def diagnosed_on(recordings: dict[str, Recording], settings: DiagnoseTable) -> list[Recording]:
+    """The recordings that a diagnosis is fitted to: those in use, or all that are not held out."""
+    kept = set(settings.hold_out)
+    used = settings.use or tuple(name for name in recordings if name not in kept)
+    return [recordings[name] for name in used if name in recordings]
+
+
+def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Diagnosis:
+    from smartshoe.diagnosis import diagnose
+
+    return diagnose(
+        diagnosed_on(recordings, settings),
+        hold_out=[recordings[name] for name in settings.hold_out if name in recordings],
+        material=settings.material_percent / 100.0,
+    )
+
+
+def steps_of(scenario: Scenario) -> int:
+    """How often `run` tells of its progress."""
+    pressed = sum(len(unit.recordings) or len(scenario.protocol) for unit in scenario.unit)
+    of_each = 2 + (scenario.diagnose is not None)
+    return pressed + of_each * len(scenario.unit) + 2 * (scenario.trial is not None)
+
+
+def run(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) -> ScenarioResult:
+    """Devices, then identification, calibration and validation of each unit, then the trial.
+
+    Raises what the steps raise, with the unit's name in front.
+    """
+    settings = scenario.identify
+    results: list[UnitResult] = []
+    # Before the fits, so that a trial that cannot be is told at once.
+    recorded = simulate_trial(scenario, source, progress)
+    if recorded is not None:
+        calibrated = {unit.name for unit in scenario.unit}
+        surplus = [channel.name for channel in recorded.recording.sensors if channel.name not in calibrated]
+        if surplus:
+            raise source.error(("trial",), f"{', '.join(surplus)} would not be calibrated: add a [[unit]] for each")
+    for name, recordings in simulate(scenario, source, progress).items():
+        fitted = _chosen(recordings, settings.use)
+        judged = _chosen(recordings, scenario.validate_.use)
+        progress(f"{name}: identifying")
+        try:
+            found = identify(
+                [recordings[key] for key in fitted],
+                direction=settings.direction,
+                method=settings.method,
+                structure=settings.structure,
+                offset=settings.offset,
+                delay=settings.delay,
+                initial_state=settings.initial_state,
+                prefilter_rad_s=settings.prefilter_rad_s,
+            )
+            calibration = found.calibration()
+            progress(f"{name}: validating")
+            validation = validate([recordings[key] for key in judged], calibration)
+            diagnosis = None
+            if scenario.diagnose is not None:
+                progress(f"{name}: diagnosing")
+                diagnosis = _diagnosed(recordings, scenario.diagnose)
+        except SmartShoeError as error:
+            error.args = (f"{source.path}, unit {name}: {error}",)
+            raise
+        truth = next(unit.options for unit in scenario.unit if unit.name == name)
+        results.append(
+            UnitResult(name, recordings, found, calibration, validation, fitted, judged, dict(truth), diagnosis)
+        )
+    trial = None
+    if recorded is not None and scenario.trial is not None:
+        progress(f"{scenario.trial.name}: events, strides, forces")
+        trial = analyse_trial(scenario.trial, recorded, [unit.calibration for unit in results])
+    return ScenarioResult(scenario, source.path, tuple(results), trial)
