@@ -3,7 +3,7 @@
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._procedure import diagnose
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Trace
-from smartshoe.diagnosis._thresholds import Thresholds, described
+from smartshoe.integrity.thresholds import Thresholds, described
 
 __all__ = [
     "Cause",

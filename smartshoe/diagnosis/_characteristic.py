@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
 STANDARD = Thresholds()

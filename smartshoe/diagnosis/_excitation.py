@@ -12,7 +12,7 @@ import numpy as np
 
 from smartshoe.arrays import Mask
 from smartshoe.diagnosis._session import CYCLE_SHARE, Session
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
 

@@ -22,7 +22,7 @@ from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions, allowed, search, step
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis._session import CYCLE_SHARE, Session
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm

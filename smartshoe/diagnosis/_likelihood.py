@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 

@@ -22,12 +22,12 @@ from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
-from smartshoe.diagnosis._thresholds import Thresholds
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel

@@ -9,7 +9,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._session import Scale, Session
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 
 STANDARD = Thresholds()
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.diagnosis._thresholds import Thresholds, described
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import DataFault
+from smartshoe.integrity.thresholds import Thresholds, described
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none

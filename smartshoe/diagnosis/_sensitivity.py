@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
 

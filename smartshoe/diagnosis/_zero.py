@@ -15,7 +15,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import REST_SHARE, Scale, Session
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95, white_noise_sd
 
@@ -227,10 +227,3 @@ def _course_says(course: Course, order: float | None) -> str:
     if course == "exponential":
         return "as one exponential"
     return f"{course} than exponentially (its rate goes as the reading to the power {order:.2f})"
-
-
-def largest_of_noise(count: int, thresholds: Thresholds) -> float:
-    """What the largest of ``count`` normal deviates exceeds, in standard deviations, by a false alarm only."""
-    from scipy.special import ndtri
-
-    return -float(ndtri(0.5 * thresholds.false_alarm / count))

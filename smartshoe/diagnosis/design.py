@@ -13,8 +13,8 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._baseline import USUAL
 from smartshoe.diagnosis._sensitivity import Linearised, linearised
 from smartshoe.diagnosis._session import Scale, prepare, thinning
-from smartshoe.diagnosis._thresholds import Thresholds
 from smartshoe.errors import UsageError
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel

@@ -1,4 +1,4 @@
-"""Every number that a diagnosis decides by, in one record: unit, meaning and origin beside each."""
+"""Every number that integrity and diagnosis decide by, in one record: unit, meaning and origin beside each."""
 
 from __future__ import annotations
 
@@ -117,3 +117,10 @@ class Thresholds:
 def described(given: Thresholds) -> list[dict[str, Any]]:
     """Name, value, unit, meaning and origin of each."""
     return [{"name": f.name, "value": getattr(given, f.name), **f.metadata} for f in fields(given)]
+
+
+def largest_of_noise(count: int, thresholds: Thresholds) -> float:
+    """What the largest of ``count`` normal deviates exceeds, in standard deviations, by a false alarm only."""
+    from scipy.special import ndtri
+
+    return -float(ndtri(0.5 * thresholds.false_alarm / count))
