@@ -23,11 +23,14 @@ _AROUND = 40  # letters of a statement that are shown on either side of a change
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One small bug, the ``number``-th of its file: the line, what stood there and what takes its place."""
+    """One small bug, the ``number``-th of its file: its lines, what stood there and what takes its place.
+
+    ``line`` to ``last`` are those of the statement, without the statements in its blocks.
+    """
 
     number: int
     line: int
-    function: int
+    last: int
     before: str
     after: str
 
@@ -40,7 +43,6 @@ class _Place:
     """One thing in the tree that may be another: swapped in, and swapped out again."""
 
     statement: ast.stmt
-    function: int
     holder: ast.AST
     field: str
     index: int | None
@@ -70,8 +72,19 @@ def changes(text: str) -> list[Change]:
         after = ast.unparse(place.statement).split("\n")
         place.swap()
         old, new = next(pair for pair in zip(before, after, strict=True) if pair[0] != pair[1])
-        found.append(Change(number, place.statement.lineno, place.function, *_shortened(old.strip(), new.strip())))
+        said = _shortened(old.strip(), new.strip())
+        found.append(Change(number, place.statement.lineno, _last_line(place.statement), *said))
     return found
+
+
+def _last_line(statement: ast.stmt) -> int:
+    """The last line of a statement that is not one of its blocks'."""
+    blocks = [getattr(statement, name, None) for name in ("body", "cases")]
+    inner = [block[0] for block in blocks if isinstance(block, list) and block]
+    if not inner:
+        return statement.end_lineno or statement.lineno
+    first = inner[0].pattern if isinstance(inner[0], ast.match_case) else inner[0]
+    return max(statement.lineno, first.lineno - 1)
 
 
 def _shortened(old: str, new: str) -> tuple[str, str]:
@@ -88,27 +101,25 @@ def _shortened(old: str, new: str) -> tuple[str, str]:
     return cut(old), cut(new)
 
 
-def changed(text: str, number: int) -> str:
-    """The source ``text`` with the ``number``-th of its `changes` made."""
+def changed(text: str, number: int) -> ast.Module:
+    """The source ``text`` with the ``number``-th of its `changes` made; its lines are numbered as they were."""
     tree = ast.parse(text)
     _places(tree)[number].swap()
-    return ast.unparse(tree) + "\n"
+    return ast.fix_missing_locations(tree)
 
 
 def _places(tree: ast.Module) -> list[_Place]:
-    return [place for item in tree.body for place in _of_statement(item, 0)]
+    return [place for item in tree.body for place in _of_statement(item)]
 
 
-def _of_statement(statement: ast.stmt, function: int) -> Iterator[_Place]:
-    """The places of a statement and of those in its blocks; ``function`` is the first line of what holds it."""
+def _of_statement(statement: ast.stmt) -> Iterator[_Place]:
+    """The places of a statement and of those in its blocks."""
     if isinstance(statement, _LEFT_ALONE) or _is_never_run(statement):
         return
-    if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
-        function = min([statement.lineno, *(item.lineno for item in statement.decorator_list)])
     for field, other in _instead_of_statement(statement):
-        yield _Place(statement, function, statement, field, None, other)
+        yield _Place(statement, statement, field, None, other)
     for holder, field, index, item in _parts(statement):
-        yield from _of_part(item, _Place(statement, function, holder, field, index, None))
+        yield from _of_part(item, _Place(statement, holder, field, index, None))
 
 
 def _instead_of_statement(statement: ast.stmt) -> Iterator[tuple[str, ast.AST]]:
@@ -132,7 +143,7 @@ def _parts(node: ast.AST) -> Iterator[tuple[ast.AST, str, int | None, object]]:
 
 def _of_part(item: object, place: _Place) -> Iterator[_Place]:
     if isinstance(item, ast.stmt):
-        yield from _of_statement(item, place.function)
+        yield from _of_statement(item)
     elif isinstance(item, ast.AST) and not isinstance(item, _LEFT_ALONE):
         if isinstance(item, ast.keyword) and item.arg in _WORDS_LEFT_ALONE:
             return

@@ -5,167 +5,214 @@ a room; without a room's name it takes all of ``rooms.toml``. The same seed on t
 the kept file holds is not run again; with ``--survivors`` those that survived are. ``--listed`` runs the bugs of
 ``listed.toml`` instead. A mutant whose name stands in docs/reliability.md is argued for there and counts as neither.
 
-Each is put into a copy of the checkout, so that programs that tests start meet it too. Of the room's tests those files
-are run that call its function. Tests that take more than three times the processor time that they take without it count
-as having noticed.
+Each is put into a copy of the checkout, so that programs that tests start meet it too. Which lines each test runs is
+found once (the kept file holds that as well); of the room's tests those are run that run the mutant's lines, cheapest
+first, until one fails or takes four times its usual processor time, 20 s of them at most: what only a longer one would
+notice counts as unnoticed. Compiled kernels are tried in plain Python.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from forked_tests import import_libraries, run_tests
+from forked_tests import NOT_SWAPPED, Costs, Ended, import_libraries, record, run_fresh, serve
 from mutants import changed, changes
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 COPIED = ("smartshoe", "simulators", "tests", "scenarios", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
 ARGUED = ROOT / "docs" / "reliability.md"
-SLOWER, LEAST_S = 3.0, 20.0  # times the usual processor time, and never less, before tests count as hanging
+KERNELS = "smartshoe/kernels/"
+MOST_S = 20.0  # of a mutant's tests, by the processor time that they take without it
 Result = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """One small bug: its room, the file and its text with the bug, the tests that are to notice."""
+    """One small bug: its room, its file as it was, the lines of its statement, and the bug's number or its text."""
 
     room: str
     file: str
     line: int
-    function: int
+    last: int
     shown: str
     text: str = field(repr=False)
-    tests: tuple[str, ...] = ()
+    number: int = 0
+    bug: str = field(default="", repr=False)
+    costs: Costs = field(default_factory=dict, repr=False)
 
     @property
     def name(self) -> str:
         """What it is called in the kept file and in docs/reliability.md."""
         return f"{self.file.removeprefix('smartshoe/')}: {self.shown}"
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether numba compiles its file."""
+        return self.file.startswith(KERNELS)
+
+    def tree(self) -> ast.Module:
+        """The file with the bug in it."""
+        return ast.parse(self.bug) if self.bug else changed(self.text, self.number)
+
 
 class Kept:
-    """What is known from earlier runs: results by mutant, costs and calls by file of tests."""
+    """What is known from earlier runs: results by mutant, and by file of tests what each of its tests runs."""
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path) -> None:
         self._path = path
         self.results: dict[str, Result] = {}
-        self.tests: dict[str, Result] = {}
-        for line in path.read_text(encoding="utf-8").splitlines() if path and path.exists() else ():
-            self._take(json.loads(line))
+        self.recorded: dict[str, Result] = {}
+        self.read()
 
-    def _take(self, item: Result) -> None:
-        if "calls" in item:
-            self.tests[item["name"]] = item
-        else:
-            self.results[item["name"]] = item
+    def read(self) -> None:
+        """Take what the file holds, which another process may have written."""
+        for line in self._path.read_text(encoding="utf-8").splitlines() if self._path.exists() else ():
+            item = json.loads(line)
+            (self.recorded if "recorded" in item else self.results)[item["name"]] = item
 
-    def add(self, item: Result) -> Result:
-        """Remember ``item``, on disk where a file was given."""
-        self._take(item)
-        if self._path:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(item, ensure_ascii=False) + "\n")
-        return item
+    def add(self, item: Result) -> None:
+        """Remember ``item``, on disk."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(item, ensure_ascii=False) + "\n")
+        self.read()
 
 
-class Checkout:
-    """A copy of the checkout, in which one file at a time is another."""
+class Room:
+    """Files of a copied checkout and the tests that hold them, in compiled or in plain Python."""
 
-    def __init__(self, path: Path, kept: Kept) -> None:
-        self.path, self._kept = path, kept
+    def __init__(self, path: Path, kept: Kept, files: list[str], tests: list[str], plain_python: bool) -> None:
+        self._path, self._kept, self._plain_python = path, kept, plain_python
+        self._texts = {name: (path / name).read_text(encoding="utf-8") for name in files}
+        self._tests: dict[str, Result] = {}
+        self._imported: set[tuple[str, int]] = set()
+        self._files = tests
+        self._know(files, tests)
 
-    def matching(self, globs: list[str]) -> list[str]:
-        """The files that ``globs`` name, as texts from the checkout's root; `SystemExit` where one names none."""
-        for glob in globs:
-            if not any(self.path.glob(glob)):
-                raise SystemExit(f"rooms.toml: {glob} names no file: it has moved")
-        return sorted({str(path.relative_to(self.path)) for glob in globs for path in self.path.glob(glob)})
+    def _know(self, files: list[str], tests: list[str]) -> None:
+        """Find what the tests run, but for what is known already of these very files."""
+        source = "".join(self._texts.values()) + str(self._plain_python)
+        named = {}
+        for test in tests:
+            text = (self._path / test).read_text(encoding="utf-8")
+            named[f"{test} {hashlib.sha256((source + text).encode()).hexdigest()[:16]}"] = test
+        new = [test for name, test in named.items() if name not in self._kept.recorded]
+        found = record(self._path, new, files, self._plain_python) if new else {}
+        for name, test in named.items():
+            if test in new:
+                own = {key: about for key, about in found["tests"].items() if key.startswith(f"{test}::")}
+                self._kept.add({"name": name, "recorded": own, "imported": found["imported"]})
+            item = self._kept.recorded[name]
+            self._tests |= item["recorded"]
+            self._imported |= {(file, line) for file, line in item["imported"]}
+        failed = [name for name, about in self._tests.items() if about["outcome"] == "failed"]
+        if failed and not self._plain_python:
+            raise SystemExit("\n".join(["these tests fail as the source is:", *failed]))
 
-    def measured(self, test: str) -> Result:
-        """Cost in s and calls of a file of tests, as the source is; raises `SystemExit` where one fails."""
-        digest = hashlib.sha256((self.path / test).read_bytes()).hexdigest()[:16]
-        known = self._kept.tests.get(test, {})
-        if known.get("digest") != digest:
-            ended = run_tests(self.path, [test], 3600.0, calls=True)
-            if ended.status != 0:
-                raise SystemExit(f"{test} fails as the source is:\n{(self.path / 'said.txt').read_text()[-3000:]}")
-            about = {"name": test, "digest": digest, "cost_s": round(ended.cpu_s, 2)}
-            self._kept.add({**about, "calls": [list(call) for call in sorted(ended.calls)]})
-        return self._kept.tests[test]
+    def _costs(self, lines: Iterable[tuple[str, int]]) -> Costs:
+        """The tests that run one of ``lines``, cheapest first, then those that start programs, which are not seen."""
+        wanted: dict[str, set[int]] = {}
+        for file, line in lines:
+            wanted.setdefault(file, set()).add(line)
+        passed = [(about["cost_s"], name) for name, about in self._tests.items() if about["outcome"] == "passed"]
 
-    def tried(self, mutant: Mutant) -> Result:
-        """Put ``mutant`` in, run its tests, cheapest first, and take it out.
+        def runs(name: str) -> bool:
+            return any(not own.isdisjoint(self._tests[name]["lines"].get(file, ())) for file, own in wanted.items())
 
-        Of a function that files of tests call, only those are run; of one that only compiled code or other programs
-        call, all.
-        """
-        about = {test: self.measured(test) for test in mutant.tests}
-        calling = {test: item for test, item in about.items() if [mutant.file, mutant.function] in item["calls"]}
-        about = calling or about
-        order = sorted(about, key=lambda test: about[test]["cost_s"])
-        usual_s = sum(item["cost_s"] for item in about.values())
-        with self._with(mutant):
-            ended = run_tests(self.path, order, max(LEAST_S, SLOWER * usual_s))
-        outcome = "survived" if ended.status == 0 else "hung" if ended.status is None else "killed"
+        seen = {name: cost_s for cost_s, name in sorted(passed) if runs(name)}
+        return seen | {name: cost_s for cost_s, name in sorted(passed) if self._tests[name]["started"]}
+
+    @staticmethod
+    def _affordable(costs: Costs) -> Costs:
+        """The first of ``costs`` that fit in `MOST_S`, and one at least."""
+        sums = accumulate(costs.values())
+        few = sum(sum_s <= MOST_S for sum_s in sums)
+        return dict(list(costs.items())[: max(few, 1)])
+
+    def _concerning(self, mutant: Mutant) -> Costs:
+        """The tests of a bug in what an import runs: first those that run a line which names what it gives."""
+        lines = range(mutant.line, mutant.last + 1)
+        named = [node for node in ast.walk(ast.parse(mutant.text)) if getattr(node, "lineno", 0) in lines]
+        names = {node.id for node in named if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+        functions = [node for node in named if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+        words = "|".join(re.escape(name) for name in {*names, *(node.name for node in functions)}) or r"(?!)"
+        told = [
+            (file, number)
+            for file, text in self._texts.items()
+            for number, line in enumerate(text.split("\n"), 1)
+            if re.search(rf"\b({words})\b", line)
+        ]
+        told += [(mutant.file, line) for node in functions for line in range(node.lineno, (node.end_lineno or 0) + 1)]
+        anywhere = ((mutant.file, line) for line in range(1, mutant.text.count("\n") + 2))
+        return self._costs(told) | self._costs(anywhere)
+
+    def try_each(self, mutants: list[Mutant]) -> None:
+        """Put each in, run its tests, take it out, and remember how it ended."""
+        quick, slow = [], []
+        for mutant in mutants:
+            lines = {(mutant.file, line) for line in range(mutant.line, mutant.last + 1)}
+            if lines & self._imported:
+                slow.append(replace(mutant, costs=self._affordable(self._concerning(mutant))))
+            else:
+                quick.append(replace(mutant, costs=self._affordable(self._costs(lines))))
+        if quick:
+            serve(self._path, self._files, quick, self._plain_python, self._remember)
+            self._kept.read()
+        left = [mutant for mutant in quick if self._kept.results[mutant.name]["outcome"] == NOT_SWAPPED]
+        for mutant in [*left, *slow]:
+            self._remember(mutant, run_fresh(self._path, mutant, self._plain_python))
+
+    def _remember(self, mutant: Mutant, ended: Ended) -> None:
+        about = {"room": mutant.room, "name": mutant.name, "line": mutant.line, "outcome": ended.outcome}
         by = ended.failed.removeprefix("tests/")
-        found = {"room": mutant.room, "name": mutant.name, "line": mutant.line, "outcome": outcome, "by": by}
-        return self._kept.add({**found, "cpu_s": round(ended.cpu_s, 1)})
-
-    @contextmanager
-    def _with(self, mutant: Mutant) -> Iterator[None]:
-        path, kernels, aside = self.path / mutant.file, self.path / "smartshoe" / "kernels", self.path / "compiled"
-        text, state = path.read_text(encoding="utf-8"), path.stat()
-        if path.parent == kernels:
-            # numba compiles what has changed and not what calls it: all is compiled anew.
-            shutil.move(kernels / "__pycache__", aside)
-        path.write_text(mutant.text, encoding="utf-8")
-        try:
-            yield
-        finally:
-            path.write_text(text, encoding="utf-8")
-            os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
-            if aside.exists():
-                shutil.rmtree(kernels / "__pycache__", ignore_errors=True)
-                shutil.move(aside, kernels / "__pycache__")
+        self._kept.add({**about, "by": by, "tests": len(mutant.costs), "cpu_s": round(ended.cpu_s, 1)})
 
 
-def drawn(checkout: Checkout, room: str, about: dict[str, list[str]], count: int, seed: int) -> list[Mutant]:
+def matching(path: Path, globs: list[str]) -> list[str]:
+    """The files that ``globs`` name, as texts from the checkout's root; `SystemExit` where one names none."""
+    for glob in globs:
+        if not any(path.glob(glob)):
+            raise SystemExit(f"rooms.toml: {glob} names no file: it has moved")
+    return sorted({str(found.relative_to(path)) for glob in globs for found in path.glob(glob)})
+
+
+def drawn(path: Path, room: str, files: list[str], count: int, seed: int) -> list[Mutant]:
     """``count`` of a room's mutants, the same for a seed and a source."""
-    texts = {name: (checkout.path / name).read_text(encoding="utf-8") for name in checkout.matching(about["files"])}
+    texts = {name: (path / name).read_text(encoding="utf-8") for name in files}
     every = [(name, change) for name, text in texts.items() for change in changes(text)]
     chosen = random.Random(f"{seed} {room}").sample(every, min(count, len(every)))
-    tests = tuple(checkout.matching(about["tests"]))
     return [
-        Mutant(room, name, change.line, change.function, str(change), changed(texts[name], change.number), tests)
-        for name, change in chosen
+        Mutant(room, name, change.line, change.last, str(change), texts[name], change.number) for name, change in chosen
     ]
 
 
-def listed(checkout: Checkout) -> list[Mutant]:
+def listed(path: Path, items: list[dict[str, Any]]) -> Iterator[Mutant]:
     """The bugs of ``listed.toml``; one whose place is no longer in the source is told and left out."""
-    found = []
-    for item in tomllib.loads((HERE / "listed.toml").read_text(encoding="utf-8"))["mutant"]:
-        text = (checkout.path / item["file"]).read_text(encoding="utf-8")
+    for item in items:
+        text = (path / item["file"]).read_text(encoding="utf-8")
         if text.count(item["before"]) != 1:
             print(f"{item['says']}: {item['file']} has changed, look it up anew", file=sys.stderr)
             continue
-        bug = text.replace(item["before"], item["after"])
-        found.append(Mutant("listed", item["file"], 0, 0, item["says"], bug, tuple(item["tests"])))
-    return found
+        line = text[: text.index(item["before"])].count("\n") + 1
+        last, bug = line + item["before"].count("\n"), text.replace(item["before"], item["after"])
+        yield Mutant("listed", item["file"], line, last, item["says"], text, bug=bug)
 
 
 @contextmanager
@@ -210,16 +257,28 @@ def main() -> None:
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", NUMBA_NUM_THREADS="1")
     os.environ.setdefault("SMARTSHOE_MEASURED", str(ROOT.parent / "shared" / "data"))
     import_libraries()
-    kept = Kept(options.keep)
-    again = {name for name, item in kept.results.items() if options.survivors and item["outcome"] == "survived"}
     results = []
     with copied() as copy:
-        checkout = Checkout(copy, kept)
-        rooms = options.rooms or list(table)
-        chosen = [m for room in rooms for m in drawn(checkout, room, table[room], options.count, options.seed)]
-        for mutant in listed(checkout) if options.listed else chosen:
-            is_known = mutant.name in kept.results and mutant.name not in again
-            results.append(kept.results[mutant.name] if is_known else checkout.tried(mutant))
+        kept = Kept(options.keep or copy.parent / "kept.jsonl")
+        again = {name for name, item in kept.results.items() if options.survivors and item["outcome"] == "survived"}
+        if options.listed:
+            items = tomllib.loads((HERE / "listed.toml").read_text(encoding="utf-8"))["mutant"]
+            files, tests = {item["file"] for item in items}, {test for item in items for test in item["tests"]}
+            table = {"listed": {"files": sorted(files), "tests": sorted(tests)}}
+            bugs = {"listed": list(listed(copy, items))}
+        else:
+            table = {
+                room: {key: matching(copy, table[room][key]) for key in ("files", "tests")}
+                for room in options.rooms or table
+            }
+            bugs = {room: drawn(copy, room, table[room]["files"], options.count, options.seed) for room in table}
+        for room, mutants in bugs.items():
+            new = [mutant for mutant in mutants if mutant.name not in kept.results or mutant.name in again]
+            for plain_python in (False, True):
+                own = [mutant for mutant in new if mutant.is_compiled == plain_python]
+                if own:
+                    Room(copy, kept, table[room]["files"], table[room]["tests"], plain_python).try_each(own)
+            results += [kept.results[mutant.name] for mutant in mutants]
     print(told(results, ARGUED.read_text(encoding="utf-8")))
 
 

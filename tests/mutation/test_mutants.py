@@ -45,9 +45,8 @@ def test_every_kind_of_small_bug_is_there_and_messages_are_left_alone() -> None:
 def test_each_change_is_made_alone_and_parses() -> None:
     plain = ast.unparse(ast.parse(SOURCE)).split("\n")
     for change in changes(SOURCE):
-        lines = changed(SOURCE, change.number).rstrip("\n").split("\n")
+        lines = ast.unparse(changed(SOURCE, change.number)).split("\n")
         assert sum(old != new for old, new in zip(plain, lines, strict=True)) == 1
-        assert ast.parse("\n".join(lines))
 
 
 @pytest.mark.bank

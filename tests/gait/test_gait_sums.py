@@ -1,0 +1,144 @@
+"""What a trial adds up to, where it is known exactly: weights, shares of time, order of contact, sequence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trials import Array, analysed, loads_of, ran, recorded, walked
+
+from smartshoe.errors import RefusedError
+from smartshoe.gait import GaitResult, analyse
+from smartshoe.gait.contact import Contacts
+from smartshoe.gait.force_sums import ForceSums
+from smartshoe.gait.indices import sequence_errors
+from smartshoe.gait.strides import Stride
+from smartshoe.gait.summary import of_main_activity
+from smartshoe.gait.trial import feet_of
+from smartshoe.gait.window import analyse_window
+from smartshoe.recording import Recording
+
+RATE_HZ = 200.0
+
+
+def _teeter(seconds: float) -> Array:
+    """The share of the left foot in a walk whose whole force is steady: 0.4 s on each foot, 0.1 s between them."""
+    at = np.arange(0.0, seconds, 1.0 / RATE_HZ) % 1.0
+    return np.interp(at, [0.0, 0.4, 0.5, 0.9, 1.0], [1.0, 1.0, 0.0, 0.0, 1.0])
+
+
+def _shared(left: Array, total_n: Array | float, start_s: float = 0.0) -> Recording:
+    loads = {"left_heel_n": left, "left_toe_n": left, "right_heel_n": 1.0 - left, "right_toe_n": 1.0 - left}
+    time_s = start_s + np.arange(left.size) / RATE_HZ
+    return recorded(time_s, {name: 0.5 * share * total_n for name, share in loads.items()})
+
+
+def test_where_the_whole_force_is_steady_it_is_the_body_weight() -> None:
+    weight = analyse(_shared(_teeter(12.0), 700.0)).forces.body_weight
+    assert weight is not None
+    assert weight.source == "strides"
+    assert weight.value == pytest.approx(700.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("start_s", [0.0, 500.0])
+def test_walking_and_standing_count_by_the_time_that_they_last(start_s: float) -> None:
+    left = np.concatenate([_teeter(12.0), np.full(1000, 0.5)])
+    total_n = np.concatenate([np.full(2400, 700.0), np.full(1000, 740.0)])
+    forces = analyse(_shared(left, total_n, start_s)).forces
+    assert forces.body_weight is not None
+    assert forces.body_weight.source == "strides"
+    assert forces.standing_total_n == pytest.approx(740.0, abs=0.1)
+    # Of 17 s some 11 are whole strides and 4 are settled standing.
+    assert forces.mean_total_n == pytest.approx((11 * 700.0 + 4 * 740.0) / 15, abs=2.5)
+
+
+def _analysed_with(gain_sd: float) -> float:
+    """The expected error of a trial whose units' gains are known to ``gain_sd``."""
+    feet, _ = feet_of([walked().recording], ())
+    uncertain = {
+        name: replace(foot, units=tuple(replace(unit, gain_sd=gain_sd) for unit in foot.units))
+        for name, foot in feet.items()
+    }
+    found = analysed()
+    contacts = {name: series.contacts for name, series in found.feet.items()}
+    sums = ForceSums(uncertain, 0.8)
+    for name, own in contacts.items():
+        sums.add_floors(name, own)
+    sums.add(analyse_window(uncertain, contacts, found.covering, None))
+    rmse_n = sums.forces(None).rmse_estimate_n
+    assert rmse_n is not None
+    return rmse_n
+
+
+def test_the_gains_uncertainty_adds_its_share_of_the_load_to_the_expected_error() -> None:
+    plain_n, uncertain_n = _analysed_with(0.0), _analysed_with(0.05)
+    mean_square = sum(float(np.mean(foot.load**2, axis=0).sum()) for foot in analysed().feet.values())
+    assert uncertain_n**2 - plain_n**2 == pytest.approx(0.05**2 * mean_square / 0.8**2, rel=1e-6)
+
+
+def _stride(start_s: float, *, runs: bool = False, toe_off_s: float | None = None) -> Stride:
+    off_s = start_s + 0.6 if toe_off_s is None else toe_off_s
+    return Stride("left", start_s, start_s + 1.0, off_s, None, None, 60.0, None, None, None, runs, False)
+
+
+def test_a_stride_is_out_of_sequence_where_two_events_come_together_or_one_is_missing() -> None:
+    strike_s = np.array([0.0, 1.0, 2.0, 3.0])
+    # Heel, then metatarsal: in order; with the heel; never; in order, but off the ground as the heel leaves it.
+    onset_s = np.column_stack([strike_s, strike_s + [0.1, 0.0, np.nan, 0.1]])
+    release_s = np.column_stack([strike_s + 0.3, strike_s + 0.6])
+    contacts = Contacts(("heel", "meta1"), strike_s, strike_s + 0.6, onset_s, release_s, np.zeros(0), np.zeros((0, 2)))
+    strides = [_stride(0.0), _stride(1.0), _stride(2.0), _stride(3.0, toe_off_s=3.3)]
+    assert [sequence_errors(contacts, [stride])[0] for stride in strides] == [0, 1, 1, 1]
+    assert sequence_errors(contacts, strides) == (3, 4)
+
+
+@pytest.mark.parametrize("regions", [("heel", "toe"), ("meta4", "meta1")])
+def test_a_shoe_that_cannot_tell_the_sequence_is_not_judged(regions: tuple[str, str]) -> None:
+    strike_s = np.array([0.0, 1.0])
+    onset_s, release_s = (np.column_stack([strike_s + a, strike_s + b]) for a, b in ((0.0, 0.1), (0.3, 0.6)))
+    contacts = Contacts(regions, strike_s, strike_s + 0.6, onset_s, release_s, np.zeros(0), np.zeros((0, 2)))
+    assert sequence_errors(contacts, [_stride(0.0), _stride(1.0)]) == (0, 0)
+
+
+def test_of_as_many_strides_walked_as_run_those_walked_are_told() -> None:
+    walks, runs = _stride(0.0), _stride(1.0, runs=True)
+    assert of_main_activity([walks, runs]) == [walks]
+    assert of_main_activity([walks, runs, runs]) == [runs, runs]
+
+
+def test_an_activity_is_told_by_the_time_that_it_takes() -> None:
+    """Four seconds of running after thirty of walking are less than a seventh."""
+    run = {name: values[:800] for name, values in loads_of(ran()).items()}
+    both = {name: np.concatenate([values, run[name]]) for name, values in loads_of(walked()).items()}
+    found = analyse(recorded(np.arange(both["left_heel_n"].size) / RATE_HZ, both), coverage=0.8)
+    assert found.activity == "walking"
+    assert any(stride.runs for stride in found.strides)
+
+
+def _own(found: GaitResult, foot: str) -> list[Stride]:
+    return [stride for stride in of_main_activity(found.strides) if stride.foot == foot]
+
+
+def test_abnormality_is_its_mean_over_the_samples_of_the_strides() -> None:
+    for name, foot in analysed().feet.items():
+        spans = [np.searchsorted(foot.time_s, [s.start_s, s.end_s]) for s in _own(analysed(), name)]
+        inside = np.concatenate([foot.abnormality[first:last] for first, last in spans])
+        assert analysed().indices[name]["abnormality_percent"] == pytest.approx(100.0 * inside.mean(), rel=1e-12)
+
+
+def test_the_lateral_metatarsal_is_counted_where_it_comes_first() -> None:
+    earlier, seen = 0, 0
+    for name, foot in analysed().feet.items():
+        own = np.isin(foot.contacts.strike_s, [stride.start_s for stride in _own(analysed(), name)])
+        meta4, meta1 = (foot.contacts.onset_s[own, foot.contacts.regions.index(unit)] for unit in ("meta4", "meta1"))
+        earlier += int(np.sum(meta4 < meta1))
+        seen += int(np.sum(np.isfinite(meta4) & np.isfinite(meta1)))
+    assert seen > 40
+    assert analysed().summary["meta4_before_meta1_percent"] == pytest.approx(100.0 * earlier / seen, rel=1e-12)
+
+
+def test_shoes_that_nobody_wore_are_refused() -> None:
+    time_s = np.arange(0.0, 10.0, 1.0 / RATE_HZ)
+    with pytest.raises(RefusedError, match="no stance is found and no foot is loaded"):
+        analyse(recorded(time_s, {"left_heel_n": 0.0 * time_s, "right_heel_n": 0.0 * time_s}))
