@@ -85,7 +85,7 @@ def _stride(start_s: float, *, runs: bool = False, toe_off_s: float | None = Non
 def test_a_stride_is_out_of_sequence_where_two_events_come_together_or_one_is_missing() -> None:
     strike_s = np.array([0.0, 1.0, 2.0, 3.0])
     # Heel, then metatarsal: in order; with the heel; never; in order, but off the ground as the heel leaves it.
-    onset_s = np.column_stack([strike_s, strike_s + [0.1, 0.0, np.nan, 0.1]])
+    onset_s = np.column_stack([strike_s, strike_s + np.array([0.1, 0.0, np.nan, 0.1])])
     release_s = np.column_stack([strike_s + 0.3, strike_s + 0.6])
     contacts = Contacts(("heel", "meta1"), strike_s, strike_s + 0.6, onset_s, release_s, np.zeros(0), np.zeros((0, 2)))
     strides = [_stride(0.0), _stride(1.0), _stride(2.0), _stride(3.0, toe_off_s=3.3)]
