@@ -153,6 +153,22 @@ def test_a_frame_out_of_place_is_dropped_and_its_neighbours_stay() -> None:
     assert counters.implausible == 1
 
 
+def test_two_frames_of_one_stamp_are_no_device_that_started_anew() -> None:
+    sent = _regular(200)
+    sent[100:100] = [(7, 4_000_000_000), (8, 4_000_000_000)]
+    counters = Counters()
+    assert [count for _, count, _ in _place(Ordering(counters), sent, [])] == list(range(1000, 1200))
+    assert (counters.implausible, counters.restarts) == (2, 0)
+
+
+@pytest.mark.parametrize("frames", [3, 4, 5])
+def test_the_pace_of_two_frames_is_known_at_once(frames: int) -> None:
+    counts, clocks = np.array(_regular(frames), dtype=np.int64).T
+    placed = Ordering(Counters()).place(counts, clocks)
+    assert placed.rows.tolist() == list(range(1, frames + 1))
+    assert placed.held is None
+
+
 def test_a_frame_that_comes_after_later_ones_is_counted_late_and_left_out() -> None:
     sent = _regular(200)
     sent.insert(110, sent.pop(100))
