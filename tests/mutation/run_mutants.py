@@ -18,12 +18,12 @@ import ast
 import hashlib
 import json
 import os
-import random
 import re
 import shutil
 import sys
 import tempfile
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -108,7 +108,7 @@ class Room:
 
     def _know(self, files: list[str], tests: list[str]) -> None:
         """Find what the tests run, but for what is known already of these very files."""
-        source = "".join(self._texts.values()) + str(self._plain_python)
+        source = f"{self._texts} {self._plain_python}"
         named = {}
         for test in tests:
             text = (self._path / test).read_text(encoding="utf-8")
@@ -194,13 +194,17 @@ def matching(path: Path, globs: list[str]) -> list[str]:
 
 
 def drawn(path: Path, room: str, files: list[str], count: int, seed: int) -> list[Mutant]:
-    """``count`` of a room's mutants, the same for a seed and a source."""
-    texts = {name: (path / name).read_text(encoding="utf-8") for name in files}
-    every = [(name, change) for name, text in texts.items() for change in changes(text)]
-    chosen = random.Random(f"{seed} {room}").sample(every, min(count, len(every)))
-    return [
-        Mutant(room, name, change.line, change.last, str(change), texts[name], change.number) for name, change in chosen
-    ]
+    """``count`` of a room's mutants, the same for a seed; where some lines are edited, the same of all others."""
+    every = []
+    for name in files:
+        text = (path / name).read_text(encoding="utf-8")
+        twins: Counter[str] = Counter()
+        for change in changes(text):
+            key = f"{seed} {Path(name).stem.lstrip('_')} {change} {twins[str(change)]}"
+            twins[str(change)] += 1
+            mutant = Mutant(room, name, change.line, change.last, str(change), text, change.number)
+            every.append((hashlib.sha256(key.encode()).hexdigest(), mutant))
+    return [mutant for _, mutant in sorted(every, key=lambda item: item[0])[:count]]
 
 
 def listed(path: Path, items: list[dict[str, Any]]) -> Iterator[Mutant]:
