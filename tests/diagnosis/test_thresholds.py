@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from smartshoe.diagnosis import Thresholds, described, largest_of_noise
+from smartshoe.diagnosis import Thresholds, described
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.diagnosis.decay import decay_of
+from smartshoe.integrity.thresholds import largest_of_noise
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
