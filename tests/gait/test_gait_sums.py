@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from smartshoe.gait.contact import Contacts
-from smartshoe.gait.force_sums import ForceSums
-from smartshoe.gait.strides import Stride
-from smartshoe.gait.trial import feet_of
-from smartshoe.gait.window import analyse_window
 from trials import Array, analysed, loads_of, ran, recorded, walked
 
 from smartshoe.errors import RefusedError
-from smartshoe.gait import GaitResult, analyse
+from smartshoe.gait import Contacts, GaitResult, analyse
+from smartshoe.gait._force_sums import ForceSums
+from smartshoe.gait._strides import Stride
+from smartshoe.gait._trial import feet_of
+from smartshoe.gait._window import analyse_window
 from smartshoe.gait.indices import sequence_errors
 from smartshoe.gait.summary import of_main_activity
 from smartshoe.recording import Recording
