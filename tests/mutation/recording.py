@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from coverage import Coverage
 
-TOO_LONG_S = 15.0  # of processor time: a test that takes longer is left out, as is one that fails
+TOO_LONG_S = 10.0  # of processor time: a test that takes longer is left out, as is one that fails
 
 
 @dataclass(slots=True)

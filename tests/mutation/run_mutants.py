@@ -7,8 +7,8 @@ the kept file holds is not run again; with ``--survivors`` those that survived a
 
 Each is put into a copy of the checkout, so that programs that tests start meet it too. Which lines each test runs is
 found once (the kept file holds that as well); of the room's tests those are run that run the mutant's lines, cheapest
-first, until one fails or takes four times its usual processor time, 20 s of them at most: what only a longer one would
-notice counts as unnoticed. Compiled kernels are tried in plain Python.
+first, until one fails or takes four times its usual processor time, and ``--most`` s at most: what only a longer one
+would notice counts as unnoticed. Compiled kernels are tried in plain Python.
 """
 
 from __future__ import annotations
@@ -39,7 +39,6 @@ ROOT = HERE.parent.parent
 COPIED = ("smartshoe", "simulators", "tests", "scenarios", "docs", "pyproject.toml", "README.md", "CHANGELOG.md")
 ARGUED = ROOT / "docs" / "reliability.md"
 KERNELS = "smartshoe/kernels/"
-MOST_S = 20.0  # of a mutant's tests, by the processor time that they take without it
 Result = dict[str, Any]
 
 
@@ -98,8 +97,9 @@ class Kept:
 class Room:
     """Files of a copied checkout and the tests that hold them, in compiled or in plain Python."""
 
-    def __init__(self, path: Path, kept: Kept, files: list[str], tests: list[str], plain_python: bool) -> None:
-        self._path, self._kept, self._plain_python = path, kept, plain_python
+    def __init__(self, path: Path, kept: Kept, about: dict[str, list[str]], plain_python: bool, most_s: float) -> None:
+        files, tests = about["files"], about["tests"]
+        self._path, self._kept, self._plain_python, self._most_s = path, kept, plain_python, most_s
         self._texts = {name: (path / name).read_text(encoding="utf-8") for name in files}
         self._tests: dict[str, Result] = {}
         self._imported: set[tuple[str, int]] = set()
@@ -139,11 +139,10 @@ class Room:
         seen = {name: cost_s for cost_s, name in sorted(passed) if runs(name)}
         return seen | {name: cost_s for cost_s, name in sorted(passed) if self._tests[name]["started"]}
 
-    @staticmethod
-    def _affordable(costs: Costs) -> Costs:
-        """The first of ``costs`` that fit in `MOST_S`, and one at least."""
+    def _affordable(self, costs: Costs) -> Costs:
+        """The first of ``costs`` that together take no longer than asked, and one at least."""
         sums = accumulate(costs.values())
-        few = sum(sum_s <= MOST_S for sum_s in sums)
+        few = sum(sum_s <= self._most_s for sum_s in sums)
         return dict(list(costs.items())[: max(few, 1)])
 
     def _concerning(self, mutant: Mutant) -> Costs:
@@ -254,6 +253,7 @@ def main() -> None:
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help=f"of {', '.join(table)} (default: all)")
     parser.add_argument("--count", type=int, default=30, help="mutants a room (default: 30)")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--most", type=float, default=20.0, metavar="S", help="processor time of a mutant's tests (20)")
     parser.add_argument("--keep", type=Path, help="file of results, a JSON line each: what it holds is not run again")
     parser.add_argument("--listed", action="store_true", help="the bugs of listed.toml in place of drawn ones")
     parser.add_argument("--survivors", action="store_true", help="run those again that the kept file calls survivors")
@@ -281,7 +281,7 @@ def main() -> None:
             for plain_python in (False, True):
                 own = [mutant for mutant in new if mutant.is_compiled == plain_python]
                 if own:
-                    Room(copy, kept, table[room]["files"], table[room]["tests"], plain_python).try_each(own)
+                    Room(copy, kept, table[room], plain_python, options.most).try_each(own)
             results += [kept.results[mutant.name] for mutant in mutants]
     print(told(results, ARGUED.read_text(encoding="utf-8")))
 
