@@ -11,11 +11,10 @@ from c_code import needs_compiler, run_filters
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.calibration import Calibration, extended_calibration
+from smartshoe.calibration import Calibration
 from smartshoe.calibration.export import FilterModel, export_files, write_files
 from smartshoe.calibration.export._fixed_point import FixedPoint, Scaled
 from smartshoe.errors import UsageError
-from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
 
 widths = st.sampled_from(["q15", "q31"])
@@ -123,8 +122,6 @@ def test_a_force_beyond_the_range_stays_at_its_end(tmp_path: Path) -> None:
 
 
 def test_what_integers_cannot_hold_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"extended model is not written in fixed point"):
-        export_files(extended_calibration(ExtendedModel(0.9, 0.15, 0.3, 800.0, 180.0, "mbar")), "c", fixed="q31")
     # An offset of a thousand times the full scale leaves 16 bits no step for the load.
     with pytest.raises(UsageError, match=r"q15 cannot hold .* up to 2\d\.\d N: use --fixed q31"):
         FixedPoint.of(FilterModel.of(Calibration(**{**vars(LEFT_TOE), "offset": 5e5})), "q15")

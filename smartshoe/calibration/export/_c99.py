@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Any
 
 import numpy as np
 
+from smartshoe.calibration.export._blocks import described
 from smartshoe.calibration.export._cost import cost_lines
-from smartshoe.calibration.export._fixed_point import FixedPoint, FixedVector
+from smartshoe.calibration.export._fixed_chain import RUN, FixedChain
+from smartshoe.calibration.export._fixed_point import FixedPoint, FixedVector, IntegerFilter
 from smartshoe.calibration.export._model import ExtendedFilterModel, FilterModel, one_safe_line
 from smartshoe.calibration.export._rendering import columns_csv, finite_or, render, vector_csv
 from smartshoe.calibration.export._single import in_single
@@ -28,7 +29,7 @@ def c_files(model: FilterModel, precision: str = "double", fixed: str | None = N
     one program. Raises `UsageError` where a coefficient is beyond what the arithmetic holds.
     """
     if fixed is not None:
-        return _files(model, "fixed_point", apart, **_fixed(model, fixed))
+        return _fixed(model, fixed, apart)
     shared = _floating(model, precision)
     if isinstance(model, ExtendedFilterModel):
         return _files(model, model.kind, apart, **shared, **_extended(model, precision))
@@ -42,10 +43,11 @@ def c_files(model: FilterModel, precision: str = "double", fixed: str | None = N
 def _files(model: FilterModel, kind: str, apart: bool, *, vector: str, **values: object) -> Files:
     name = model.name
     source = render(f"{kind}.c.j2", model, **values)
-    cost = cost_lines(render(f"{kind}.h.j2", model, cost={}, **values), source)
+    head = {"fixed_extended": "fixed_point"}.get(kind, kind) + ".h.j2"
+    cost = cost_lines(render(head, model, cost={}, **values), source)
     folder, header = ("self_test/", f"../{name}.h") if apart else ("", f"{name}.h")
     return {
-        f"{name}.h": render(f"{kind}.h.j2", model, cost=cost, **values),
+        f"{name}.h": render(head, model, cost=cost, **values),
         f"{name}.c": source,
         f"{folder}{name}_test.c": render("filter_test.c.j2", model, header=header, **values),
         f"{folder}{name}_test.csv": vector,
@@ -69,9 +71,25 @@ def _floating(model: FilterModel, precision: str) -> dict[str, Any]:
     }
 
 
-def _fixed(model: FilterModel, fixed: str) -> dict[str, Any]:
-    """What the templates of fixed point need."""
+def _fixed(model: FilterModel, fixed: str, apart: bool) -> Files:
+    if isinstance(model, ExtendedFilterModel):
+        chain = FixedChain.of(model, fixed)
+        states = [(name, "counts of the chain") for _, step in chain.blocks for name in step.states]
+        said: dict[str, Any] = {
+            "blocks": described(chain.blocks),
+            "bound_holds": f"up to full scale and for {RUN} samples",
+            "bound_found": " (the latter\n * measured along a walk when this was written, with a margin)",
+            "clock_hours": chain.clock and f"{chain.clock[2] / model.sample_rate_hz / 3600.0:.0f}",
+        }
+        return _files(model, "fixed_extended", apart, **_integers(model, chain, states), **said)
     found = FixedPoint.of(model, fixed)
+    states = [("state", f"steps of force times 2^{found.fraction}")]
+    plain: dict[str, Any] = {"bound_holds": "within the range", "bound_found": "", "clock_hours": None}
+    return _files(model, "fixed_point", apart, **_integers(model, found, states), **plain)
+
+
+def _integers(model: FilterModel, found: IntegerFilter, states: list[tuple[str, str]]) -> dict[str, Any]:
+    """What the templates of fixed point share."""
     vector = FixedVector(model, found)
     low, high = -found.most - 1, found.most
     columns = {
@@ -81,6 +99,7 @@ def _fixed(model: FilterModel, fixed: str) -> dict[str, Any]:
     }
     return {
         "fixed": found,
+        "states": states,
         "reading_type": found.integer,
         "force_factor": f"{found.output_lsb!r} * ",
         "readings": [str(step) for step in vector.steps.tolist()],
@@ -115,21 +134,12 @@ def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, Any]:
     states = {name: _initial(value, precision) for _, step in blocks for name, value in step.states.items()}
     return {
         "states": states,
-        "blocks": [
-            {"name": name, "body": step.body, "needs_time": _needs_time(step.body)}
-            for name, step in blocks
-            if step.body
-        ],
+        "blocks": described(blocks),
         "reading_per_share": _literal(filter_.reading_per_share, precision, "full_scale_reading"),
         "full_scale_load_n": _literal(filter_.model.full_scale_load_n, precision, "full_scale_load_n"),
         "step_s": _literal(filter_.step_s, precision, "sample time"),
         "started_s": _literal(filter_.started_s, precision, "started_s"),
     }
-
-
-def _needs_time(body: str) -> bool:
-    """Whether a block reads the time ``t``; one may have a local of that name instead."""
-    return re.search(r"\bt\b", body) is not None and re.search(r"\b(?:double|float) t\b", body) is None
 
 
 def _initial(value: float, precision: str) -> str:

@@ -42,12 +42,41 @@ class Scaled:
         return cls(mantissa, shift, float(abs(value - Fraction(mantissa, 2**shift))))
 
 
-@dataclass(frozen=True)
-class FixedPoint:
+@dataclass(frozen=True, kw_only=True)
+class IntegerFilter:
+    """A filter whose readings and forces are integers of ``width`` bits and a sign.
+
+    They count steps of ``input_lsb`` (reading unit) and ``output_lsb`` (N), both powers of two. ``rounding_n`` bounds
+    the force's distance in N from the exact filter of the integers; ``error_bound_n`` adds what rounding the reading
+    to its step does.
+    """
+
+    width: int
+    input_lsb: float
+    output_lsb: float
+    rounding_n: float
+    error_bound_n: float
+
+    @property
+    def integer(self) -> str:
+        """C's name of the type that goes in and out."""
+        return f"int{self.width + 1}_t"
+
+    @property
+    def most(self) -> int:
+        """The largest integer."""
+        return int(2**self.width - 1)
+
+    def steps(self, readings: Array) -> Integers:
+        """Readings (n,) as integers, to the nearest step, clipped at the type's ends."""
+        return np.clip(np.rint(readings / self.input_lsb), -self.most - 1, self.most).astype(np.int64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedPoint(IntegerFilter):
     """Constants of force = direct r + state - bias, state += feed r - leak state, r the reading in steps.
 
-    Reading and force are integers of ``width`` bits and a sign, in steps of ``input_lsb`` (reading unit) and
-    ``output_lsb`` (N), both powers of two. State and bias count 2^-``fraction`` of the output's step; the leak is
+    State and bias count 2^-``fraction`` of the output's step; the leak is
     taken from the state's bits above ``split`` and below it by turns. The offset of the reading is in the bias,
     exactly, as the filter starts in balance. ``rounding_n`` bounds the force's distance
     in N from the exact filter of the integers; ``error_bound_n`` adds what rounding the reading to its step does.
@@ -63,19 +92,12 @@ class FixedPoint:
     leak: Scaled
     start: Scaled
     bias: int
-    rounding_n: float
-    error_bound_n: float
 
     @classmethod
     def of(cls, model: FilterModel, fixed: str) -> FixedPoint:
         """The scaling with the smallest bound; raises `UsageError` where even that is no filter, and of other kinds."""
         if fixed not in WIDTHS:
             raise UsageError(f"fixed point {fixed!r} is not known: use {' or '.join(WIDTHS)}")
-        if model.kind != "first_order":
-            raise UsageError(
-                f"unit {model.calibration.unit or '(unnamed)'}: an extended model is not written in fixed point, its"
-                " curves and bisections need floating point: leave --fixed away, or export the plain calibration"
-            )
         width = WIDTHS[fixed]
         load_n = max(map(abs, model.calibration.load_range_n or (0.0, 0.0))) or USUAL_LOAD_N
         gains = abs(model.static_gain), abs(model.numerator[0])
@@ -83,19 +105,15 @@ class FixedPoint:
         slowest = max(min(gains), 0.25 * max(gains))
         reading = abs(model.calibration.offset) + load_n / slowest
         most = 2**width - 1
-        input_lsb = _power_of_two(HEADROOM[fixed] * reading / most)
-        output_lsb = _power_of_two(HEADROOM[fixed] * load_n / most)
+        input_lsb = power_of_two(HEADROOM[fixed] * reading / most)
+        output_lsb = power_of_two(HEADROOM[fixed] * load_n / most)
         try:
             tried = [cls._at(model, width, input_lsb, output_lsb, fraction) for fraction in range(PRODUCT_BITS - width)]
         except OverflowError:  # a coefficient near the end of float64
             tried = []
         found = min((one for one in tried if one is not None), key=lambda one: one.rounding_n, default=None)
         if found is None or not found.error_bound_n <= WORST_SHARE * load_n:
-            says = "" if found is None else f", the error would be up to {found.error_bound_n:.3g} N"
-            raise UsageError(
-                f"{fixed} cannot hold the filter of {model.calibration.unit or 'this unit'} at"
-                f" {model.sample_rate_hz:g} Hz{says}: use {'--fixed q31' if fixed == 'q15' else '--precision float'}"
-            )
+            raise too_coarse(model, fixed, found)
         return found
 
     @classmethod
@@ -127,23 +145,9 @@ class FixedPoint:
         rounding_n = output_lsb * (units * 2.0**-fraction + 0.5)
         reading_n = 0.5 * input_lsb * float(abs(n0) + abs(feed) / settling)
         return cls(
-            width, input_lsb, output_lsb, fraction, split,
-            direct, fed, leaked, start, bias, rounding_n, rounding_n + reading_n,
+            width=width, input_lsb=input_lsb, output_lsb=output_lsb, fraction=fraction, split=split, direct=direct,
+            feed=fed, leak=leaked, start=start, bias=bias, rounding_n=rounding_n, error_bound_n=rounding_n + reading_n,
         )  # fmt: skip
-
-    @property
-    def integer(self) -> str:
-        """C's name of the type that goes in and out."""
-        return f"int{self.width + 1}_t"
-
-    @property
-    def most(self) -> int:
-        """The largest integer."""
-        return int(2**self.width - 1)
-
-    def steps(self, readings: Array) -> Integers:
-        """Readings (n,) as integers, to the nearest step, clipped at the type's ends."""
-        return np.clip(np.rint(readings / self.input_lsb), -self.most - 1, self.most).astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -151,7 +155,7 @@ class FixedVector:
     """The test vector of a fixed-point filter: what `FilterModel` tests with, missing readings left out."""
 
     model: FilterModel
-    fixed: FixedPoint
+    fixed: IntegerFilter
 
     @cached_property
     def steps(self) -> Integers:
@@ -168,6 +172,15 @@ class FixedVector:
         return np.clip(forces_n, *ends_n)
 
 
-def _power_of_two(value: float) -> float:
+def too_coarse(model: FilterModel, fixed: str, found: IntegerFilter | None) -> UsageError:
+    """The refusal of a filter that ``fixed`` cannot hold, with the bound of the best that it can."""
+    says = "" if found is None else f", the error would be up to {found.error_bound_n:.3g} N"
+    return UsageError(
+        f"{fixed} cannot hold the filter of {model.calibration.unit or 'this unit'} at"
+        f" {model.sample_rate_hz:g} Hz{says}: use {'--fixed q31' if fixed == 'q15' else '--precision float'}"
+    )
+
+
+def power_of_two(value: float) -> float:
     """The smallest power of two that is not below ``value``."""
     return float(2.0 ** np.ceil(np.log2(value)))

@@ -1,0 +1,161 @@
+"""The extended filter in integer arithmetic: scaling, what its error may be, and the C of its blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, log2
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.calibration.export._blocks import reads_time
+from smartshoe.calibration.export._fixed_point import (
+    HEADROOM,
+    WIDTHS,
+    WORST_SHARE,
+    IntegerFilter,
+    Scaled,
+    power_of_two,
+    too_coarse,
+)
+from smartshoe.calibration.export._integer_c import IntegerC
+from smartshoe.calibration.export._integer_functions import MOST, functions_text
+from smartshoe.calibration.export._model import ExtendedFilterModel
+from smartshoe.errors import UsageError
+from smartshoe.models.effects.effect import CStep
+
+FRACTION = 46
+"""Bits after the point of a share of full scale inside the chain."""
+FRACTION_WITH_TIME = 40  # six days of seconds fit beside it
+WIDEST = 64  # full scales that a signal may reach between two blocks
+RUN = 20_000
+"""Samples after the start for which the bound is stated: what is summed up drifts by its rounding."""
+ROUNDINGS_A_BLOCK = 200
+ROUNDINGS_A_SAMPLE = 4  # of a sum that never forgets
+MOVED = 24  # places of the test readings at which one reading is moved
+WALK = 4000  # samples of a walk on which all readings are moved at once
+DRAWS = 6  # of which are moved up and which down
+DITHER = 0.001  # standard deviation of the readings' noise meanwhile, of their span
+MARGIN = 2.0
+"""Of what was measured at these places, for the places that were not tried."""
+
+
+Forces = Callable[[Array], Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedChain(IntegerFilter):
+    """The chain of an extended model in integers, a share of full scale counting 2^-``fraction`` in 64 bits.
+
+    A reading times ``entry`` is a count; a count times ``leaving[0]``, 2^``leaving[1]`` times smaller, is a force in
+    steps. ``clock`` is (start, step, last): the time in counts at the first sample and between two, and the sample at
+    which it stands still; None where no block reads it. ``functions`` is the C of the arithmetic that ``blocks`` call.
+
+    ``rounding_n`` is half a step of the force and the roundings inside, raised as the chain raises its input.
+    ``error_bound_n`` adds what rounding a reading to its step does: the sum of what moving each single reading by half
+    a step does to a force, measured along the test readings, and the drift of a hold, with a margin.
+    """
+
+    fraction: int
+    entry: Scaled
+    leaving: tuple[int, int]
+    widest: int
+    clock: tuple[int, int, int] | None
+    blocks: tuple[tuple[str, CStep], ...]
+    functions: str
+
+    @classmethod
+    def of(cls, model: ExtendedFilterModel, fixed: str) -> FixedChain:
+        """The chain in ``fixed`` ("q15", "q31"); raises `UsageError` where its error would be no filter's."""
+        filter_ = model.filter
+        width, full_scale_n = WIDTHS[fixed], filter_.model.full_scale_load_n
+        finite = model.test_readings[np.isfinite(model.test_readings)]
+        largest = max(float(np.abs(finite).max()), abs(filter_.reading_per_share))
+        input_lsb = power_of_two(HEADROOM[fixed] * largest / (2**width - 1))
+        output_lsb = power_of_two(HEADROOM[fixed] * full_scale_n / (2**width - 1))
+        steps = filter_.c_steps(single=True)
+        timed = any(reads_time(step.body) for _, step in steps)
+        to = IntegerC(FRACTION_WITH_TIME if timed else FRACTION)
+        entry = Scaled.of(Fraction(input_lsb) / Fraction(filter_.reading_per_share) * to.one, 2**width)
+        if entry is None:
+            raise UsageError(f"a full scale of {filter_.reading_per_share:g} is beyond {fixed}: export without --fixed")
+        exponent = ceil(log2(full_scale_n))
+        lowered = to.fraction + round(log2(output_lsb)) - exponent
+        start, step = (to.count(Fraction(seconds)) for seconds in (filter_.started_s, filter_.step_s))
+        gain_n = _gain_n(model, 0.5 * input_lsb)
+        summed = ROUNDINGS_A_SAMPLE * RUN if any(step.states for _, step in steps) else 0
+        steepness = max(1.0, gain_n * abs(filter_.reading_per_share) / full_scale_n)
+        inside = steepness * (
+            (ROUNDINGS_A_BLOCK * len(steps) + summed) / to.one
+            + entry.error / (input_lsb / abs(filter_.reading_per_share) * to.one)
+        )
+        rounding_n = 0.5 * output_lsb + full_scale_n * inside
+        found = cls(
+            width=width,
+            input_lsb=input_lsb,
+            output_lsb=output_lsb,
+            rounding_n=rounding_n,
+            error_bound_n=rounding_n + 0.5 * input_lsb * gain_n,
+            fraction=to.fraction,
+            entry=entry,
+            leaving=(to.count(Fraction(full_scale_n) / Fraction(2) ** exponent), lowered),
+            widest=WIDEST * to.one,
+            clock=(start, step, min((MOST - start) // step, 2**32 - 2)) if timed else None,
+            blocks=tuple((name, to.step(step)) for name, step in steps),
+            functions=functions_text(to.used | {"times_q", "rounded_q"}, to.fraction),
+        )  # fmt: skip
+        if not found.error_bound_n <= WORST_SHARE * full_scale_n:
+            raise too_coarse(model, fixed, found)
+        return found
+
+
+def _gain_n(model: ExtendedFilterModel, step: float) -> float:
+    """Largest change of a force over that of the readings up to it, ``step``, in N per reading unit: measured."""
+    filter_ = model.calibration.compensator(model.sample_rate_hz)
+
+    def forces_n(readings: Array) -> Array:
+        filter_.reset()
+        return np.asarray(filter_.push(readings))
+
+    rng = np.random.default_rng(0)
+    readings = model.test_readings[np.isfinite(model.test_readings)]
+    low, high = float(readings.min()), float(readings.max())
+    dither = DITHER * (high - low)
+    readings = readings + dither * rng.standard_normal(readings.size)
+    corners = rng.choice([low, low, 0.5 * (low + high), high], WALK // 100 + 1)
+    walk = np.interp(np.arange(WALK) / 100.0, np.arange(corners.size), corners)
+    walk = walk + dither * rng.standard_normal(WALK)
+    gains_n = _single_n(forces_n, readings, step) + _held_n(forces_n, high, step, readings.size)
+    return MARGIN * max(gains_n, _whole_n(forces_n, walk, step, rng)) / step
+
+
+def _single_n(forces_n: Forces, readings: Array, step: float) -> float:
+    """The sum over the lag of the most that one reading, moved by ``step``, does to a force that much later."""
+    base_n = forces_n(readings)
+    lagged_n = np.zeros(readings.size)
+    for at in np.linspace(1, readings.size - 1, MOVED).astype(int):
+        for sign in (1.0, -1.0):
+            moved = readings.copy()
+            moved[at] += sign * step
+            changed_n = np.abs(forces_n(moved) - base_n)[at:]
+            lagged_n[: changed_n.size] = np.maximum(lagged_n[: changed_n.size], changed_n)
+    return float(lagged_n.sum())
+
+
+def _held_n(forces_n: Forces, reading: float, step: float, after: int) -> float:
+    """What the first reading does, which counts as having lasted for ever, and a sum over readings ``after`` that."""
+    hold = np.full(RUN, reading)
+    begun = np.concatenate([[reading + step], hold[1:]])
+    held_n = forces_n(hold)
+    drift_n = np.abs(forces_n(hold + step) - held_n)
+    first_n = np.abs(forces_n(begun) - held_n)[1:]
+    return float(first_n.max()) + max(float(drift_n.max() - drift_n[:after].max()), 0.0)
+
+
+def _whole_n(forces_n: Forces, walk: Array, step: float, rng: np.random.Generator) -> float:
+    """What moving every reading of a walk by ``step`` does, each up or down: this finds where the chain is steep."""
+    base_n = forces_n(walk)
+    signs = [np.ones(walk.size), -np.ones(walk.size), *rng.choice([-1.0, 1.0], (DRAWS, walk.size))]
+    return max(float(np.abs(forces_n(walk + step * sign) - base_n).max()) for sign in signs)
