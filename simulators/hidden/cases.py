@@ -139,7 +139,7 @@ def conditions(p: Plan, subject: Subject) -> list[dict[str, Any]]:
 
 
 def case(kind: str, index: int) -> BankCase:
-    """Case ``index`` of ``kind`` (`simulators.hidden.plans.KINDS`): the same for ever."""
+    """Case ``index`` of ``kind`` (`simulators.hidden.plans.KINDS`): always the same."""
     return make(plan(kind, index))
 
 

@@ -108,7 +108,7 @@ def seeded(*key: object) -> int:
 
 
 def plan(kind: str, index: int) -> Plan:
-    """Case ``index`` of ``kind``: the same for ever. Raises `UsageError` for a kind that there is not."""
+    """Case ``index`` of ``kind``: always the same. Raises `UsageError` for a kind that there is not."""
     if kind not in KINDS or index < 0:
         raise UsageError(f"there is no case {index} of the kind {kind!r}: use 0 and up of one of {', '.join(KINDS)}")
     group = index // LAWS if kind == "worlds" else index

@@ -27,7 +27,7 @@ class Sampler:
         return np.asarray(MILLIBAR.from_si(unit.sensor.to_pressure_pa(self.adc.convert(voltage_v))))
 
     def reset(self) -> None:
-        """Back to rest: unloaded for ever."""
+        """Back to rest: unloaded, in steady state."""
         for unit in self.units:
             unit.bladder.reset()
             unit.sensor.reset()

@@ -48,7 +48,7 @@ class SimulatedBladder(Bladder):
         self.reset()
 
     def reset(self) -> None:
-        """Back to rest: unloaded for ever, memory forgotten, at the reset's temperature."""
+        """Back to rest: unloaded, in steady state, memory forgotten, at the reset's temperature."""
         self._session += 1
         self._stepper.reset(self._session)
         self.deformation = np.zeros(0)

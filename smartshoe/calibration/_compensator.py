@@ -38,7 +38,7 @@ class Compensator(ForceFilter):
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: the next reading counts as having lasted for ever."""
+        """Forget the past: start in the steady state of the next reading."""
         super().reset()
         self._state = np.zeros(1)
 

@@ -46,7 +46,7 @@ class CoreInverse(Inverse):
         return float(np.min(np.real(own), initial=1.0))
 
     def reset(self) -> None:
-        """The next pressure counts as that of a load that has lasted for ever, nothing leaked."""
+        """Start in the steady state of the next pressure, nothing leaked."""
         self._state: Array | None = None
 
     def push(self, signal: Array, time_s: Array) -> Array:

@@ -95,7 +95,7 @@ class ExtendedCompensator(ForceFilter):
             )
 
     def reset(self) -> None:
-        """Forget the past: the next reading counts as having lasted for ever, and time begins again."""
+        """Forget the past: start in the steady state of the next reading, and time begins again."""
         super().reset()
         for _, inverse in self.blocks:
             inverse.reset()

@@ -17,7 +17,7 @@ from smartshoe.units import Unit
 class ForceFilter(ABC):
     """Readings in ``reading_unit`` to force in N, compression positive, at ``sample_rate_hz``.
 
-    The filter starts as if the first reading had lasted for ever, so that a static load has no transient. A reading
+    The filter starts in the steady state of its first reading, so that a static load has no transient. A reading
     that is not finite repeats the last one (force 0 before the first); the output is always finite.
     """
 
@@ -30,14 +30,14 @@ class ForceFilter(ABC):
 
     @abstractmethod
     def _begin(self, first: float) -> None:
-        """Take ``first`` as having lasted for ever."""
+        """Start in the steady state of ``first``."""
 
     @abstractmethod
     def _advance(self, readings: Array, count: int) -> Array:
         """Force (n,) of finite ``readings`` (n,), the first of which is number ``count`` since `reset`."""
 
     def reset(self) -> None:
-        """Forget the past: the next reading counts as having lasted for ever."""
+        """Forget the past: start in the steady state of the next reading."""
         self._last: float | None = None
         self._missing = 0
         self._count = 0

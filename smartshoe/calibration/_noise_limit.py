@@ -35,7 +35,7 @@ class NoiseLimit(Inverse):
         self.reset()
 
     def reset(self) -> None:
-        """The next value counts as having lasted for ever."""
+        """Start in the steady state of the next value."""
         self._states: list[Array] | None = None
 
     def push(self, signal: Array, time_s: Array) -> Array:

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     type=click.Choice(["estimate", "steady"]),
     default="estimate",
     show_default=True,
-    help="Estimate each experiment's start, or take its first reading to have lasted for ever.",
+    help="Estimate each experiment's start, or start in the steady state of its first reading.",
 )
 @click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Grey box: fix k1, k2, c or x_over_nrt.")
 @click.option("--bound", "bounds", multiple=True, metavar="NAME=LOW:HIGH", help="Grey box: keep a parameter within.")

@@ -110,7 +110,7 @@ class Bladder(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """Back to rest: unloaded for ever, memory forgotten."""
+        """Back to rest: unloaded, in steady state, memory forgotten."""
 
     @abstractmethod
     def press(self, load_n: Array, sample_rate_hz: float) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification._estimator import ParameterFit
-from smartshoe.identification._experiment import kept_of
+from smartshoe.identification._experiment import masked
 from smartshoe.identification._identification import Identification
 from smartshoe.identification._parametrisation import GreyBox
 from smartshoe.identification._prediction_error import LARGEST_DELAY_S
@@ -83,8 +83,8 @@ def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
             notes.append(f"the delay ran to its limit of {LARGEST_DELAY_S:g} s: check that the logs start together")
     if values[4] < 0:
         notes.append("k2 is negative: the reading leads the load, which no standard linear solid does")
-    used = [experiment for experiment in experiments if experiment.kept.any()]
-    loads = [kept_of(experiment.load_n, experiment.kept) for experiment in used]
+    used = [experiment for experiment in experiments if experiment.mask.any()]
+    loads = [masked(experiment.load_n, experiment.mask) for experiment in used]
     cost = fit.cost if fit.estimator == "output_error" else _plain_cost(fit)
     return Identification(
         unit=choice.unit,
@@ -206,14 +206,14 @@ def _offsets(
 
 def _spread_of_output(fit: ParameterFit) -> float:
     """Sum of squares of the output about its mean, over all samples that count."""
-    outputs = [kept_of(y, kept) for y, kept in zip(fit.problem.outputs, fit.problem.kept, strict=True)]
+    outputs = [masked(y, mask) for y, mask in zip(fit.problem.outputs, fit.problem.masks, strict=True)]
     count = sum(output.size for output in outputs)
     mean = sum(float(output.sum()) for output in outputs) / max(count, 1)
     return sum(float(np.dot(output - mean, output - mean)) for output in outputs)
 
 
 def _plain_cost(fit: ParameterFit) -> float:
-    errors = [fit.problem.model_error(fit.theta, index)[kept] for index, kept in enumerate(fit.problem.kept)]
+    errors = [fit.problem.model_error(fit.theta, index)[mask] for index, mask in enumerate(fit.problem.masks)]
     return sum(float(error @ error) for error in errors)
 
 
@@ -229,6 +229,6 @@ def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array,
         )
     if fit.degenerate or not np.isfinite(sd).all() or sd[0] > WORST_RELATIVE_SD * values[0]:
         raise NotIdentifiableError(
-            f"{where}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be told from these data:"
+            f"{where}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be determined from these data:"
             " record more triangles, at several rates, with rests between"
         )

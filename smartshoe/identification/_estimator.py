@@ -35,7 +35,7 @@ class Termination:
 
 @dataclass(frozen=True, eq=False)
 class ParameterFit:
-    """theta of ``problem`` with its covariance, and how it was come by."""
+    """theta of ``problem`` with its covariance, and how it was found."""
 
     problem: PredictionError
     theta: Array
@@ -238,7 +238,7 @@ def _is_weak(instrumental: ParameterFit, fit: ParameterFit) -> bool:
 
 
 def _mean_square(problem: PredictionError, theta: Array) -> float:
-    errors = [problem.model_error(theta, index)[kept] for index, kept in enumerate(problem.kept)]
+    errors = [problem.model_error(theta, index)[mask] for index, mask in enumerate(problem.masks)]
     return sum(float(error @ error) for error in errors) / max(problem.count - problem.size, 1)
 
 
@@ -259,7 +259,7 @@ def _instrumental(
         max_iterations=limits.max_iterations,
     )
     problem = fit.problem.with_noise_ratio(0.0)
-    problem.kept = instruments.usable
+    problem.masks = instruments.usable
     return replace(
         fit,
         problem=problem,

@@ -27,7 +27,7 @@ LEAST_RETURN = 0.1  # of the load's range that must be travelled both ways
 class Experiment:
     """One recording as load in N and reading in the common reading unit, both (n,), gaps bridged by straight lines.
 
-    ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``kept`` marks the samples whose error
+    ``time_s`` starts at 0; ``step`` is `models.first_order.steps` of it; ``mask`` marks the samples whose error
     counts. ``rows`` says which samples are the recording's, where skipped ones were put back; None: all are.
     """
 
@@ -36,7 +36,7 @@ class Experiment:
     step: Steps
     load_n: Array
     reading: Array
-    kept: Mask
+    mask: Mask
     n_missing: int
     command_n: Array | None = None
     rows: Index | None = None
@@ -63,7 +63,7 @@ class Experiment:
             step=self.step * factor if isinstance(self.step, float) else np.diff(time_s),
             load_n=block_means(self.load_n, factor),
             reading=block_means(self.reading, factor),
-            kept=whole_blocks(self.kept, factor),
+            mask=whole_blocks(self.mask, factor),
         )
 
 
@@ -75,10 +75,10 @@ def block_means(signal: Array, factor: int) -> Array:
     return means
 
 
-def whole_blocks(kept: Mask, factor: int) -> Mask:
-    """(n // factor,) whether all ``factor`` neighbours are kept."""
-    whole = np.ones(kept.size // factor, dtype=bool)
-    broken = np.flatnonzero(~kept) // factor
+def whole_blocks(mask: Mask, factor: int) -> Mask:
+    """(n // factor,) whether all ``factor`` neighbours are in the mask."""
+    whole = np.ones(mask.size // factor, dtype=bool)
+    broken = np.flatnonzero(~mask) // factor
     whole[broken[broken < whole.size]] = False
     return whole
 
@@ -115,12 +115,12 @@ def prepare(
     for recording, name in zip(recordings, names, strict=True):
         load, sensor = recording.load, recording.sensor
         present = load.present & sensor.present
-        kept = present
+        mask = present
         if name in masks:
-            mask = np.asarray(masks[name], dtype=bool)
-            if mask.shape != present.shape:
-                raise UsageError(f"counted[{name!r}] has shape {mask.shape}: give one flag a sample, {present.shape}")
-            kept = present & mask
+            given = np.asarray(masks[name], dtype=bool)
+            if given.shape != present.shape:
+                raise UsageError(f"counted[{name!r}] has shape {given.shape}: give one flag a sample, {present.shape}")
+            mask = present & given
         command_n = recording.command_n
         experiment = Experiment(
             name,
@@ -128,7 +128,7 @@ def prepare(
             steps(recording.time_s),
             bridged(recording.time_s, load.si, load.present),
             bridged(recording.time_s, sensor.in_unit(reading_unit), sensor.present),
-            kept,
+            mask,
             int(np.count_nonzero(~present)),
             None if command_n is None else np.array(command_n, dtype=float),
         )
@@ -154,8 +154,8 @@ def _on_one_step(experiment: Experiment) -> Experiment:
     if np.max(np.abs(experiment.time_s - step_s * places)) > SKIPPED_TOLERANCE * step_s:
         return experiment
     time_s, at = step_s * np.arange(size, dtype=float), places.astype(int)
-    kept = np.zeros(size, dtype=bool)
-    kept[at] = experiment.kept
+    mask = np.zeros(size, dtype=bool)
+    mask[at] = experiment.mask
     command_n = experiment.command_n
     return replace(
         experiment,
@@ -163,7 +163,7 @@ def _on_one_step(experiment: Experiment) -> Experiment:
         step=step_s,
         load_n=np.interp(np.arange(size), places, experiment.load_n),
         reading=np.interp(np.arange(size), places, experiment.reading),
-        kept=kept,
+        mask=mask,
         command_n=None if command_n is None else np.interp(np.arange(size), places, command_n),
         rows=at,
     )
@@ -171,14 +171,14 @@ def _on_one_step(experiment: Experiment) -> Experiment:
 
 def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequence[Recording]) -> None:
     where = recordings[0].label + (f" and {len(recordings) - 1} more" if len(recordings) > 1 else "")
-    count = sum(int(np.count_nonzero(experiment.kept)) for experiment in experiments)
+    count = sum(int(np.count_nonzero(experiment.mask)) for experiment in experiments)
     if count < FEWEST_SAMPLES:
         raise NotIdentifiableError(
             f"{where} holds {count} samples with both load and reading: record {FEWEST_SAMPLES} at least"
         )
-    counted = [experiment for experiment in experiments if experiment.kept.any()]
-    loads = [kept_of(experiment.load_n, experiment.kept) for experiment in counted]
-    readings = [kept_of(experiment.reading, experiment.kept) for experiment in counted]
+    counted = [experiment for experiment in experiments if experiment.mask.any()]
+    loads = [masked(experiment.load_n, experiment.mask) for experiment in counted]
+    readings = [masked(experiment.reading, experiment.mask) for experiment in counted]
     for what, signals in (("load", loads), ("reading", readings)):
         ends = [(float(signal.min()), float(signal.max())) for signal in signals]
         largest = max(max(abs(low), abs(high)) for low, high in ends)
@@ -198,11 +198,11 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
         )
 
 
-def kept_of(signal: Array, kept: Mask) -> Array:
+def masked(signal: Array, mask: Mask) -> Array:
     """``signal`` (n,) at the samples that count: itself, or a view, where those lie together."""
-    first, count = int(kept.argmax()), int(np.count_nonzero(kept))
+    first, count = int(mask.argmax()), int(np.count_nonzero(mask))
     together = slice(first, first + count)
-    return signal[together] if kept[together].all() else signal[kept]
+    return signal[together] if mask[together].all() else signal[mask]
 
 
 def _largest_rises(signal: Array) -> tuple[float, float]:

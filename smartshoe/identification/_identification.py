@@ -166,8 +166,8 @@ class Identification(Summarised):
         """By recording, measured minus model (n,), NaN where a sample did not count."""
         problem = self.fit.problem
         return {
-            experiment.name: np.where(experiment.of_recording(kept), -self.errors[experiment.name], np.nan)
-            for experiment, kept in zip(problem.experiments, problem.kept, strict=True)
+            experiment.name: np.where(experiment.of_recording(mask), -self.errors[experiment.name], np.nan)
+            for experiment, mask in zip(problem.experiments, problem.masks, strict=True)
         }
 
     @cached_property
@@ -175,9 +175,9 @@ class Identification(Summarised):
         """``fit_percent`` of each recording."""
         problem = self.fit.problem
         return {
-            experiment.name: fit_percent(y[kept], problem.model_error(self.fit.theta, index)[kept])
-            for index, (experiment, y, kept) in enumerate(
-                zip(problem.experiments, problem.outputs, problem.kept, strict=True)
+            experiment.name: fit_percent(y[mask], problem.model_error(self.fit.theta, index)[mask])
+            for index, (experiment, y, mask) in enumerate(
+                zip(problem.experiments, problem.outputs, problem.masks, strict=True)
             )
         }
 

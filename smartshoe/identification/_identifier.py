@@ -70,7 +70,7 @@ def identify(  # noqa: PLR0913 - a public verb
         Reading at no load (one a recording), s by which the reading is later than the load, and what was before:
         estimated, or fixed.
     load_offset_n
-        The load cell's zero in N: one constant cannot be told from the other, so that one of the two is fixed.
+        The load cell's zero in N: one constant cannot be distinguished from the other, so that one of the two is fixed.
     fixed, bounds
         Parameters of the structure that are known, and limits of those that are free, by name.
     reading_noise, load_noise_n

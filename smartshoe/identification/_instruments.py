@@ -33,7 +33,7 @@ class Instruments:
         self.readings = readings
         self.usable: list[Mask] = []
         for index, experiment in enumerate(problem.experiments):
-            usable = problem.kept[index].copy()
+            usable = problem.masks[index].copy()
             if source == "command":
                 command_n = experiment.command_n
                 if command_n is None:

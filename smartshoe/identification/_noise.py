@@ -20,7 +20,7 @@ IMPULSE_SAMPLES = 512
 
 def noise_sds(experiments: Sequence[Experiment]) -> tuple[float, float]:
     """White noise of the load in N and of the reading in its unit."""
-    usable = [experiment for experiment in experiments if experiment.kept.any()]
+    usable = [experiment for experiment in experiments if experiment.mask.any()]
     return (
         white_noise_sd(*(experiment.load_n for experiment in usable), order=3, most=DIFFERENCES),
         white_noise_sd(*(experiment.reading for experiment in usable), order=3, most=DIFFERENCES),

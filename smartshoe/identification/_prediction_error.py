@@ -64,7 +64,7 @@ class PredictionError:
         experiments: Sequence[Experiment],
         settings: Settings,
         form: Parametrisation | None = None,
-        kept: Sequence[Mask] | None = None,
+        masks: Sequence[Mask] | None = None,
     ) -> None:
         self.experiments, self.settings = list(experiments), settings
         self.form: Parametrisation = form or FreeForm(settings.direction)
@@ -81,8 +81,8 @@ class PredictionError:
         self.lower[: self.shape_size], self.upper[: self.shape_size] = low, high
         if self.delay_at is not None:
             self.lower[self.delay_at], self.upper[self.delay_at] = -LARGEST_DELAY_S, LARGEST_DELAY_S
-        self.kept: list[Mask] = list(kept or [experiment.kept for experiment in self.experiments])
-        if self.delay_at is not None and kept is None:
+        self.masks: list[Mask] = list(masks or [experiment.mask for experiment in self.experiments])
+        if self.delay_at is not None and masks is None:
             self.drop_edges(EDGE_SAMPLES)
         self._pairs = [self._signals(experiment) for experiment in self.experiments]
         from smartshoe.kernels.first_order import COLUMNS
@@ -128,16 +128,16 @@ class PredictionError:
     def drop_edges(self, count: int) -> None:
         """Leave ``count`` samples at either end of every recording out of the error."""
         for index, experiment in enumerate(self.experiments):
-            kept = experiment.kept.copy()
-            if kept.size > 4 * count:
-                kept[:count] = False
-                kept[kept.size - count :] = False
-            self.kept[index] = kept
+            mask = experiment.mask.copy()
+            if mask.size > 4 * count:
+                mask[:count] = False
+                mask[mask.size - count :] = False
+            self.masks[index] = mask
 
     @property
     def count(self) -> int:
         """How many samples count."""
-        return sum(int(np.count_nonzero(kept)) for kept in self.kept)
+        return sum(int(np.count_nonzero(mask)) for mask in self.masks)
 
     # -- signals ---------------------------------------------------------------------------------------------
     @property
@@ -166,18 +166,18 @@ class PredictionError:
 
     def with_noise_ratio(self, ratio: float) -> PredictionError:
         """This problem with the input's noise allowed for."""
-        return PredictionError(self.experiments, replace(self.settings, noise_ratio=ratio), self.form, self.kept)
+        return PredictionError(self.experiments, replace(self.settings, noise_ratio=ratio), self.form, self.masks)
 
     def thinned(self, factor: int) -> PredictionError:
         """This problem on means of ``factor`` neighbouring samples."""
         if factor == 1:
             return self
         few = [experiment.decimated(factor) for experiment in self.experiments]
-        kept = [
+        masks = [
             mask if thin is experiment else whole_blocks(mask, factor)
-            for mask, thin, experiment in zip(self.kept, few, self.experiments, strict=True)
+            for mask, thin, experiment in zip(self.masks, few, self.experiments, strict=True)
         ]
-        return PredictionError(few, self.settings, self.form, kept)
+        return PredictionError(few, self.settings, self.form, masks)
 
     def delayed(self, theta: Array) -> list[tuple[Array, Array]]:
         """Per recording the input at the delay, and its derivative with respect to it (empty where it is fixed)."""
@@ -218,12 +218,12 @@ class PredictionError:
 
         products = np.zeros((COLUMNS, COLUMNS))
         (u, slope), y = self.delayed(theta)[index], self._pairs[index][1]
-        kept, step = self.kept[index], self.experiments[index].step
+        mask, step = self.masks[index], self.experiments[index].step
         inner_products(
             u,
             slope,
             y,
-            EVERY if kept.all() else kept,
+            EVERY if mask.all() else mask,
             np.atleast_1d(step),
             float(self.experiments[index].time_s[0]),
             shape.alpha,
@@ -290,12 +290,12 @@ class PredictionError:
         """Both, from plain filters over whole signals."""
         errors, slopes = [], []
         white = self.whitening(theta)
-        for index, kept in enumerate(self.kept):
+        for index, mask in enumerate(self.masks):
             error, jacobian = self.error_and_slopes(theta, index)
             if white is not None:
-                error, jacobian = whiten(white, np.where(kept, error, 0.0), jacobian * kept)
-            errors.append(error[kept])
-            slopes.append(jacobian[:, kept])
+                error, jacobian = whiten(white, np.where(mask, error, 0.0), jacobian * mask)
+            errors.append(error[mask])
+            slopes.append(jacobian[:, mask])
         return np.concatenate(errors), np.concatenate(slopes, axis=1).T
 
     def whitening(self, theta: Array) -> Whitening | None:

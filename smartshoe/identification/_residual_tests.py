@@ -40,21 +40,23 @@ def residual_tests(problem: PredictionError, theta: Array, errors: Sequence[Arra
     """Whiteness and input independence of the prediction error ``errors`` (one (n,) a recording) at ``theta``."""
     white = problem.whitening(theta)
     if white is not None:
-        errors = [whitened(white, np.where(kept, error, 0.0)) for error, kept in zip(errors, problem.kept, strict=True)]
+        errors = [
+            whitened(white, np.where(mask, error, 0.0)) for error, mask in zip(errors, problem.masks, strict=True)
+        ]
     return {
-        "whiteness": whiteness(errors, problem.kept),
+        "whiteness": whiteness(errors, problem.masks),
         "input_independence": input_independence(problem, theta, errors),
     }
 
 
-def whiteness(residuals: Sequence[Array], kept: Sequence[Mask]) -> ResidualTest:
+def whiteness(residuals: Sequence[Array], masks: Sequence[Mask]) -> ResidualTest:
     """Ljung-Box over 20 lags, pooled over recordings; pairs with a missing sample do not count."""
     from smartshoe.kernels.residual import lagged_products
 
-    total = sum(int(np.count_nonzero(mask)) for mask in kept)
+    total = sum(int(np.count_nonzero(mask)) for mask in masks)
     lags = min(WHITENESS_LAGS, max(total // 4, 1))
     products, pairs = np.zeros(lags + 1), np.zeros(lags + 1, dtype=int)
-    for residual, mask in zip(residuals, kept, strict=True):
+    for residual, mask in zip(residuals, masks, strict=True):
         lagged_products(residual if mask.all() else np.where(mask, residual, 0.0), mask, products, pairs)
     correlation = products[1:] / products[0] if products[0] > 0.0 else np.zeros(lags)
     statistic = float(np.sum((correlation * total) ** 2 / np.maximum(pairs[1:], 1)))
@@ -82,7 +84,7 @@ def input_independence(problem: PredictionError, theta: Array, errors: Sequence[
     lags, size = sorted({lag // factor for lag in INPUT_LAGS}), problem.size
     rows, residuals = [], []
     for index, error in enumerate(errors):
-        u, inside = coarse.delayed(theta)[index][0], coarse.kept[index].astype(float)
+        u, inside = coarse.delayed(theta)[index][0], coarse.masks[index].astype(float)
         row = np.empty((size + len(lags), u.size))
         row[:size] = coarse.model_error_and_slopes(theta, index)[1]
         for delayed, lag in zip(row[size:], lags, strict=True):

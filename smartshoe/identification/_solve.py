@@ -106,8 +106,8 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
             trial = walk.keep_inside(theta - step, problem)
             move = theta - trial
             following = problem.evaluate(trial)
-            foretold = float(2.0 * move @ now.gradient - move @ now.normal @ move)
-            accepted = walk.judge(now, following, foretold, move)
+            predicted = float(2.0 * move @ now.gradient - move @ now.normal @ move)
+            accepted = walk.judge(now, following, predicted, move)
             if accepted or float(np.max(np.abs(move) / (np.abs(theta) + 1e-300))) < 1e-16:
                 break
         if not accepted:
@@ -117,7 +117,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
         change = float((np.abs(move) / (size + (1e-3 * size.max() + 1e-300))).max())
         gained = now.cost - following.cost
         theta, before, now = trial, now.cost, following
-        if change < tolerance or (gained <= ROUNDING * before and foretold <= 1e-6 * before):
+        if change < tolerance or (gained <= ROUNDING * before and predicted <= 1e-6 * before):
             return Minimum(theta, now, iteration, True)
     return Minimum(theta, now, max_iterations, False)
 
@@ -160,7 +160,7 @@ class _GaussNewton:
         inside: Array = np.clip(trial, problem.lower, problem.upper)
         return inside
 
-    def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
+    def judge(self, now: Evaluation, following: Evaluation, predicted: float, move: Array) -> bool:
         accepted = bool(following.cost <= now.cost)
         self.fraction = 1.0 if accepted else self.fraction / 2
         return accepted
@@ -180,10 +180,10 @@ class _LevenbergMarquardt(_GaussNewton):
         step[free] = solve_normal(damped[np.ix_(free, free)], now.gradient[free])
         return step
 
-    def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
+    def judge(self, now: Evaluation, following: Evaluation, predicted: float, move: Array) -> bool:
         gained = now.cost - following.cost
         if gained >= 0.0 and np.isfinite(following.cost):
-            share = gained / foretold if foretold > 0.0 else 1.0
+            share = gained / predicted if predicted > 0.0 else 1.0
             self.damping = max(self.damping * max(1 / 3, 1 - (2 * share - 1) ** 3), 1e-14)
             self.growth = 2.0
             return True
@@ -231,9 +231,9 @@ class _TrustRegion(_GaussNewton):
             inside = np.where(crossed, np.clip(trial, problem.lower, problem.upper), inside)
         return inside
 
-    def judge(self, now: Evaluation, following: Evaluation, foretold: float, move: Array) -> bool:
+    def judge(self, now: Evaluation, following: Evaluation, predicted: float, move: Array) -> bool:
         gained = now.cost - following.cost
-        share = gained / foretold if foretold > 0.0 else -1.0
+        share = gained / predicted if predicted > 0.0 else -1.0
         length = _length(self.scale * move)
         if not np.isfinite(following.cost) or share < 0.25:
             self.radius = 0.25 * length

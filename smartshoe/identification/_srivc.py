@@ -49,8 +49,8 @@ def srivc(
             model = np.empty(u.size)
             respond(u, np.atleast_1d(experiment.step), 0.0, pole, p1, p2, 0.0, 0.0, model)
             auxiliary.append(model)
-            if not experiment.kept.all():
-                y = np.where(experiment.kept, y, model + _nuisance(problem, index, alpha, y - model))
+            if not experiment.mask.all():
+                y = np.where(experiment.mask, y, model + _nuisance(problem, index, alpha, y - model))
             outputs.append(y)
     return pole, p1, p2, solution[3:].reshape(len(inputs), -1), max_iterations, False
 
@@ -75,7 +75,7 @@ def _step(
             inputs[index],
             outputs[index],
             instruments[index],
-            EVERY if experiment.kept.all() else experiment.kept,
+            EVERY if experiment.mask.all() else experiment.mask,
             np.atleast_1d(experiment.step),
             pole,
             products,
@@ -103,11 +103,11 @@ def _nuisance(problem: PredictionError, index: int, alpha: float, rest: Array) -
         columns.append(np.ones_like(rest))
     if problem.state_at is not None:
         columns.append(np.exp(-alpha * experiment.time_s))
-    kept = experiment.kept
-    if not columns or not kept.any():
+    mask = experiment.mask
+    if not columns or not mask.any():
         return np.zeros_like(rest)
     basis = np.stack(columns)
-    inside, target = basis[:, kept], rest[kept]
+    inside, target = basis[:, mask], rest[mask]
     fitted: Array = np.linalg.lstsq(inside @ inside.T, inside @ target, rcond=None)[0] @ basis
     return fitted
 
@@ -128,7 +128,7 @@ def coarse_delay(problem: PredictionError, pole: float) -> float:
         experiment = problem.experiments[index]
         stride = max(round(COARSE_STEP_S / steps[index]), 1)
         edge = reach * stride
-        inside = np.where(experiment.kept, 1.0, 0.0)[edge : y.size - edge]
+        inside = np.where(experiment.mask, 1.0, 0.0)[edge : y.size - edge]
         count = float(inside.sum())
         if count < 10:
             continue

@@ -86,10 +86,10 @@ def _linear(problem: PredictionError, alpha: float, delay_s: float) -> tuple[flo
         if fading:
             rows.append(np.exp(-alpha * experiment.time_s))
             at.append(size - count + index)
-        basis = np.stack(rows)[:, experiment.kept]
+        basis = np.stack(rows)[:, experiment.mask]
         normal[np.ix_(at, at)] += basis @ basis.T
-        right[at] += basis @ y[experiment.kept]
-        power += float(y[experiment.kept] @ y[experiment.kept])
+        right[at] += basis @ y[experiment.mask]
+        power += float(y[experiment.mask] @ y[experiment.mask])
     solution = solve_normal(normal, right)
     cost = power - 2 * float(solution @ right) + float(solution @ normal @ solution)
     return (cost if np.isfinite(cost) else np.inf), alpha, float(solution[0]), float(solution[1])

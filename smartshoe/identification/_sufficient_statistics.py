@@ -79,7 +79,7 @@ class Sums:
 
         if not u.size:
             return
-        if self.last_at < 0:  # as if the first input had lasted for ever
+        if self.last_at < 0:  # started in the steady state of the first input
             self.lags[:] = u[0]
             self.last_u, self.last_at = float(u[0]), int(at[0]) - 1
         columns = np.empty((u.size, free.columns))
@@ -97,9 +97,9 @@ class Sums:
             gone = int(np.count_nonzero(time_s[0] * BANK > VANISHED))
             columns[:, :gone] = 0.0
             columns[:, gone:POLES] = np.exp(-np.outer(time_s, BANK[gone:]))
-        kept = np.isfinite(y)
-        if not kept.all():
-            columns, u, y = columns[kept], u[kept], y[kept]
+        mask = np.isfinite(y)
+        if not mask.all():
+            columns, u, y = columns[mask], u[mask], y[mask]
         if not y.size:
             return
         gone = min(gone, self.root.shape[0])

@@ -176,10 +176,10 @@ def _fold(
     whole = [bool(found) and all(id(cycle) in members for cycle in found) for found in cycles]
     # Names as `identify` will know them: unique over all recordings, with some of these gone.
     named = [replace(one, name=experiment.name) for one, experiment in zip(recordings, experiments, strict=True)]
-    kept = [index for index, gone in enumerate(whole) if not gone]
-    masks = {experiments[index].name: experiments[index].kept & ~left_out[index] for index in kept}
+    others = [index for index, gone in enumerate(whole) if not gone]
+    masks = {experiments[index].name: experiments[index].mask & ~left_out[index] for index in others}
     try:
-        found = identify([named[index] for index in kept], counted=masks, **options)
+        found = identify([named[index] for index in others], counted=masks, **options)
     except (NotIdentifiableError, NotConvergedError) as refusal:
         # One rate on which everything hangs is a finding, and the other folds stand.
         return RateFold(rate, count, None, *(4 * (float("nan"),)), refused=str(refusal))
@@ -190,7 +190,7 @@ def _fold(
             error = _error_of_unseen(found, experiment, cycles[index][0].start)
         else:
             error = _force_error(found, experiment, found.errors[experiment.name])
-        outside.append(error[experiment.kept & left_out[index]])
+        outside.append(error[experiment.mask & left_out[index]])
         if not whole[index]:
             inside.append(error[masks[experiment.name]])
     return RateFold(rate, count, found, *_figures(outside), *_figures(inside))
@@ -205,7 +205,7 @@ def _figures(errors: Sequence[Array]) -> tuple[float, float]:
 
 
 def _compensated(found: Identification, reading: Array, experiment: Experiment) -> Array:
-    """(n,) force of a reading about its zero: (b0 s + b1)/(s + a1), as if the first reading had lasted for ever."""
+    """(n,) force of a reading about its zero: (b0 s + b1)/(s + a1), started in steady state."""
     a1, b0, b1 = found.coefficients
     slow = lag(reading, a1, experiment.step)
     force_n: Array = b0 * (reading - slow) + b1 / a1 * slow
@@ -224,7 +224,7 @@ def _error_of_unseen(found: Identification, experiment: Experiment, first_ramp: 
     """Force error (n,) of a recording that no part of the fit has seen."""
     a1, _, b1 = found.coefficients
     load_zero_n = float(np.mean([one.value for one in found.load_offsets.values()]))
-    rest = experiment.kept.copy()
+    rest = experiment.mask.copy()
     rest[first_ramp:] = False
     offset = found.offset
     if rest.any():

@@ -217,8 +217,8 @@ class RecursiveIdentification:
         edge = min(theta[0] - LN_POLES[-1], LN_POLES[0] - theta[0]) < 1e-6
         if edge or degenerate or not values[0] > 0 or not sd[0] <= WORST_RELATIVE_SD * values[0]:
             raise NotIdentifiableError(
-                f"{self.unit}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be told so far: record more triangles,"
-                " at several rates, with rests between"
+                f"{self.unit}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be determined so far: record more"
+                " triangles, at several rates, with rests between"
             )
         quantile, symbol = t_quantile(degrees), self.reading_unit.symbol
         units = ("1/s", f"N/{symbol}", f"N/({symbol} s)", "1", "1", "s")

@@ -159,7 +159,7 @@ def inner_products(  # type: ignore[no-untyped-def]
         now[:m] = u[at : at + m]
         if delayed:
             now_change[:m] = slope[at : at + m]
-        if at == 0:  # as if the first sample had lasted for ever
+        if at == 0:  # started in the steady state of the first sample
             inputs[0] = w = now[0]
             changes[0] = s = now_change[0]
         if even:  # one short loop a column, as in `complete`

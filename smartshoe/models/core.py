@@ -56,19 +56,19 @@ class Core:
         self.matrix, self.drive, self.read, self.direct = matrix, drive, read, float(direct)
         self._to_deformation, self._stiffness = to_u, stiffness
         self._memory = len(inner)
-        self._kept: dict[float, tuple[Array, Array, Array, Array, Array]] = {}
+        self._known_modes: dict[float, tuple[Array, Array, Array, Array, Array]] = {}
 
     def steady_state(self, load: float) -> Array:
-        """States of arms and heat under a load that has lasted for ever; nothing has leaked."""
+        """States of arms and heat in the steady state of a load; nothing has leaked."""
         state = np.zeros(self.drive.size)
         state[: self._memory] = load
         return state
 
     def _modes(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
-        """`_modes_at`, kept: a chain is run many times with its core unchanged."""
-        if step_s not in self._kept:
-            self._kept[step_s] = self._modes_at(step_s)
-        return self._kept[step_s]
+        """`_modes_at`, cached: a chain is run many times with its core unchanged."""
+        if step_s not in self._known_modes:
+            self._known_modes[step_s] = self._modes_at(step_s)
+        return self._known_modes[step_s]
 
     def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
         """decay, before, after (p,), the matrix from modes to states and that from states to modes."""
@@ -94,7 +94,7 @@ class Core:
         return decay, scale * before, scale * after, vectors, inverse
 
     def simulate(self, load: Array, step_s: float) -> Array:
-        """Pressure (n,) for ``load`` (n,), shares of full scale, every ``step_s``; the first load lasted for ever."""
+        """Pressure (n,) for ``load`` (n,), shares of full scale, every ``step_s``; started in steady state."""
         return self._response(load, step_s, self.read, self.direct)
 
     def deformation(self, load: Array, step_s: float) -> Array:

@@ -121,15 +121,15 @@ class ExtendedModel:
         signal: Array,
         conditions: Conditions,
         first: int = 0,
-        kept: list[Array] | None = None,
+        inputs: list[Array] | None = None,
         core: Core | None = None,
     ) -> Array:
         """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
         # Blocks that bend a spring beside the relaxing arm solve the balance of both.
         conditions = conditions.within(self.relaxing_share, self.relaxation_rate_per_s)
         for part in self.chain[first:]:
-            if kept is not None:
-                kept.append(signal)
+            if inputs is not None:
+                inputs.append(signal)
             if part is None:
                 signal = (core or self.core).simulate(signal, conditions.step_s)
             else:
@@ -150,13 +150,13 @@ class ExtendedModel:
         A gas that stiffens beyond the linear one takes load off the wall, one that leaks leaves it to the wall: from
         u = f + omega/N and p = f - omega (1 - 1/N) of `smartshoe.models.core`.
         """
-        kept: list[Array] = []
-        self._run(conditions.load, conditions, 0, kept)
+        inputs: list[Array] = []
+        self._run(conditions.load, conditions, 0, inputs)
         core = self.chain.index(None)
-        load = kept[core]
+        load = inputs[core]
         for k, part in enumerate(self.chain):
             if part is not None and part.effect.air is not None and k > core:
-                pressure = kept[k]
+                pressure = inputs[k]
                 share = self.wall_ratio - (1.0 if part.effect.air == "leaves" else 0.0)
                 load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / share
         return self.core.deformation(load, conditions.step_s)
@@ -184,19 +184,19 @@ class ExtendedModel:
 
         The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
         """
-        kept: list[Array] = []
-        reading = self._run(conditions.load, conditions, 0, kept)
+        inputs: list[Array] = []
+        reading = self._run(conditions.load, conditions, 0, inputs)
         out = np.empty((reading.size, 1 + len(self._varied)), order="F")
         out[:, 0] = reading / self.gain
         for j, by in enumerate(self._varied, start=1):
-            out[:, j] = by.slope(reading, kept, conditions)
+            out[:, j] = by.slope(reading, inputs, conditions)
         return reading, out
 
     def trace(self, conditions: Conditions) -> tuple[Array, list[Array]]:
         """The reading (n,), and what goes into each block of the chain, the chain's end last."""
-        kept: list[Array] = []
-        reading = self._run(conditions.load, conditions, 0, kept)
-        return reading, [*kept, reading / self.gain]
+        inputs: list[Array] = []
+        reading = self._run(conditions.load, conditions, 0, inputs)
+        return reading, [*inputs, reading / self.gain]
 
     def extended_by(self, added: Effect, start: Array) -> Extensions:
         """A small step of each strength of an effect that is not in it yet; ``start``: null strengths and a shape."""
@@ -215,10 +215,10 @@ class ExtendedModel:
 
     def column_of(self, by: Extensions, conditions: Conditions, trace: tuple[Array, list[Array]]) -> Array:
         """Derivatives (n, k) of the reading with respect to the k strengths of ``by``; ``trace`` is the model's own."""
-        reading, kept = trace
+        reading, inputs = trace
         out = np.empty((reading.size, len(by)), order="F")
         for column, one in enumerate(by):
-            out[:, column] = one.slope(reading, kept, conditions)
+            out[:, column] = one.slope(reading, inputs, conditions)
         return out
 
     # -- to and from a file ---------------------------------------------------------------------------------------
@@ -267,9 +267,9 @@ class Extension:
     first: int
     core: Core | None
 
-    def slope(self, reading: Array, kept: Sequence[Array], conditions: Conditions) -> Array:
-        """The reading's derivative (n,), ``kept`` being what goes into each block of the model that did not move."""
-        moved = self.model._run(kept[self.first], conditions, self.first, core=self.core)
+    def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions) -> Array:
+        """The reading's derivative (n,), ``inputs`` being what goes into each block of the model that did not move."""
+        moved = self.model._run(inputs[self.first], conditions, self.first, core=self.core)
         return (moved - reading) / self.step
 
 

@@ -87,7 +87,7 @@ def _recur(start: float, decay: Array, drive: Array) -> Array:
 
 
 def lag(u: Array, alpha: float, step: Steps) -> Array:
-    """w (n,) = alpha/(s + alpha) u, as if u[0] had lasted for ever; ``alpha`` in 1/s, ``step`` from `steps`."""
+    """w (n,) = alpha/(s + alpha) u, started in the steady state of u[0]; ``alpha`` in 1/s, ``step`` from `steps`."""
     if isinstance(step, float):
         decay, now, before = (float(value) for value in hold_coefficients(alpha * step))
         return linear_filter([now, before], [1.0, -decay], u, [u[0] - now * u[0]])[0]
@@ -111,7 +111,7 @@ def simulate(
 ) -> Array:
     """y (n,) of (b0 s + b1)/(s + a1) driven by ``u`` (n,), straight lines between samples; Chinimilli 2016 (13).
 
-    ``start``: "steady" as if u[0] had lasted for ever, "rest" as if u had been 0 before. Exact for any steps.
+    ``start``: "steady" in the steady state of u[0], "rest" as if u had been 0 before. Exact for any steps.
     """
     if not a1 > 0.0:
         raise UsageError(f"a1 is {a1:g}: the pole must be stable, give a1 above 0")

@@ -47,7 +47,7 @@ class TwinBladder(Bladder):
         return 1.0 / (self.static_gain_pa_per_n * self.model.wall_ratio)
 
     def reset(self) -> None:
-        """Back to rest: unloaded for ever, memory forgotten, the session's time at zero."""
+        """Back to rest: unloaded, in steady state, memory forgotten, the session's time at zero."""
         self._load_n = np.zeros(1)
         self._rate_hz: float | None = None
 

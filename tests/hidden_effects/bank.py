@@ -80,7 +80,7 @@ class Drawn:
 
 
 def drawn(kind: str, index: int) -> Drawn:
-    """Case ``index`` of the set ``kind``: the same for ever."""
+    """Case ``index`` of the set ``kind``: always the same."""
     seed = SEEDS[kind] + index
     rng = np.random.default_rng([seed, 77])
     like = MIXTURE[index % len(MIXTURE)] if kind == "calibrate" else kind

@@ -163,7 +163,7 @@ def test_a_balance_holds_what_it_says():
     one = Given(law, 0.05, draws_of(law))
     u, further = balanced([one], f, at, SUBJECT)
     assert np.abs(further).max() == 0.0
-    # Under a load held for ever the wall takes what its deformation asks for.
+    # Under a load held without end the wall takes what its deformation asks for.
     stiff = SUBJECT.k1 * 0.38113
     at_once = (1 + stiff) / (1 + stiff + SUBJECT.k2 * 0.38113)
     x = at_once * u + (1 - at_once) * lagged(u, 2e-3, at_once * SUBJECT.k2)

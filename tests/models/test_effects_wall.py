@@ -149,7 +149,7 @@ def test_every_corner_of_the_bounds_gives_finite_numbers(name: str) -> None:
     for given_ in (conditions(corners(3)), conditions(corners(3), noise=0.002)):
         for values in product(*[(one.lower, one.upper) for one in made.parameters]):
             for within in (given_, given_.within(0.3, 0.5)):
-                given_.kept.clear()
+                given_.cache.clear()
                 with np.errstate(all="raise", under="ignore"):
                     out = made.apply(given_.load, within, np.array(values))
                 assert np.all(np.isfinite(out))

@@ -1,4 +1,4 @@
-"""The thread behind a `SerialShoe`: reads the port, watches for valid frames, reopens a lost port, never for ever."""
+"""The thread behind a `SerialShoe`: reads the port, watches for valid frames, reopens a lost port; every wait ends."""
 
 from __future__ import annotations
 

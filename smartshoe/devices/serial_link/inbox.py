@@ -1,4 +1,4 @@
-"""Blocks between the thread that reads a port and whoever iterates over them: bounded, never for ever."""
+"""Blocks between the thread that reads a port and who iterates over them: bounded in number; every wait ends."""
 
 from __future__ import annotations
 

@@ -22,8 +22,8 @@ class SwingZero:
 
     The zero moves when three swings within ten seconds, each a flat valley of 0.15 to 1 s between two stances, agree;
     then by at most ``slew_per_s`` of full scale, and never further than ``most`` of it. A load that stays (standing,
-    a bag in the shoe, a foot that rests for more than a second) has no such valleys, so it is kept for ever. What it
-    cannot tell from a zero is a load that is the same in every swing (tight lacing).
+    a bag in the shoe, a foot that rests for more than a second) has no such valleys, so it is never taken for a zero.
+    A load that is the same in every swing (tight lacing) is.
 
     Feed it compensated forces: in raw readings the silicone's relaxation is still there in swing.
     """

@@ -181,8 +181,8 @@ def summarise(
         one[~counted] = np.nan
         residual.append(one)
         spread += float(np.sum((experiment.y[counted] - np.mean(experiment.y[counted])) ** 2))
-    kept = [np.isfinite(one) for one in residual]
-    white = whiteness(residual, kept)
+    masks = [np.isfinite(one) for one in residual]
+    white = whiteness(residual, masks)
     if white.p_value < LEAST_P_VALUE and cost > NOISE_FREE**2 * spread:
         notes = [*notes, f"the residual is not white (p = {white.p_value:.1g}): the error bars take it for white noise"]
     if (np.roots(denominator).real > 0.0).any():

@@ -17,7 +17,7 @@ from smartshoe.models.first_order import hold_coefficients
 
 
 class _Lag:
-    """w = alpha/(s + alpha) u on a stream of straight lines, as if the first value had lasted for ever."""
+    """w = alpha/(s + alpha) u on a stream of straight lines, started in steady state."""
 
     def __init__(self, alpha: float, step_s: float) -> None:
         self.decay, self.now, self.before = (float(value) for value in hold_coefficients(alpha * step_s))
@@ -72,7 +72,7 @@ class BesideArm(Inverse):
         self.lag = _Lag(arm.rate_per_s / (1.0 + arm.share), step_s)
 
     def reset(self) -> None:
-        """The next value counts as having lasted for ever."""
+        """Start in the steady state of the next value."""
         self.spring.reset()
         self.lag.reset()
 
@@ -90,8 +90,8 @@ class BesideArm(Inverse):
         return self._around(name, self.spring.c_single(name), self.lag.c_increments)
 
     def _around(self, name: str, step: CStep, lag: Callable[[str, str, str, str], str]) -> CStep:
-        kept, begun, arm = f"{name}_lag", f"{name}_begun", f"{name}_arm"
-        lagged = lag(f"f->{kept}", f"f->{begun}", f"{name}_lagged", "x")
+        lag_state, begun, arm = f"{name}_lag", f"{name}_begun", f"{name}_arm"
+        lagged = lag(f"f->{lag_state}", f"f->{begun}", f"{name}_lagged", "x")
         body = f"""{{
 {lagged}    const double {arm} = {self.part!r} * (x - {name}_lagged);
     f->{begun} = 1.0;
@@ -99,7 +99,7 @@ class BesideArm(Inverse):
     {step.body}
     x += {arm};
 }}"""
-        return CStep({**step.states, **_members(body, kept), begun: 0.0}, body)
+        return CStep({**step.states, **_members(body, lag_state), begun: 0.0}, body)
 
 
 class GasBesideArm(Inverse):
@@ -116,7 +116,7 @@ class GasBesideArm(Inverse):
         self.core = _Lag(arm.rate_per_s / (1.0 + arm.share), step_s)
 
     def reset(self) -> None:
-        """The next value counts as having lasted for ever."""
+        """Start in the steady state of the next value."""
         self.spring.reset()
         self.arm.reset()
         self.core.reset()

@@ -28,14 +28,14 @@ def drift(conditions: Conditions, values: Array) -> Array:
     moved = np.zeros(conditions.time_s.size)
     if warmer_k.size:
         moved += values[1] * warmer_k
-    if not warmer_k.size or conditions.kept["drift_by_clock"][0] > 0.0:
+    if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
         moved += values[0] * running_time_s(conditions)
     return moved
 
 
 def _warmer_k(conditions: Conditions) -> Array:
-    """The smoothed temperature (n,), or (0,) where none was logged or it stood still; kept from call to call."""
-    known = conditions.kept.get("warmer_k")
+    """The smoothed temperature (n,), or (0,) where none was logged or it stood still; cached between calls."""
+    known = conditions.cache.get("warmer_k")
     if known is None:
         known = np.zeros(0)
         temperature = conditions.temperature_k
@@ -46,8 +46,8 @@ def _warmer_k(conditions: Conditions) -> Array:
             if float(np.ptp(means)) >= LEAST_CHANGE_K:
                 known = _running_mean(temperature, round(0.5 * SMOOTHED_S / conditions.step_s))
                 like_time = abs(float(np.corrcoef(means, np.arange(BLOCKS))[0, 1])) >= SAME_AS_TIME
-                conditions.kept["drift_by_clock"] = np.array([0.0 if like_time else 1.0])
-        conditions.kept["warmer_k"] = known
+                conditions.cache["drift_by_clock"] = np.array([0.0 if like_time else 1.0])
+        conditions.cache["warmer_k"] = known
     return known
 
 

@@ -77,8 +77,8 @@ def local_variance(residual: Array, prediction: Array, sample_time_s: float) -> 
     fast = _second_difference(residual[:n].reshape(-1, 3))
     spread = float(np.median(np.abs(fast))) / 0.6745
     readings = np.unique((prediction + residual).round(12))
-    lattice = float(np.min(np.diff(readings))) if readings.size > 1 else 0.0
-    if spread <= 0.0 or (readings.size < residual.size // 4 and lattice > 1.5 * spread):
+    grid_step = float(np.min(np.diff(readings))) if readings.size > 1 else 0.0
+    if spread <= 0.0 or (readings.size < residual.size // 4 and grid_step > 1.5 * spread):
         return None
     slope = np.gradient(prediction, sample_time_s)[1:n:3]
     corner = np.abs(_second_difference(prediction[:n].reshape(-1, 3)))
@@ -155,8 +155,8 @@ def variance_score(local: LocalVariance, asked: int) -> tuple[float, float]:
     standard = np.log(np.maximum(local.variance, 1e-9 * without) / without)
     standard = standard - standard.mean()  # its mean is psi(2) - log(2) and not 0
     direction = scores[:, asked]
-    kept = np.column_stack([scores[:, other], np.ones(direction.size)])
-    direction = direction - kept @ np.linalg.lstsq(kept, direction, rcond=None)[0]
+    others = np.column_stack([scores[:, other], np.ones(direction.size)])
+    direction = direction - others @ np.linalg.lstsq(others, direction, rcond=None)[0]
     length = float(np.sqrt(direction @ direction))
     if length <= 1e-9 * float(np.sqrt(scores[:, asked] @ scores[:, asked])):
         return 0.0, 0.0

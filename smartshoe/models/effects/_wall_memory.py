@@ -31,9 +31,9 @@ def cleaned(load: Array, half_width: float) -> Array:
 
 def cleaned_load(conditions: Conditions) -> Array:
     """The measured load (n,) through a play of the noise's width; computed once."""
-    found = conditions.kept.get("cleaned_load")
+    found = conditions.cache.get("cleaned_load")
     if found is None:
-        found = conditions.kept["cleaned_load"] = cleaned(conditions.load, dead_zone(conditions))
+        found = conditions.cache["cleaned_load"] = cleaned(conditions.load, dead_zone(conditions))
     return found
 
 

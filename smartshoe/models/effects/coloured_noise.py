@@ -14,7 +14,7 @@ from smartshoe.models.effects.exposure import by
 
 MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each
 QUANTILE = 3.588  # normal, of one false alarm in 1000 over the number of memories
-LEAST_INDEPENDENT = 40  # stretches of one memory's length, below which that memory is left out
+LEAST_INDEPENDENT = 40  # segments of one memory's length, below which that memory is left out
 SAME_PEAK = 0.05
 CORNER = 0.1  # of the noise: a prediction that bends more from one sample to the next
 

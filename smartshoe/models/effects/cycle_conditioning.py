@@ -37,11 +37,11 @@ class CycleConditioning(Effect):
         """The load with the gain so far; ``before["cycles"]`` counts along."""
         if values[0] == 0.0:
             return signal.copy()
-        done = conditions.kept.get("cycles_done")
+        done = conditions.cache.get("cycles_done")
         if done is None:
             from smartshoe.kernels.memory import cycles_done
 
-            done = conditions.kept["cycles_done"] = np.empty(signal.size)
+            done = conditions.cache["cycles_done"] = np.empty(signal.size)
             start = np.array([NO_LOAD, NO_LOAD, float(conditions.before.get("cycles", 0.0))])
             cycles_done(cleaned_load(conditions), LEAST_HEIGHT, start, done)
         return signal * (1.0 - float(values[0]) * np.expm1(done * (-1.0 / float(values[1]))))

@@ -70,7 +70,7 @@ class Conditions:
     neighbour: Array | None = None
     before: Mapping[str, float] = field(default_factory=dict)
     relaxing: tuple[float, float] | None = None
-    kept: dict[str, Array] = field(default_factory=dict, repr=False)
+    cache: dict[str, Array] = field(default_factory=dict, repr=False)
     """What blocks derive from the load alone (largest so far, cycles done), by name."""
 
     def within(self, share: float, rate_per_s: float) -> Conditions:
@@ -80,10 +80,10 @@ class Conditions:
     @property
     def rate_per_s(self) -> Array:
         """(n,) the load's slope in full scales a second, central differences."""
-        found = self.kept.get("rate_per_s")
+        found = self.cache.get("rate_per_s")
         if found is None:
             found = np.gradient(self.load, self.step_s) if self.load.size > 1 else np.zeros(self.load.size)
-            self.kept["rate_per_s"] = found
+            self.cache["rate_per_s"] = found
         return found
 
 

@@ -19,7 +19,7 @@ HARMONICS = 7
 MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
 NEIGHBOURS = 60  # bins on either side that give the floor
 HANN_CORRELATION = 1.944  # neighbouring bins behind a Hann window are worth half as many independent ones
-STRETCHES = 30
+SEGMENTS = 30
 STEADY, STEADIER = 0.4, 0.8  # least median over mean of a weak and of a strong tone's power in time; noise has 0.69
 BURST_SAMPLES = 64
 
@@ -88,7 +88,7 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
 
     Each bin of the periodogram over the mean of its neighbours, which has an F distribution where the noise is
     locally flat (Fisher's test with a local floor), at one false alarm in 1000 for the whole spectrum; on the whole
-    record and on averages over stretches of it, since the mains wander. A line that the ``prediction`` (n,) has as
+    record and on averages over segments of it, since the mains wander. A line that the ``prediction`` (n,) has as
     well is the load's, and one that comes and goes is ringing.
     """
     best: tuple[float, float, float, float] | None = None
@@ -120,7 +120,7 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
 
 
 def _powers(signal: Array, length: int) -> Array:
-    """Periodograms (stretches, bins) behind a Hann window, stretches overlapping not at all."""
+    """Periodograms (segments, bins) behind a Hann window, segments overlapping not at all."""
     count = signal.size // length
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
     parts = signal[: count * length].reshape(count, length)
@@ -148,18 +148,18 @@ def _line(
     from scipy.special import fdtrc, fdtri
 
     powers = _powers(residual, length)
-    stretches, bins = powers.shape
-    half = NEIGHBOURS if stretches == 1 else NEIGHBOURS // 3
+    segments, bins = powers.shape
+    half = NEIGHBOURS if segments == 1 else NEIGHBOURS // 3
     first = max(math.ceil(LOWEST_HZ * length * sample_time_s), 4)
     if bins - first < 2 * half:
         return None
     ratio, count = _over_floor(powers.mean(axis=0), half, 3)
     load_ratio, _ = _over_floor(_powers(prediction, length).mean(axis=0), half, 3)
-    freedom = np.full(bins, 2.0 * stretches)
+    freedom = np.full(bins, 2.0 * segments)
     if length % 2 == 0:
-        freedom[-1] = stretches  # a real number at the Nyquist frequency
-        freedom[-2] = 1.5 * stretches
-    rest = 2.0 * stretches * count / HANN_CORRELATION
+        freedom[-1] = segments  # a real number at the Nyquist frequency
+        freedom[-2] = 1.5 * segments
+    rest = 2.0 * segments * count / HANN_CORRELATION
     chance = fdtrc(freedom, rest, ratio)
     allowed = 0.5 * FALSE_ALARMS / (bins - first)
     threshold = fdtri(freedom, rest, 1.0 - allowed)
@@ -173,12 +173,12 @@ def _line(
 
 
 def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bool:
-    """Whether the tone's power in stretches of a thirtieth of the record is much the same throughout.
+    """Whether the tone's power in segments of a thirtieth of the record is much the same throughout.
 
     The stronger the tone above the floor beside it, the steadier it has to be.
     """
-    length = residual.size // STRETCHES
-    parts = residual[: STRETCHES * length].reshape(STRETCHES, length)
+    length = residual.size // SEGMENTS
+    parts = residual[: SEGMENTS * length].reshape(SEGMENTS, length)
     turns = -2j * np.pi * sample_time_s * np.arange(length)
     window = np.hanning(length)
 

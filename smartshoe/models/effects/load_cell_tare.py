@@ -11,7 +11,7 @@ from smartshoe.models.effects.exposure import by
 class LoadCellTare(Effect):
     """Acting load = measured load + f0: f0 > 0 where the tube is loaded while the log says zero.
 
-    To a linear tube that was loaded for ever this is `zero_offset`. They differ where the chain is not linear, and in
+    To a linear tube in steady state this is `zero_offset`. They differ where the chain is not linear, and in
     the rests: an unloaded and vented unit reads zero pressure at a measured load of -f0.
     """
 

@@ -1,4 +1,4 @@
-"""Readings on a lattice."""
+"""Readings on a grid of evenly spaced values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Quantisation(Waveformless, Effect):
     """
 
     name, family, stage, place = "quantisation", "data", "logger", "logger"
-    says = "readings sit on a lattice of evenly spaced values"
+    says = "readings lie on a grid of evenly spaced values"
     exposed_by = by("holds")
     separated_by = {
         "coloured_noise": by("holds"),

@@ -42,9 +42,9 @@ class RateGain(Effect):
         if values[0] == 0.0:
             return signal.copy()
         gain, exponent = (float(value) for value in values)
-        square = conditions.kept.get("rate_gain")
+        square = conditions.cache.get("rate_gain")
         if square is None:
-            square = conditions.kept["rate_gain"] = np.log(_rate(conditions) ** 2 + SLOW_PER_S**2)
+            square = conditions.cache["rate_gain"] = np.log(_rate(conditions) ** 2 + SLOW_PER_S**2)
         factor: Array = 1.0 - gain * SLOW_PER_S**exponent + gain * np.exp((0.5 * exponent) * square)
         return signal * factor
 

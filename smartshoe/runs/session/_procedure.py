@@ -105,7 +105,7 @@ def _earlier(plan: SessionPlan) -> Calibration | None:
 
 
 class _Stream:
-    """The shoe's blocks, each on disk before anybody sees it; never silent for ever."""
+    """The shoe's blocks, each on disk before anybody sees it; every wait ends."""
 
     def __init__(self, shoe: Shoe, folder: SessionFolder, operator: Operator) -> None:
         self._blocks: Iterator[Block] = shoe.blocks()
