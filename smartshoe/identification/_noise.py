@@ -58,10 +58,10 @@ def _answer(problem: PredictionError, theta: Array) -> tuple[Array, float]:
 
     shape, impulse, none = problem.shape(theta), np.zeros(IMPULSE_SAMPLES), np.zeros(0)
     impulse[1] = 1.0
-    products, step = np.zeros((COLUMNS, COLUMNS)), np.array([problem.experiments[0].sample_time_s])
+    products, step_s = np.zeros((COLUMNS, COLUMNS)), problem.experiments[0].sample_time_s
     # Without an output to compare with, the error is the response.
     inner_products(
-        impulse, none, np.zeros_like(impulse), EVERY, step, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0, NOT_STORED,
+        impulse, none, np.zeros_like(impulse), EVERY, step_s, None, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0, NOT_STORED,
         products,
     )  # fmt: skip
     return products[:3, -1], float(products[-1, -1])

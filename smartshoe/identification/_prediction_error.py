@@ -19,6 +19,7 @@ from smartshoe.identification._solve import Evaluation
 from smartshoe.identification._whitening import Whitening, whiten, whitening
 from smartshoe.models.first_order import (
     HALF_WIDTH,
+    as_kernels_take,
     interpolation_gain,
     lag,
     lag_and_slope,
@@ -224,7 +225,7 @@ class PredictionError:
             slope,
             y,
             EVERY if mask.all() else mask,
-            np.atleast_1d(step),
+            *as_kernels_take(step),
             float(self.experiments[index].time_s[0]),
             shape.alpha,
             shape.p1,
@@ -319,8 +320,8 @@ class PredictionError:
 
         experiment, shape, u = self.experiments[index], self.shape(theta), self.delayed(theta)[index][0]
         error, constant, state = np.empty(u.size), self.constant(theta, index), self.state(theta, index)
-        steps, begin_s = np.atleast_1d(experiment.step), float(experiment.time_s[0])
-        respond(u, steps, begin_s, shape.alpha, shape.p1, shape.p2, constant, state, error)
+        step, begin_s = as_kernels_take(experiment.step), float(experiment.time_s[0])
+        respond(u, *step, begin_s, shape.alpha, shape.p1, shape.p2, constant, state, error)
         error -= self._pairs[index][1]
         return error
 

@@ -12,6 +12,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification._prediction_error import EVERY, LARGEST_DELAY_S, PredictionError
+from smartshoe.models.first_order import as_kernels_take
 
 COARSE_STEP_S = 0.05  # the grid on which a delay is first looked for
 
@@ -47,7 +48,7 @@ def srivc(
             experiment = problem.experiments[index]
             # Offset and start stand among the instruments as they are: the auxiliary model needs neither.
             model = np.empty(u.size)
-            respond(u, np.atleast_1d(experiment.step), 0.0, pole, p1, p2, 0.0, 0.0, model)
+            respond(u, *as_kernels_take(experiment.step), 0.0, pole, p1, p2, 0.0, 0.0, model)
             auxiliary.append(model)
             if not experiment.mask.all():
                 y = np.where(experiment.mask, y, model + _nuisance(problem, index, alpha, y - model))
@@ -76,7 +77,7 @@ def _step(
             outputs[index],
             instruments[index],
             EVERY if experiment.mask.all() else experiment.mask,
-            np.atleast_1d(experiment.step),
+            *as_kernels_take(experiment.step),
             pole,
             products,
         )
@@ -136,7 +137,7 @@ def coarse_delay(problem: PredictionError, pole: float) -> float:
         target = y[edge : y.size - edge]
         target = (target - float(target @ inside) / count) * inside
         w = np.empty(u.size)
-        respond(u, np.atleast_1d(experiment.step), 0.0, pole, 0.0, 1.0, 0.0, 0.0, w)
+        respond(u, *as_kernels_take(experiment.step), 0.0, pole, 0.0, 1.0, 0.0, 0.0, w)
         sums = np.empty((costs.size, 7))
         delayed_products(u, w, target, inside, stride, sums)
         of_u, of_w, uu, uw, ww, uy, wy = sums.T

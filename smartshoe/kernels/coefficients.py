@@ -31,12 +31,12 @@ def _solve3(matrix, right, out):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _start(u, y, step, pole, theta):  # type: ignore[no-untyped-def]
     """SRIVC (Chinimilli 2016, Section V) of ``u`` and ``y``, into theta = (ln alpha, p1, p2); False if astray."""
-    every, steps = np.empty(0, dtype=np.bool_), np.array([step])
+    every = np.empty(0, dtype=np.bool_)
     products, normal, right, solution = np.empty((COLUMNS, COLUMNS)), np.empty((3, 3)), np.empty(3), np.empty(3)
     instrument = y.copy()
     for _ in range(20):
         products[:] = 0.0
-        instrument_products(u, y, instrument, every, steps, pole, products)
+        instrument_products(u, y, instrument, every, step, None, pole, products)
         for i in range(3):
             row = products[INSTRUMENT if i == 0 else i]
             normal[i, 0], normal[i, 1], normal[i, 2], right[i] = row[REGRESSOR], row[1], row[2], row[TARGET]
@@ -49,7 +49,7 @@ def _start(u, y, step, pole, theta):  # type: ignore[no-untyped-def]
         theta[0], theta[1], theta[2] = math.log(alpha), p1, p2
         if settled:
             return True
-        respond(u, steps, 0.0, alpha, p1, p2, 0.0, 0.0, instrument)
+        respond(u, step, None, 0.0, alpha, p1, p2, 0.0, 0.0, instrument)
     return False
 
 
@@ -61,7 +61,7 @@ def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[n
     lambda, on means of ``factor`` samples. ``theta`` (3,) becomes (ln alpha, p1, p2), ``normal`` (3, 3) J'J.
     """
     none, stored = np.empty(0), np.empty((0, 0))
-    every, steps = np.empty(0, dtype=np.bool_), np.array([step])
+    every = np.empty(0, dtype=np.bool_)
     products, change = np.empty((COLUMNS, COLUMNS)), np.empty(3)
     blocks = u.size // factor
     thin_u, thin_y = np.empty(blocks), np.empty(blocks)
@@ -80,7 +80,7 @@ def fit_coefficients(u, y, step, pole, factor, theta, normal):  # type: ignore[n
     for passes in range(1, 60):
         products[:] = 0.0
         inner_products(
-            u, none, y, every, steps, 0.0, math.exp(theta[0]), theta[1], theta[2], 0.0, 0.0, stored, products
+            u, none, y, every, step, None, 0.0, math.exp(theta[0]), theta[1], theta[2], 0.0, 0.0, stored, products
         )
         following = products[COLUMNS - 1, COLUMNS - 1]
         if not following <= cost * (1.0 + 1e-14):

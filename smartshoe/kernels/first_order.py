@@ -131,38 +131,39 @@ def complete(columns, now, now_change, now_s, target, alpha, p1, p2, offset, sta
 
 @njit(cache=True, fastmath=_LAX)
 def inner_products(  # type: ignore[no-untyped-def]
-    u, slope, y, counted, steps, begin_s, alpha, p1, p2, offset, start, stored, out
+    u, slope, y, counted, step_s, uneven, begin_s, alpha, p1, p2, offset, start, stored, out
 ):
     """Add the inner products (COLUMNS, COLUMNS) of gradient and error over counted samples to ``out``.
 
     ``u`` (n,) input, ``slope`` (n,) its derivative with respect to the delay (or size 0), ``y`` (n,) output,
-    ``counted`` (n,) bool or size 0 for all, ``steps`` (1,) or (n - 1,) in s, ``begin_s`` the time of the first
-    sample. ``stored`` (COLUMNS, n) receives the columns at every sample, counted or not (or has size 0). The delay's
+    ``counted`` (n,) bool or size 0 for all, ``step_s`` the even step or the first one, ``uneven`` None or all steps
+    (n - 1,) in s, ``begin_s`` the time of the first sample. ``stored`` (COLUMNS, n) receives the columns at every sample, counted or not (or has size 0). The delay's
     column is 0 where there is no slope. The model is y = p1 (u - w) + p2 w + offset + start exp(-alpha t) with
     w = alpha/(s + alpha) u.
     """
     n = u.size
-    even, delayed, masked = steps.size == 1, slope.size > 0, counted.size > 0
+    delayed, masked = slope.size > 0, counted.size > 0
     columns = np.empty((COLUMNS, CHUNK))
     fades, times, now_s = np.empty(CHUNK), np.empty(CHUNK), np.empty(CHUNK)
     inputs, changes = np.zeros(CHUNK + 1), np.zeros(CHUNK + 1)  # the sample before the chunk, then the chunk
     before, now, before_change, now_change = inputs[:CHUNK], inputs[1:], changes[:CHUNK], changes[1:]
     drift, lag, slow, fading = columns[0], columns[2], columns[3], columns[5]
-    E, A, B, dE, dA, dB = hold(alpha, steps[0])
+    E, A, B, dE, dA, dB = hold(alpha, step_s)
     fades[0], times[0] = 1.0, 0.0
     for j in range(1, CHUNK):
-        fades[j], times[j] = fades[j - 1] * E, j * steps[0]
+        fades[j], times[j] = fades[j - 1] * E, j * step_s
     w = v = s = 0.0
     time_s, fade = begin_s, math.exp(-alpha * begin_s)
     for at in range(0, n, CHUNK):
         m = min(CHUNK, n - at)
-        now[:m] = u[at : at + m]
-        if delayed:
-            now_change[:m] = slope[at : at + m]
+        for j in range(m):  # a slice assigned to a slice takes numba two seconds more to compile
+            now[j] = u[at + j]
+        for j in range(m if delayed else 0):
+            now_change[j] = slope[at + j]
         if at == 0:  # started in the steady state of the first sample
             inputs[0] = w = now[0]
             changes[0] = s = now_change[0]
-        if even:  # one short loop a column, as in `complete`
+        if uneven is None:  # one short loop a column, as in `complete`
             for j in range(m):
                 lag[j] = A * now[j] + B * before[j]
                 drift[j] = dA * now[j] + dB * before[j]
@@ -173,16 +174,16 @@ def inner_products(  # type: ignore[no-untyped-def]
                 now_s[j] = time_s + times[j]
                 fading[j] = fade * fades[j]
             fade *= fades[m - 1] * E
-            time_s += m * steps[0]
+            time_s += m * step_s
         else:
             for j in range(m):
                 if at + j > 0:
-                    E, A, B, dE, dA, dB = hold(alpha, steps[at + j - 1])
+                    E, A, B, dE, dA, dB = hold(alpha, uneven[at + j - 1])
                     v = E * v + (dE * w + dA * now[j] + dB * before[j])
                     w = E * w + (A * now[j] + B * before[j])
                     s = E * s + (A * now_change[j] + B * before_change[j])
                     fade *= E
-                    time_s += steps[at + j - 1]
+                    time_s += uneven[at + j - 1]
                 lag[j], drift[j], slow[j], now_s[j], fading[j] = w, v, s, time_s, fade
         if fade < FADED:
             fade = 0.0
@@ -197,14 +198,14 @@ def inner_products(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_LAX)
-def respond(u, steps, begin_s, alpha, p1, p2, offset, start, out):  # type: ignore[no-untyped-def]
+def respond(u, step_s, uneven, begin_s, alpha, p1, p2, offset, start, out):  # type: ignore[no-untyped-def]
     """The model's output (n,) alone into ``out``; arguments as those of `inner_products`."""
     n = u.size
-    E, A, B, _, _, _ = hold(alpha, steps[0])
+    E, A, B, _, _, _ = hold(alpha, step_s)
     lag, none, fading = np.empty(CHUNK), np.zeros(CHUNK), np.empty(CHUNK)
     u_last = w = u[0]
     fade, start = 0.0, start * math.exp(-alpha * begin_s)
-    if steps.size == 1:
+    if uneven is None:
         for at in range(0, n, CHUNK):
             m = min(CHUNK, n - at)
             now, here = u[at:], out[at:]
@@ -218,7 +219,7 @@ def respond(u, steps, begin_s, alpha, p1, p2, offset, start, out):  # type: igno
     else:
         for k in range(n):
             if k > 0:
-                E, A, B, _, _, _ = hold(alpha, steps[k - 1])
+                E, A, B, _, _, _ = hold(alpha, uneven[k - 1])
                 w = E * w + (A * u[k] + B * u[k - 1])
             fade = 1.0 if k == 0 else E * fade
             out[k] = p1 * (u[k] - w) + p2 * w + offset + start * fade

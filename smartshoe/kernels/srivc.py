@@ -12,24 +12,24 @@ _LAX = {"reassoc", "contract", "nsz"}
 
 
 @njit(cache=True, fastmath=_LAX)
-def instrument_products(u, y, x, counted, steps, pole, out):  # type: ignore[no-untyped-def]
+def instrument_products(u, y, x, counted, step_s, uneven, pole, out):  # type: ignore[no-untyped-def]
     """Add the inner products (COLUMNS, COLUMNS) of SRIVC's filtered signals over counted samples to ``out``.
 
     ``u``, ``y``, ``x`` (n,) input, output and the instrument's output, ``counted`` (n,) bool or size 0 for all,
-    ``steps`` (1,) or (n - 1,) in s. With f = pole/(s + pole) the columns are the instrument -f x/pole, then u - f u,
+    ``step_s`` and ``uneven`` as in `inner_products`. With f = pole/(s + pole) the columns are the instrument -f x/pole, then u - f u,
     f u/pole, 1 and exp(-pole t), the regressor -f y/pole and the target y - f y.
     """
-    n, even = u.size, steps.size == 1
+    n = u.size
     columns = np.empty((COLUMNS, CHUNK))
     instrument, rest, lag, ones = columns[0], columns[1], columns[2], columns[3]
     fading, regressor, target = columns[4], columns[5], columns[6]
-    E, A, B, _, _, _ = hold(pole, steps[0])
+    E, A, B, _, _, _ = hold(pole, step_s)
     u_slow, y_slow, x_slow, fade = u[0], y[0], x[0], 1.0
     u_last, y_last, x_last = u[0], y[0], x[0]
     for at in range(0, n, CHUNK):
         m = min(CHUNK, n - at)
         us, ys, xs = u[at:], y[at:], x[at:]
-        if even:
+        if uneven is None:
             lag[0], regressor[0] = A * us[0] + B * u_last, A * ys[0] + B * y_last
             instrument[0] = A * xs[0] + B * x_last
             for j in range(1, m):
@@ -45,7 +45,7 @@ def instrument_products(u, y, x, counted, steps, pole, out):  # type: ignore[no-
         else:
             for j in range(m):
                 if at + j > 0:
-                    E, A, B, _, _, _ = hold(pole, steps[at + j - 1])
+                    E, A, B, _, _, _ = hold(pole, uneven[at + j - 1])
                     u_slow = E * u_slow + (A * us[j] + B * u_last)
                     y_slow = E * y_slow + (A * ys[j] + B * y_last)
                     x_slow = E * x_slow + (A * xs[j] + B * x_last)

@@ -38,14 +38,14 @@ def compile_all() -> None:
     from smartshoe.kernels.shift import NEIGHBOURS, fill_taps, shift
     from smartshoe.kernels.srivc import delayed_products, instrument_products
 
-    u, none, every, step = np.ones(32), np.zeros(0), np.zeros(0, dtype=bool), np.ones(1)
+    u, none, every = np.ones(32), np.zeros(0), np.zeros(0, dtype=bool)
     products = np.zeros((COLUMNS, COLUMNS))
     delayed_products(u, u, u, u, 1, products)
-    instrument_products(u, u, u, every, step, 1.0, products)
-    respond(u, step, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.empty(32))
+    instrument_products(u, u, u, every, 1.0, None, 1.0, products)
+    respond(u, 1.0, None, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.empty(32))
     fill_taps(0.5, np.empty(NEIGHBOURS), np.empty(NEIGHBOURS))
     shift(u, 0.5, 1.0, np.empty(32), np.empty(32))
-    inner_products(u, none, u, every, step, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.zeros((0, 0)), products)
+    inner_products(u, none, u, every, 1.0, None, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, np.zeros((0, 0)), products)
     lagged_products(u, np.ones(32, dtype=bool), np.zeros(2), np.zeros(2, dtype=int))
     linear_filter([1.0, 1.0], [1.0, 0.5], u)
     orthogonalise(np.ones((2, 32)), 1)

@@ -54,6 +54,14 @@ def hold_slopes(x: Any) -> tuple[Any, Any, Any]:
     return -decay, -slope, slope + decay
 
 
+def as_kernels_take(step: Steps) -> tuple[float, Array | None]:
+    """``step`` as two arguments: the first step in s, and all of them (n - 1,) where they are uneven, else None.
+
+    numba leaves out the branch of a None before it compiles: most data are even, and never compile the other one.
+    """
+    return (step, None) if isinstance(step, float) else (float(step[0]), step)
+
+
 def _now_series(x: Any) -> Any:
     # 1 - phi loses digits for small x; its series does not.
     return x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x / 720))))

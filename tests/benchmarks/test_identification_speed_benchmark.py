@@ -123,11 +123,11 @@ def test_speed_of_one_pass(table):
     u, y = signals()
     num, den = cases.hold_filter(*cases.TRUE)
     a1, b0, b1 = cases.TRUE
-    step, none, every = np.array([cases.SAMPLE_TIME_S]), np.zeros(0), np.zeros(0, dtype=bool)
+    none, every = np.zeros(0), np.zeros(0, dtype=bool)
     slope, stored, out = np.gradient(u, cases.SAMPLE_TIME_S), np.zeros((0, 0)), np.zeros((COLUMNS, COLUMNS))
 
     def one_pass(delayed: np.ndarray) -> None:
-        inner_products(u, delayed, y, every, step, 0.0, a1, b0, b1 / a1, 0.0, 0.0, stored, out)
+        inner_products(u, delayed, y, every, cases.SAMPLE_TIME_S, None, 0.0, a1, b0, b1 / a1, 0.0, 0.0, stored, out)
 
     rivals = {"scipy": lambda: lfilter(num, den, u), "three": lambda: one_pass(none), "six": lambda: one_pass(slope)}
     took = quickest_s(rivals, 30)

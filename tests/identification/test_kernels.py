@@ -9,7 +9,7 @@ from smartshoe.kernels.first_order import COLUMNS, respond
 from smartshoe.kernels.residual import lagged_products, orthogonalise
 from smartshoe.kernels.shift import shift
 from smartshoe.kernels.srivc import INSTRUMENT, REGRESSOR, TARGET, delayed_products, instrument_products
-from smartshoe.models.first_order import interpolation_taps, lag
+from smartshoe.models.first_order import as_kernels_take, interpolation_taps, lag
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -35,7 +35,7 @@ def test_a_response_is_the_plain_lags(seed: int, samples: int, pole: float, even
     rng = np.random.default_rng(seed)
     step = 0.01 if even else rng.uniform(0.004, 0.03, samples - 1)
     u, out = rng.standard_normal(samples), np.empty(samples)
-    respond(u, np.atleast_1d(step), begin_s, pole, 1.5, -0.7, 0.3, 2.0, out)
+    respond(u, *as_kernels_take(step), begin_s, pole, 1.5, -0.7, 0.3, 2.0, out)
     time_s = begin_s + np.concatenate([[0.0], np.cumsum(np.broadcast_to(step, samples - 1))])
     w = lag(u, pole, step)
     assert out == pytest.approx(1.5 * (u - w) - 0.7 * w + 0.3 + 2.0 * np.exp(-pole * time_s), abs=1e-9)
@@ -51,7 +51,7 @@ def test_the_instruments_products_are_those_of_plain_filters(
     u, y, x = rng.standard_normal((3, samples))
     counted = rng.random(samples) < 0.8 if gaps else np.zeros(0, dtype=bool)
     products = np.zeros((COLUMNS, COLUMNS))
-    instrument_products(u, y, x, counted, np.atleast_1d(step), pole, products)
+    instrument_products(u, y, x, counted, *as_kernels_take(step), pole, products)
     fade = np.exp(-pole * np.concatenate([[0.0], np.cumsum(np.broadcast_to(step, samples - 1))]))
     slow_u, slow_y, slow_x = (lag(signal, pole, step) for signal in (u, y, x))
     columns = np.zeros((COLUMNS, samples))
