@@ -100,6 +100,13 @@ def add_products(columns, m, out):  # type: ignore[no-untyped-def]
             at += 1
 
 
+@njit(cache=True)
+def copy(values, at, m, out):  # type: ignore[no-untyped-def]
+    """``m`` of ``values`` from ``at`` on into ``out``; a slice set to a slice takes numba two seconds to compile."""
+    for j in range(m):
+        out[j] = values[at + j]
+
+
 @njit(cache=True, fastmath=_LAX)
 def leave_out(counted, columns, m):  # type: ignore[no-untyped-def]
     """Set the first ``m`` of ``columns`` (COLUMNS, CHUNK) to 0 where ``counted`` (m or more,) is False."""
@@ -137,9 +144,9 @@ def inner_products(  # type: ignore[no-untyped-def]
 
     ``u`` (n,) input, ``slope`` (n,) its derivative with respect to the delay (or size 0), ``y`` (n,) output,
     ``counted`` (n,) bool or size 0 for all, ``step_s`` the even step or the first one, ``uneven`` None or all steps
-    (n - 1,) in s, ``begin_s`` the time of the first sample. ``stored`` (COLUMNS, n) receives the columns at every sample, counted or not (or has size 0). The delay's
-    column is 0 where there is no slope. The model is y = p1 (u - w) + p2 w + offset + start exp(-alpha t) with
-    w = alpha/(s + alpha) u.
+    (n - 1,) in s, ``begin_s`` the time of the first sample. ``stored`` (COLUMNS, n) receives the columns at every
+    sample, counted or not (or has size 0). The delay's column is 0 where there is no slope. The model is
+    y = p1 (u - w) + p2 w + offset + start exp(-alpha t) with w = alpha/(s + alpha) u.
     """
     n = u.size
     delayed, masked = slope.size > 0, counted.size > 0
@@ -156,10 +163,9 @@ def inner_products(  # type: ignore[no-untyped-def]
     time_s, fade = begin_s, math.exp(-alpha * begin_s)
     for at in range(0, n, CHUNK):
         m = min(CHUNK, n - at)
-        for j in range(m):  # a slice assigned to a slice takes numba two seconds more to compile
-            now[j] = u[at + j]
-        for j in range(m if delayed else 0):
-            now_change[j] = slope[at + j]
+        copy(u, at, m, now)
+        if delayed:
+            copy(slope, at, m, now_change)
         if at == 0:  # started in the steady state of the first sample
             inputs[0] = w = now[0]
             changes[0] = s = now_change[0]

@@ -16,8 +16,8 @@ def instrument_products(u, y, x, counted, step_s, uneven, pole, out):  # type: i
     """Add the inner products (COLUMNS, COLUMNS) of SRIVC's filtered signals over counted samples to ``out``.
 
     ``u``, ``y``, ``x`` (n,) input, output and the instrument's output, ``counted`` (n,) bool or size 0 for all,
-    ``step_s`` and ``uneven`` as in `inner_products`. With f = pole/(s + pole) the columns are the instrument -f x/pole, then u - f u,
-    f u/pole, 1 and exp(-pole t), the regressor -f y/pole and the target y - f y.
+    ``step_s`` and ``uneven`` as in `inner_products`. With f = pole/(s + pole) the columns are the instrument
+    -f x/pole, then u - f u, f u/pole, 1 and exp(-pole t), the regressor -f y/pole and the target y - f y.
     """
     n = u.size
     columns = np.empty((COLUMNS, CHUNK))
