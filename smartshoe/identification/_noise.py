@@ -61,7 +61,7 @@ def _answer(problem: PredictionError, theta: Array) -> tuple[Array, float]:
     products, step_s = np.zeros((COLUMNS, COLUMNS)), problem.experiments[0].sample_time_s
     # Without an output to compare with, the error is the response.
     inner_products(
-        impulse, none, np.zeros_like(impulse), EVERY, step_s, None, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0, NOT_STORED,
-        products,
+        impulse, none, np.zeros_like(impulse), EVERY, step_s, None, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0,
+        NOT_STORED, products,
     )  # fmt: skip
     return products[:3, -1], float(products[-1, -1])
