@@ -9,7 +9,7 @@ import numpy as np
 
 from smartshoe.calibration.export._blocks import described
 from smartshoe.calibration.export._cost import cost_lines
-from smartshoe.calibration.export._fixed_chain import RUN, FixedChain
+from smartshoe.calibration.export._fixed_chain import RUN, FixedChain, IntegerChain
 from smartshoe.calibration.export._fixed_point import FixedPoint, FixedVector, IntegerFilter
 from smartshoe.calibration.export._model import ExtendedFilterModel, FilterModel, one_safe_line
 from smartshoe.calibration.export._rendering import columns_csv, finite_or, render, vector_csv
@@ -32,6 +32,8 @@ def c_files(model: FilterModel, precision: str = "double", fixed: str | None = N
         return _fixed(model, fixed, apart)
     shared = _floating(model, precision)
     if isinstance(model, ExtendedFilterModel):
+        if precision == "float" and model.is_steep:
+            return _files(model, "steep_extended", apart, **shared, **_steep(model))
         return _files(model, model.kind, apart, **shared, **_extended(model, precision))
     n0, n1 = model.numerator
     values = {"n0": n0, "n1": n1, "d1": model.denominator[1], "leak": model.leak, "feed": model.feed}
@@ -43,7 +45,7 @@ def c_files(model: FilterModel, precision: str = "double", fixed: str | None = N
 def _files(model: FilterModel, kind: str, apart: bool, *, vector: str, **values: object) -> Files:
     name = model.name
     source = render(f"{kind}.c.j2", model, **values)
-    head = {"fixed_extended": "fixed_point"}.get(kind, kind) + ".h.j2"
+    head = {"fixed_extended": "fixed_point", "steep_extended": "extended"}.get(kind, kind) + ".h.j2"
     cost = cost_lines(render(head, model, cost={}, **values), source)
     folder, header = ("self_test/", f"../{name}.h") if apart else ("", f"{name}.h")
     return {
@@ -73,15 +75,15 @@ def _floating(model: FilterModel, precision: str) -> dict[str, Any]:
 
 def _fixed(model: FilterModel, fixed: str, apart: bool) -> Files:
     if isinstance(model, ExtendedFilterModel):
-        chain = FixedChain.of(model, fixed)
+        found_chain = FixedChain.of(model, fixed)
+        chain = found_chain.chain
         states = [(name, "counts of the chain") for _, step in chain.blocks for name in step.states]
-        said: dict[str, Any] = {
-            "blocks": described(chain.blocks),
+        said = _counted(chain) | {
             "bound_holds": f"up to full scale and for {RUN} samples",
             "bound_found": " (the latter\n * measured along a walk when this was written, with a margin)",
             "clock_hours": chain.clock and f"{chain.clock[2] / model.sample_rate_hz / 3600.0:.0f}",
         }
-        return _files(model, "fixed_extended", apart, **_integers(model, chain, states), **said)
+        return _files(model, "fixed_extended", apart, **_integers(model, found_chain, states), **said)
     found = FixedPoint.of(model, fixed)
     states = [("state", f"steps of force times 2^{found.fraction}")]
     plain: dict[str, Any] = {"bound_holds": "within the range", "bound_found": "", "clock_hours": None}
@@ -124,6 +126,32 @@ def _rounded_up(value: float) -> float:
     return float(f"{math.ceil(value / unit) * unit:.3g}")
 
 
+def _counted(chain: IntegerChain) -> dict[str, Any]:
+    """What the templates of a chain in integers share."""
+    return {
+        "chain": chain,
+        "blocks": described(chain.blocks),
+        "counts": {name: value for _, step in chain.blocks for name, value in step.states.items()},
+    }
+
+
+def _steep(model: ExtendedFilterModel) -> dict[str, Any]:
+    """What the template needs where blocks are so steep that floats between them would lose too much."""
+    chain = IntegerChain.of(model.filter)
+    factor, above = chain.entry
+    return {
+        **_counted(chain),
+        "states": [name for _, step in chain.blocks for name in step.states],
+        "state_type": "int64_t",
+        "arithmetic": "float in and out; between, where this chain is too steep for floats, integers (int64_t)",
+        "largest_reading": _literal(32.0 * 2.0**above, "float", "full_scale_reading"),
+        "into_counts": _literal(2.0 ** (chain.fraction - above), "float", "full_scale_reading"),
+        "entry_factor": f"INT64_C({factor})" if factor > 0 else f"-INT64_C({-factor})",
+        "out_of_counts": _literal(2.0 ** (chain.leaving[1] - chain.fraction), "float", "full_scale_load_n"),
+        "started_s": f"{model.filter.started_s:g}",
+    }
+
+
 def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, Any]:
     """What the templates of the extended filter need beside the shared values."""
     filter_ = model.filter
@@ -134,6 +162,8 @@ def _extended(model: ExtendedFilterModel, precision: str) -> dict[str, Any]:
     states = {name: _initial(value, precision) for _, step in blocks for name, value in step.states.items()}
     return {
         "states": states,
+        "state_type": precision,
+        "arithmetic": precision,
         "blocks": described(blocks),
         "reading_per_share": _literal(filter_.reading_per_share, precision, "full_scale_reading"),
         "full_scale_load_n": _literal(filter_.model.full_scale_load_n, precision, "full_scale_load_n"),

@@ -10,6 +10,7 @@ from math import ceil, log2
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.calibration._extended import ExtendedCompensator
 from smartshoe.calibration.export._blocks import reads_time
 from smartshoe.calibration.export._fixed_point import (
     HEADROOM,
@@ -45,67 +46,95 @@ MARGIN = 2.0
 Forces = Callable[[Array], Array]
 
 
-@dataclass(frozen=True, kw_only=True)
-class FixedChain(IntegerFilter):
-    """The chain of an extended model in integers, a share of full scale counting 2^-``fraction`` in 64 bits.
+@dataclass(frozen=True)
+class IntegerChain:
+    """The blocks of an extended filter in C of integers: a share of full scale counts 2^-``fraction`` in 64 bits.
 
-    A reading times ``entry`` is a count; a count times ``leaving[0]``, 2^``leaving[1]`` times smaller, is a force in
-    steps. ``clock`` is (start, step, last): the time in counts at the first sample and between two, and the sample at
-    which it stands still; None where no block reads it. ``functions`` is the C of the arithmetic that ``blocks`` call.
-
-    ``rounding_n`` is half a step of the force and the roundings inside, raised as the chain raises its input.
-    ``error_bound_n`` adds what rounding a reading to its step does: the sum of what moving each single reading by half
-    a step does to a force, measured along the test readings, and the drift of a hold, with a margin.
+    ``clock`` is (start, step, last): the time in counts at the first sample and between two, and the sample at which
+    it stands still; None where no block reads it. ``functions`` is the C of the arithmetic that ``blocks`` call, and
+    ``widest`` the largest count between two of them. ``entry`` and ``leaving`` are (factor, exponent): full scales are
+    the power of two above them times the factor, upwards of 1 for readings and downwards for forces.
     """
 
     fraction: int
-    entry: Scaled
-    leaving: tuple[int, int]
-    widest: int
-    clock: tuple[int, int, int] | None
     blocks: tuple[tuple[str, CStep], ...]
     functions: str
+    clock: tuple[int, int, int] | None
+    widest: int
+    entry: tuple[int, int]
+    leaving: tuple[int, int]
+
+    @classmethod
+    def of(cls, filter_: ExtendedCompensator) -> IntegerChain:
+        """The chain of ``filter_`` from its start."""
+        steps = filter_.c_steps(single=True)
+        timed = any(reads_time(step.body) for _, step in steps)
+        to = IntegerC(FRACTION_WITH_TIME if timed else FRACTION)
+        start, step = (to.count(Fraction(seconds)) for seconds in (filter_.started_s, filter_.step_s))
+        share, load_n = filter_.reading_per_share, filter_.model.full_scale_load_n
+        above, above_n = ceil(log2(abs(share))), ceil(log2(load_n))
+        return cls(
+            fraction=to.fraction,
+            blocks=tuple((name, to.step(one)) for name, one in steps),
+            functions=functions_text(to.used | {"times_q", "rounded_q"}, to.fraction),
+            clock=(start, step, min((MOST - start) // step, 2**32 - 2)) if timed else None,
+            widest=WIDEST * to.one,
+            entry=(to.count(Fraction(2) ** above / Fraction(share)), above),
+            leaving=(to.count(Fraction(load_n) / Fraction(2) ** above_n), above_n),
+        )
+
+    @property
+    def roundings(self) -> float:
+        """How far its integers may be off, a share of full scale, where no block raises that."""
+        summed = ROUNDINGS_A_SAMPLE * RUN if any(step.states for _, step in self.blocks) else 0
+        return float((ROUNDINGS_A_BLOCK * len(self.blocks) + summed) * 2.0**-self.fraction)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedChain(IntegerFilter):
+    """The chain of an extended model between integers.
+
+    A reading times ``entry`` is a count of ``chain``; a count times its factor of leaving, 2^``lowered`` times
+    smaller, is a force in steps.
+
+    ``rounding_n`` is half a step of the force and the roundings inside, raised as the chain raises its input.
+    ``error_bound_n`` adds what rounding a reading to its step does: the sum of what moving each single reading by half
+    a step does to a force, measured along the test readings, and the drift of a hold, or what moving all readings of
+    a walk does, with a margin.
+    """
+
+    chain: IntegerChain
+    entry: Scaled
+    lowered: int
 
     @classmethod
     def of(cls, model: ExtendedFilterModel, fixed: str) -> FixedChain:
         """The chain in ``fixed`` ("q15", "q31"); raises `UsageError` where its error would be no filter's."""
         filter_ = model.filter
         width, full_scale_n = WIDTHS[fixed], filter_.model.full_scale_load_n
+        share = abs(filter_.reading_per_share)
         finite = model.test_readings[np.isfinite(model.test_readings)]
-        largest = max(float(np.abs(finite).max()), abs(filter_.reading_per_share))
-        input_lsb = power_of_two(HEADROOM[fixed] * largest / (2**width - 1))
+        input_lsb = power_of_two(HEADROOM[fixed] * max(float(np.abs(finite).max()), share) / (2**width - 1))
         output_lsb = power_of_two(HEADROOM[fixed] * full_scale_n / (2**width - 1))
-        steps = filter_.c_steps(single=True)
-        timed = any(reads_time(step.body) for _, step in steps)
-        to = IntegerC(FRACTION_WITH_TIME if timed else FRACTION)
-        entry = Scaled.of(Fraction(input_lsb) / Fraction(filter_.reading_per_share) * to.one, 2**width)
+        chain = IntegerChain.of(filter_)
+        unit = Fraction(input_lsb) / Fraction(filter_.reading_per_share) * 2**chain.fraction
+        entry = Scaled.of(unit, 2**width)
         if entry is None:
-            raise UsageError(f"a full scale of {filter_.reading_per_share:g} is beyond {fixed}: export without --fixed")
-        exponent = ceil(log2(full_scale_n))
-        lowered = to.fraction + round(log2(output_lsb)) - exponent
-        start, step = (to.count(Fraction(seconds)) for seconds in (filter_.started_s, filter_.step_s))
+            raise UsageError(f"a full scale of {share:g} is beyond {fixed}: export without --fixed")
         gain_n = _gain_n(model, 0.5 * input_lsb)
-        summed = ROUNDINGS_A_SAMPLE * RUN if any(step.states for _, step in steps) else 0
-        steepness = max(1.0, gain_n * abs(filter_.reading_per_share) / full_scale_n)
-        inside = steepness * (
-            (ROUNDINGS_A_BLOCK * len(steps) + summed) / to.one
-            + entry.error / (input_lsb / abs(filter_.reading_per_share) * to.one)
-        )
-        rounding_n = 0.5 * output_lsb + full_scale_n * inside
+        steepness = max(1.0, gain_n * share / full_scale_n)
+        inside_n = full_scale_n * steepness * (chain.roundings + entry.error / float(abs(unit)))
+        rounding_n = 0.5 * output_lsb + inside_n
         found = cls(
             width=width,
             input_lsb=input_lsb,
             output_lsb=output_lsb,
             rounding_n=rounding_n,
             error_bound_n=rounding_n + 0.5 * input_lsb * gain_n,
-            fraction=to.fraction,
+            chain=chain,
             entry=entry,
-            leaving=(to.count(Fraction(full_scale_n) / Fraction(2) ** exponent), lowered),
-            widest=WIDEST * to.one,
-            clock=(start, step, min((MOST - start) // step, 2**32 - 2)) if timed else None,
-            blocks=tuple((name, to.step(step)) for name, step in steps),
-            functions=functions_text(to.used | {"times_q", "rounded_q"}, to.fraction),
-        )  # fmt: skip
+            lowered=chain.fraction + round(log2(output_lsb)) - chain.leaving[1],
+        )
         if not found.error_bound_n <= WORST_SHARE * full_scale_n:
             raise too_coarse(model, fixed, found)
         return found

@@ -141,14 +141,23 @@ class ExtendedFilterModel(FilterModel):
             raise UsageError(f"calibration of {self.calibration.unit or 'a unit'} holds no extended model")
         return found
 
+    @property
+    def is_steep(self) -> bool:
+        """Whether single precision between two blocks would move the force too far."""
+        undone = {name for name, _ in self.filter.blocks}
+        return any(part.effect.is_steep_undone for part in self.filter.model.parts if part.name in undone)
+
     def tolerance_n(self, precision: str) -> float:
         """Bound in N on what rounding may do to `test_forces_n`.
 
         Each block is run in the order of operations of the filter. In double, what is left comes from the library's
         exp and pow and is some 1e-14 of full scale; the bound is a billionth, and a wrong constant shows in the
-        fourth digit. In float it is two dozen roundings a block, of the largest force.
+        fourth digit. In float it is two dozen roundings a block, of the largest force; six in all where the chain is
+        steep, and therefore run in integers.
         """
         most_n = max(np.abs(self.test_forces_n).max(), self.filter.model.full_scale_load_n)
+        if precision == "float" and self.is_steep:
+            return float(most_n * 6 * FLOAT_ROUNDING)
         return float(most_n * (1e-9 if precision == "double" else 24 * FLOAT_ROUNDING * len(self.filter.blocks)))
 
     @property

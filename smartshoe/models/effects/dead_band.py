@@ -20,6 +20,7 @@ class DeadBand(Effect):
 
     name, family, stage, place = "dead_band", "dead_band", "contact", "contact"
     is_memoryless = True
+    is_steep_undone = True
     says = "the first newtons of each loading do not reach the tube: no reading at low loads, a constant lack above"
     parameters = (
         EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.3, 0.01),

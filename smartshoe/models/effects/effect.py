@@ -135,6 +135,7 @@ class Effect(ABC):
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
     ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause;
     ``is_refinement`` where it follows members of other families too, and so tells no kind.
+    ``is_steep_undone``: True where half a spacing of single precision in a signal moves the load by 3e-7 of full scale.
     ``is_memoryless``: True where the reading is a function of the present load alone.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
     """
@@ -160,6 +161,7 @@ class Effect(ABC):
     is_memoryless: ClassVar[bool] = False
     imitates: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
+    is_steep_undone: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

@@ -45,6 +45,7 @@ class FlexibleLoop(Effect):
     """
 
     name, family, stage, place = "flexible_loop", "hysteresis", "wall", "wall"
+    is_steep_undone = True
     says = "the reading lies lower while loading than while unloading, by the same amount at any rate"
     parameters = (
         *_weights("even", "full scale", USUAL_HEIGHT),

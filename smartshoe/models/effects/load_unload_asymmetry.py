@@ -17,6 +17,7 @@ class LoadUnloadAsymmetry(Effect):
     """f (1 - a (1 - s)/2), s the sense of motion: ds = (sgn(df) - s) |df|/turn, kept through holds, +1 at first."""
 
     name, family, stage, place = "load_unload_asymmetry", "asymmetry", "wall", "wall"
+    is_steep_undone = True
     says = "unloading has another gain than loading: the reading jumps where the load turns, in proportion to the load"
     parameters = (
         EffectParameter("lost_gain", "1", "share of the gain that unloading lacks", 0.0, -0.6, 0.6, 0.01),

@@ -21,6 +21,7 @@ class RateGain(Effect):
     """f (1 + g r^m), r = |f'| over 1 FS/s: the way gone within 0.08 s, small reversals taken out."""
 
     name, family, stage, place = "rate_gain", "rate", "wall", "wall"
+    is_steep_undone = True
     says = "faster loading reads higher (or lower), up and down alike, and the reading drops where a hold begins"
     parameters = (
         EffectParameter(
