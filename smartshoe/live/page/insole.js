@@ -2,10 +2,24 @@
 const PHASES = ["swing", "on the heel", "flat", "push off"];
 const TRAIL = 50;
 
-function css(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
+// Colours and widths are asked for once: each question makes the browser lay the page out, sixty times a second.
+const colours = new Map(), NUMBERS_MS = 200;
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
+
+function css(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return colours.get(name);
+}
+
+const resized = new ResizeObserver((entries) => { for (const entry of entries) entry.target.wide = entry.contentRect.width; });
+
+function wideOf(canvas) {
+  if (canvas.wide === undefined) { canvas.wide = canvas.clientWidth; resized.observe(canvas); }
+  return canvas.wide;
+}
 
 function canvasFor(canvas, height) {
-  const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth;
+  const ratio = window.devicePixelRatio || 1, width = wideOf(canvas);
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     canvas.style.height = height + "px";
@@ -24,7 +38,7 @@ function mixed(low, high, share) {
 
 class Insole {
   constructor(foot, symbols, ranges) {
-    this.foot = foot; this.symbols = symbols; this.trail = [];
+    this.foot = foot; this.symbols = symbols; this.trail = []; this.numbers = []; this.toldMs = -NUMBERS_MS;
     this.most = foot.columns.map((c) => (ranges[c] ? 0.2 * ranges[c] : 50));
     this.figure = document.createElement("figure");
     this.canvas = document.createElement("canvas");
@@ -35,7 +49,7 @@ class Insole {
   }
   draw(values, phase, load, along, medial) {
     const inward = this.foot.side === "right" ? -1 : 1; // a left foot's inner edge is on the right as one looks down
-    const wide = this.canvas.clientWidth, [g, w, h] = canvasFor(this.canvas, Math.min(2.35 * wide, 380));
+    const wide = wideOf(this.canvas), [g, w, h] = canvasFor(this.canvas, Math.min(2.35 * wide, 380));
     const scale = Math.min(w / 0.42, (h - 16) / 1.04);
     const at = (a, m) => [w / 2 + inward * m * scale, h - 8 - (a + 0.02) * scale];
     g.beginPath();
@@ -47,6 +61,9 @@ class Insole {
     g.fillStyle = css("--insole"); g.fill();
     g.strokeStyle = css("--skin"); g.lineWidth = 1.5; g.stroke();
     const radius = 0.068 * scale;
+    // Nobody reads numbers that change with each picture.
+    const now = performance.now(), isTold = now - this.toldMs >= NUMBERS_MS;
+    if (isTold) { this.toldMs = now; this.numbers = this.foot.columns.map((column) => numberOf(values[column])); }
     this.foot.columns.forEach((column, k) => {
       const region = this.foot.regions[k], value = values[column];
       this.most[k] = Math.max(this.most[k], Math.abs(value) || 0);
@@ -58,7 +75,7 @@ class Insole {
       g.fillStyle = share > 0.5 ? css("--page") : css("--ink");
       g.font = "600 " + Math.max(11, Math.round(radius * 0.72)) + "px system-ui, sans-serif";
       g.textAlign = "center"; g.textBaseline = "middle";
-      g.fillText(numberOf(value), x, y);
+      g.fillText(this.numbers[k], x, y);
     });
     if (Number.isFinite(along)) this.trail.push([along, medial]); else this.trail.push(null);
     if (this.trail.length > TRAIL) this.trail.shift();
@@ -76,6 +93,7 @@ class Insole {
       g.lineWidth = 5; g.strokeStyle = css("--card"); g.stroke();
       g.lineWidth = 2.5; g.strokeStyle = css("--bad"); g.stroke();
     }
+    if (!isTold) return;
     const symbol = this.symbols[this.foot.columns[0]];
     const same = this.foot.columns.every((c) => this.symbols[c] === symbol);
     say(this.caption, [["b", (this.foot.side || "foot") + ": " + (PHASES[phase] || "no step yet")],

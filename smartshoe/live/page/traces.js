@@ -23,7 +23,7 @@ class Strip {
     g.save(); g.beginPath(); g.rect(LEFT, 0, right - LEFT, h - BELOW); g.clip();
     if (this.side !== null) this.phases(g, x, bottom + 2, steps, (last + 1) * width);
     this.marks(g, x, bottom, notes, (last + 1) * width - seconds);
-    g.lineWidth = 1.6; g.lineJoin = "round";
+    g.lineWidth = 1.6; g.lineJoin = "bevel";
     for (const unit of this.units) {
       g.strokeStyle = css("--" + unit.colour);
       g.beginPath();

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.devices.wire.clock import KEPT_BINS, DeviceClock
+from smartshoe.devices.wire.delay_law import DelayLaw
+from smartshoe.devices.wire.delay_line import robust_line
 from smartshoe.errors import UsageError
 
 Array = NDArray[np.float64]
@@ -69,11 +71,13 @@ class Run:
         # A serial line keeps the order.
         arrival_s = np.maximum.accumulate(self.true_s + 0.01 + _delays(self.law, self.true_s, rng))
         self.clock = DeviceClock()
-        self.live_s = np.empty_like(self.true_s)
+        self.live_s, self.live_sd_s = np.empty_like(self.true_s), np.empty_like(self.true_s)
         for start in range(0, self.true_s.size, BLOCK):
             here = slice(start, start + BLOCK)
             self.clock.update(self.device_s[here], arrival_s[here])
-            self.live_s[here] = self.clock.host_time(self.device_s[here])
+            assert self.clock.fit is not None
+            self.live_s[here] = self.clock.fit.host_time(self.device_s[here])
+            self.live_sd_s[here] = self.clock.fit.sd_s(self.device_s[here])
 
     def final_error_s(self) -> float:
         """Largest error of a sample's time about the one constant, by the last line, over its window."""
@@ -86,6 +90,15 @@ class Run:
         error = (self.live_s - self.true_s)[self.true_s >= from_s]
         return float(np.ptp(error)) / 2.0
 
+    def share_within_stated(self, from_s: float) -> float:
+        """Share of live times that are off by no more than 1.96 of the standard errors that were stated with them.
+
+        About the constant that the last third of the stream shows.
+        """
+        error = self.live_s - self.true_s
+        off = np.abs(error - error[self.true_s >= self.duration_s * 2.0 / 3.0].mean())
+        return float(np.mean((off <= 1.96 * self.live_sd_s)[self.true_s >= from_s]))
+
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_minute_is_timed_within_a_millisecond(law: str) -> None:
@@ -95,7 +108,7 @@ def test_a_minute_is_timed_within_a_millisecond(law: str) -> None:
     assert run.final_error_s() < 1e-3
     assert abs(fit.skew_ppm - SKEW_PPM) < 4.0 * fit.skew_sd_ppm
     assert (fit.sd_s(run.device_s) < 2e-3).all()
-    assert fit.samples > 0.99 * run.true_s.size
+    assert fit.samples > 0.95 * run.true_s.size
 
 
 @pytest.mark.parametrize("law", [LAWS[0], LAWS[3]])
@@ -162,13 +175,39 @@ def test_gaps_and_single_samples_are_taken() -> None:
     assert clock.fit is None
 
 
+def test_a_law_is_told_from_what_is_only_known_to_be_no_longer() -> None:
+    # Exponential delays behind each other: of three in four only a bound is seen. The line through all of it is surer
+    # than one through the delays that are known, taken as if all were.
+    rng = np.random.default_rng(5)
+    slopes: dict[bool, list[float]] = {True: [], False: []}
+    for _ in range(6):
+        time_s = np.arange(4000) / RATE_HZ
+        arrival_s = np.maximum.accumulate(time_s + rng.exponential(0.02, 4000))
+        came_with = np.diff(arrival_s, prepend=-1.0) <= 0.0
+        assert 0.6 < came_with.mean() < 0.9
+        start = robust_line(time_s, arrival_s - time_s)
+        for is_said in (True, False):
+            kept = np.ones(4000, dtype=bool) if is_said else ~came_with
+            at_s, delay_s, bound = time_s[kept], (arrival_s - time_s)[kept], came_with[kept]
+            law = DelayLaw.of(delay_s - start.delay_s(at_s), bound)
+            found = law.line(at_s, delay_s, bound, np.floor(2.0 * at_s).astype(int), start)
+            assert found is not None
+            slopes[is_said].append(found.slope)
+    assert np.square(slopes[True]).mean() < 0.5 * np.square(slopes[False]).mean()
+
+
 @pytest.mark.bank
 @pytest.mark.parametrize("law", LAWS)
 def test_the_table_of_the_guide(law: str) -> None:
-    """``pytest -m bank tests/devices/wire/test_wire_clock.py -s`` prints docs/wire.md's rows (a minute)."""
-    seeds = (1, 2)
+    """``pytest -m bank tests/devices/wire/test_wire_clock.py -s`` prints docs/wire.md's rows (some minutes).
+
+    Seeds that nothing was developed on.
+    """
+    seeds = (31, 32, 33, 34)
     finals = [max(Run(law, duration, seed).final_error_s() for seed in seeds) for duration in (10.0, 60.0)]
     long = [Run(law, 600.0, seed) for seed in seeds]
-    cells = [*finals, max(run.final_error_s() for run in long), max(run.live_error_s(30.0) for run in long)]
-    print(f"\n| {law} | " + " | ".join(f"{1e3 * cell:.2f} ms" for cell in cells) + " |")
+    lives = sorted(run.live_error_s(30.0) for run in long)
+    cells = [*finals, max(run.final_error_s() for run in long), float(np.median(lives)), lives[-1]]
+    held = np.mean([run.share_within_stated(30.0) for run in long])
+    print(f"\n| {law} | " + " | ".join(f"{1e3 * cell:.2f} ms" for cell in cells) + f" | {100 * held:.0f} % |")
     assert all(cell < 1e-3 for cell in cells[:3])
