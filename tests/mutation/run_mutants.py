@@ -31,7 +31,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from forked_tests import NOT_SWAPPED, Costs, Ended, import_libraries, record, run_fresh, serve
+from forked_tests import NOT_SWAPPED, UNDECIDED, Costs, Ended, import_libraries, record, run_fresh, serve
 from mutants import changed, changes
 
 HERE = Path(__file__).resolve().parent
@@ -237,7 +237,7 @@ def told(results: list[Result], argued: str) -> str:
     lines = []
     for room in dict.fromkeys(result["room"] for result in results):
         own = [result for result in results if result["room"] == room]
-        alive = [result for result in own if result["outcome"] == "survived"]
+        alive = [result for result in own if result["outcome"] not in ("killed", "hung")]
         open_ = [result for result in alive if result["name"] not in argued]
         counted, killed = len(own) - len(alive) + len(open_), len(own) - len(alive)
         share = 100.0 * killed / max(counted, 1)
@@ -264,7 +264,8 @@ def main() -> None:
     results = []
     with copied() as copy:
         kept = Kept(options.keep or copy.parent / "kept.jsonl")
-        again = {name for name, item in kept.results.items() if options.survivors and item["outcome"] == "survived"}
+        wanted = {UNDECIDED, NOT_SWAPPED, *(["survived"] if options.survivors else [])}
+        again = {name for name, item in kept.results.items() if item["outcome"] in wanted}
         if options.listed:
             items = tomllib.loads((HERE / "listed.toml").read_text(encoding="utf-8"))["mutant"]
             files, tests = {item["file"] for item in items}, {test for item in items for test in item["tests"]}

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from smartshoe.errors import FormatError, InputError, UsageError
 from smartshoe.files.atomic import write_text
-from smartshoe.files.journal import AppendedFile, Journal, read_journal
+from smartshoe.files.journal import AppendedFile, Journal, _appending, _journal, _records, read_journal
 
 RECORDS = st.lists(st.tuples(st.integers(0, 255), st.binary(max_size=60)), min_size=1, max_size=8)
 
@@ -158,6 +158,39 @@ def test_a_full_disk_ends_with_one_sentence_and_every_acknowledged_record(tmp_pa
     contents = read_journal(path)
     assert [int.from_bytes(record.payload[:4], "little") for record in contents.records] == acknowledged
     assert contents.torn_bytes == 0  # what did not fit was taken back
+
+
+def test_a_piece_that_was_written_stays_where_ctrl_c_comes_while_it_is_synced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with AppendedFile(tmp_path / "walk.csv", new=True) as file:
+        file.append(b"first\n")
+        with monkeypatch.context() as patch:
+            patch.setattr(_appending, "_data_to_disk", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                file.append(b"second\n")
+        assert file.size == 13
+        file.append(b"third\n")
+    assert (tmp_path / "walk.csv").read_bytes() == b"first\nsecond\nthird\n"
+
+
+def test_records_are_of_the_longest_length_and_kind_and_none_beyond(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_journal, "LONGEST_PAYLOAD", 8)
+    monkeypatch.setattr(_records, "LONGEST_PAYLOAD", 8)
+    kept = [(0, b"12345678"), (255, b"")]
+    with Journal(tmp_path / "journal") as journal:
+        for kind, payload in kept:
+            journal.append(kind, payload)
+        for kind, payload in ((256, b""), (-1, b""), (0, b"123456789")):
+            with pytest.raises(UsageError, match="cannot be written"):
+                journal.append(kind, payload)
+    assert _content(tmp_path / "journal") == kept
+    assert read_journal(tmp_path / "journal").notes == ()
 
 
 def test_a_journal_that_cannot_be_read_says_so(tmp_path: Path) -> None:

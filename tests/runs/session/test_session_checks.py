@@ -18,7 +18,7 @@ from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, conduct
 from smartshoe.runs.session import _machine_run as machine_run
-from smartshoe.runs.session._checks import AT_THE_END, Pressing, first_fault
+from smartshoe.runs.session._checks import AT_THE_END, Pressing, contact, first_fault, other_test
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +63,27 @@ def test_a_unit_that_reads_nothing_has_no_contact(pressed: Pressing) -> None:
     rng = np.random.default_rng(1)
     assert _kind(_changed(pressed, lambda c: rng.normal(0.0, 0.05, c.values.size))) in ("no_contact", "wrong_unit")
     assert _kind(replace(_changed(pressed, lambda c: 0.001 * c.values), load=None)) == "no_contact"
+
+
+@pytest.mark.parametrize(("share", "kind"), [(0.015, "no_contact"), (0.03, None)])
+def test_contact_is_a_fiftieth_of_the_range(pressed: Pressing, share: float, kind: str | None) -> None:
+    low, high = pressed.reading.range_ or (np.nan, np.nan)
+    span = np.ptp(pressed.reading.values)
+    lowered = _changed(pressed, lambda c: c.values * share * (high - low) / span)
+    found = first_fault((contact,), lowered)
+    assert (None if found is None else found.kind) == kind
+
+
+@pytest.mark.parametrize(("factor", "kind"), [(0.96, None), (1.04, None), (0.94, "other_test"), (1.07, "other_test")])
+def test_a_log_whose_peak_is_a_twentieth_off_is_another_tests(
+    pressed: Pressing, factor: float, kind: str | None
+) -> None:
+    load = pressed.load
+    assert load is not None
+    asked = factor * pressed.protocol.peak_load_n / load.load.values.max()
+    scaled = load.with_channel(replace(load.load, values=asked * load.load.values))
+    found = first_fault((other_test,), replace(pressed, load=scaled))
+    assert (None if found is None else found.kind) == kind
 
 
 def test_another_tests_log_is_not_taken(pressed: Pressing) -> None:
