@@ -14,8 +14,9 @@ from smartshoe.gait._force_sums import ForceSums
 from smartshoe.gait._strides import Stride
 from smartshoe.gait._trial import feet_of
 from smartshoe.gait._window import analyse_window
-from smartshoe.gait.indices import sequence_errors
-from smartshoe.gait.summary import of_main_activity
+from smartshoe.gait.indices import deviations, sequence_errors
+from smartshoe.gait.phases import PHASES, crisp
+from smartshoe.gait.summary import both_down, of_main_activity
 from smartshoe.recording import Recording
 
 RATE_HZ = 200.0
@@ -135,6 +136,55 @@ def test_the_lateral_metatarsal_is_counted_where_it_comes_first() -> None:
         seen += int(np.sum(np.isfinite(meta4) & np.isfinite(meta1)))
     assert seen > 40
     assert analysed().summary["meta4_before_meta1_percent"] == pytest.approx(100.0 * earlier / seen, rel=1e-12)
+
+
+def test_a_stride_in_which_the_other_foot_lacks_its_samples_weighs_nothing() -> None:
+    left = _teeter(12.0)
+    gone = {name: 350.0 * share for name, share in (("left", left), ("right", 1.0 - left))}
+    columns = {f"{side}_{unit}_n": load.copy() for side, load in gone.items() for unit in ("heel", "toe")}
+    for unit in ("heel", "toe"):
+        columns[f"right_{unit}_n"][1600:1700] = np.nan  # half a second from 8 s on: bridged by a line that is wrong
+    weight = analyse(recorded(np.arange(left.size) / RATE_HZ, columns)).forces.body_weight
+    assert weight is not None
+    assert weight.value == pytest.approx(700.0, rel=1e-9)
+
+
+def test_one_shoes_strides_last_as_long_as_they_do() -> None:
+    """Of 24 s of walking and 3.5 s of standing six sevenths are walking, with one shoe as with two."""
+    left = np.concatenate([_teeter(24.0), np.full(700, 0.5)])
+    time_s = np.arange(left.size) / RATE_HZ
+    assert analyse(recorded(time_s, {"left_heel_n": 350.0 * left, "left_toe_n": 350.0 * left})).activity == "walking"
+
+
+def test_a_deviation_is_the_rms_distance_in_percent_of_the_peak() -> None:
+    shape = np.abs(np.sin(np.linspace(0.0, np.pi, 101)))[:, None] * np.array([0.6, 0.4])
+    each = 900.0 * np.stack([shape, shape])
+    assert deviations(each, shape) == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert deviations(each, shape + np.array([0.03, -0.04])) == pytest.approx(np.full(2, 100.0 * np.sqrt(12.5e-4)))
+    assert deviations(0.0 * each, shape).tolist() == [0.0, 0.0]
+
+
+def test_a_single_contact_has_its_phases_and_a_foot_without_any_is_in_swing() -> None:
+    time_s = np.arange(0.0, 1.0, 0.1)
+    none, one = np.zeros(0), np.array([[0.15, 0.35]])
+    contacts = Contacts(("heel", "meta1"), one[:, 0], np.array([0.75]), one, one + 0.4, none, np.zeros((0, 2)))
+    assert [PHASES[k] for k in crisp(contacts, time_s)] == ["swing"] * 2 + ["heel"] * 2 + ["flat"] * 2 + [
+        "push"
+    ] * 2 + ["swing"] * 2
+    empty = Contacts(("heel",), none, none, np.zeros((0, 1)), np.zeros((0, 1)), none, np.zeros((0, 1)))
+    assert not crisp(empty, time_s).any()
+
+
+def test_double_support_is_what_both_stances_share_up_to_the_last_contact() -> None:
+    def foot(first_s: float, count: int) -> Contacts:
+        strike_s = first_s + np.arange(float(count))
+        once = np.full((count, 1), np.nan)
+        return Contacts(("heel",), strike_s, strike_s + 0.6, once, once, np.zeros(0), np.zeros((0, 1)))
+
+    strides = [_stride(float(k), toe_off_s=k + 0.6) for k in range(3)]
+    assert both_down({"left": foot(0.0, 4), "right": foot(-0.5, 4)}, strides) == pytest.approx((20.0, 0.0))
+    # Without the other foot nothing is shared, and it is in the air whenever this one is.
+    assert both_down({"left": foot(0.0, 4), "right": foot(50.0, 2)}, strides) == pytest.approx((0.0, 40.0))
 
 
 def test_shoes_that_nobody_wore_are_refused() -> None:
