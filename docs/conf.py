@@ -64,3 +64,5 @@ sphinx_gallery_conf = {
 html_theme = "furo"
 html_title = "smartshoe"
 html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]

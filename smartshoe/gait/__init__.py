@@ -12,6 +12,7 @@ _HOME = {
     "FootSeries": "smartshoe.gait._series",
     "Stride": "smartshoe.gait._strides",
     "write_c3d": "smartshoe.gait._c3d",
+    "write_motion_bids": "smartshoe.gait._motion_bids",
     "LEAST_LOAD_N": "smartshoe.gait._contact",
     "analyse": "smartshoe.gait._analysis",
     "analyse_stream": "smartshoe.gait._day",
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from smartshoe.gait._day import analyse_stream
     from smartshoe.gait._events import Event
     from smartshoe.gait._flag import Flag
+    from smartshoe.gait._motion_bids import write_motion_bids
     from smartshoe.gait._result import DayResult, GaitFindings, GaitResult
     from smartshoe.gait._series import FootSeries
     from smartshoe.gait._strides import Stride
@@ -56,6 +58,7 @@ __all__ = [
     "FootSeries",
     "Stride",
     "write_c3d",
+    "write_motion_bids",
     "LEAST_LOAD_N",
 ]
 

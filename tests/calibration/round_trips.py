@@ -140,7 +140,7 @@ def motion_bids_row(folder: Path) -> str:
     """A Motion-BIDS folder, its tables read as tables."""
     import pandas as pd
 
-    from smartshoe.gait._motion_bids import write_motion_bids
+    from smartshoe.gait import write_motion_bids
 
     given = walked()
     told = analysed()

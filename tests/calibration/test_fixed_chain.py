@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 
 from smartshoe.calibration import Calibration, extended_calibration
 from smartshoe.calibration.export import export_files, export_shoe, write_files
-from smartshoe.calibration.export._integer_c import IntegerC
 from smartshoe.calibration.export._integer_functions import MOST, functions_text
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import effect
@@ -199,11 +198,21 @@ def test_functions_are_those_of_the_library(arithmetic: Callable[..., int], a: i
         assert real("pow_q", a, b) == pytest.approx(power(y * math.log(x)), rel=1e-11, abs=4 * unit)
 
 
-def test_what_has_no_integer_twin_is_refused() -> None:
-    with pytest.raises(ValueError, match="erf"):
-        IntegerC(FRACTION).step(CStep({}, "x = erf(x);"))
-    with pytest.raises(ValueError, match="no C"):
-        IntegerC(FRACTION).step(CStep({}, "x = x @ 2.0;"))
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ("x = erf(x);", "erf"),
+        ("x = x @ 2.0;", "no C"),
+        ("do { x = 0.5 * x; } while (x > 1.0);", "expected"),
+        ("x = 0.5 *", "ends"),
+    ],
+)
+def test_c_that_has_no_integer_form_is_refused(body: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = chain_of(["sensor_lag"], 1)
+    monkeypatch.setattr(type(model.parts[0].effect.inverse(model.parts[0].values, 0.01)), "c_step",
+                        lambda self, name: CStep({}, body))  # fmt: skip
+    with pytest.raises(UsageError, match=f"block sensor_lag .*{says}.*--precision double"):
+        export_files(extended_calibration(model), "c", fixed="q31")
 
 
 def test_sixteen_bits_are_refused_where_half_a_step_moves_the_force_too_far() -> None:

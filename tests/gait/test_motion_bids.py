@@ -11,7 +11,7 @@ import pytest
 from trials import analysed
 
 from smartshoe.errors import UsageError
-from smartshoe.gait._motion_bids import write_motion_bids
+from smartshoe.gait import write_motion_bids
 
 
 def test_a_trial_comes_back_from_the_folder(tmp_path: Path) -> None:

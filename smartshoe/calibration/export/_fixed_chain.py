@@ -66,7 +66,7 @@ class IntegerChain:
 
     @classmethod
     def of(cls, filter_: ExtendedCompensator) -> IntegerChain:
-        """The chain of ``filter_`` from its start."""
+        """The chain of ``filter_`` from its start; raises `UsageError` for C that has no integer form."""
         steps = filter_.c_steps(single=True)
         timed = any(reads_time(step.body) for _, step in steps)
         to = IntegerC(FRACTION_WITH_TIME if timed else FRACTION)
@@ -75,7 +75,7 @@ class IntegerChain:
         above, above_n = ceil(log2(abs(share))), ceil(log2(load_n))
         return cls(
             fraction=to.fraction,
-            blocks=tuple((name, to.step(one)) for name, one in steps),
+            blocks=tuple((name, _in_integers(to, name, one)) for name, one in steps),
             functions=functions_text(to.used | {"times_q", "rounded_q"}, to.fraction),
             clock=(start, step, min((MOST - start) // step, 2**32 - 2)) if timed else None,
             widest=WIDEST * to.one,
@@ -88,6 +88,15 @@ class IntegerChain:
         """How far its integers may be off, a share of full scale, where no block raises that."""
         summed = ROUNDINGS_A_SAMPLE * RUN if any(step.states for _, step in self.blocks) else 0
         return float((ROUNDINGS_A_BLOCK * len(self.blocks) + summed) * 2.0**-self.fraction)
+
+
+def _in_integers(to: IntegerC, name: str, step: CStep) -> CStep:
+    try:
+        return to.step(step)
+    except ValueError as error:  # of an effect from another package
+        raise UsageError(
+            f"block {name} is written in C that has no integer form ({error}): export in --precision double"
+        ) from error
 
 
 @dataclass(frozen=True, kw_only=True)

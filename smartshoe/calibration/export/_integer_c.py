@@ -89,6 +89,8 @@ class _Parser:
     # Tokens
 
     def _next(self) -> tuple[str, str]:
+        if self.at == len(self.tokens):
+            raise ValueError("it ends in the middle of a statement")
         self.at += 1
         return self.tokens[self.at - 1]
 
