@@ -229,7 +229,9 @@ class Evidence:
         """
         given, limits = self.given, self.thresholds
         columns = [*range(1, 1 + given.own), *(c for m in members for c in given.candidates[m].columns)]
-        precision = np.array([OWN_SD**-2] * given.own + [limits.strength_sd**-2] * (len(columns) - given.own))
+        # What the rest says little of is taken for nothing there, rather than for anything up to the largest effect.
+        sds = [max(float(abs(s)), limits.material) for part in self.posterior(members).strengths for s in part]
+        precision = np.array([OWN_SD**-2] * given.own + [sd**-2 for sd in sds])
         raw = self._folds
         errors = np.zeros(len(raw))
         total = sum(raw)

@@ -23,7 +23,7 @@ from smartshoe.diagnosis._search import BREADTH, additions, allowed, search, ste
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, available, linearised
 from smartshoe.diagnosis._session import CYCLE_SHARE, Session
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
@@ -35,6 +35,8 @@ ROUNDS = 6
 ROUND_STEPS = 6  # of a fit that is linearised anew anyway
 FEW_STEPS = 4  # of a fit that only has to be compared with others
 RIVALS = 2
+LENGTHS = (1.0, 0.5, 0.2, 0.05)  # of a first step
+SIZES = (0.5, 5.0)  # typical ones of an effect, from which a fit begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,20 +110,20 @@ def infer(
     if state.fit.model.relaxing_share < 0.0:
         again = _settled(_with_an_arm_that_creeps(state, sessions, thresholds), sessions, thresholds, progress)
         state = again if _is_simpler(again.fit, state, sessions) else state
-    state = _with_laws(state, sessions, thresholds)
+    state = _with_laws(state, sessions, thresholds, progress)
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     refused: list[str] = []
     while (worst := _worse(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
-        best = search(evidence, tuple(m for m in best.members if m != worst), refused)
+        best = search(evidence, tuple(m for m in best.members if m != worst), [*refused, *state.banned])
     likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
-    extended = fit(likelihood, _with(given, best, extended.model))
+    extended = fit(likelihood, _with(given, best, extended.model, likelihood))
     while (beyond := _extrapolates(sessions, extended.model, thresholds)) is not None:
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
-    if not extended.model.parts:
-        extended = plain
+    if not extended.model.parts or _error(sessions, extended.model) >= _error(sessions, plain.model):
+        extended, best = plain, evidence.posterior(())  # a fit that went astray extends nothing
     progress("weighing alternatives")
     members = _members(evidence, best, refused, likelihood, extended)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused))
@@ -135,12 +137,13 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """A linearisation about ``fit``, and the best set in it."""
+    """A linearisation about ``fit``, and the best set in it; ``banned`` are blocks that a law has replaced."""
 
     given: Linearised
     evidence: Evidence
     best: Posterior
     fit: Fit
+    banned: tuple[str, ...] = ()
 
     @property
     def improved(self) -> float:
@@ -195,15 +198,18 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
         likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = min(
-            (fit(likelihood, _with(state.given, one, state.fit.model), ROUND_STEPS) for one in _promising(state)),
+            (
+                fit(likelihood, _with(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
+                for one in _promising(state)
+            ),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
-        state = _State(*_searched(found.model, sessions, thresholds), found)
+        state = _State(*_searched(found.model, sessions, thresholds, state.banned), found, state.banned)
     for name, arm in _arms(state.fit.model):
         likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = fit(likelihood, _with_arm(state.fit.model.without(name), arm))
         if _is_simpler(found, state, sessions):
-            state = _State(*_searched(found.model, sessions, thresholds), found)
+            state = _State(*_searched(found.model, sessions, thresholds, state.banned), found, state.banned)
     return state
 
 
@@ -219,9 +225,12 @@ def _promising(state: _State) -> list[Posterior]:
     flexible = [
         k
         for k, one in enumerate(state.given.candidates)
-        if one.effect.is_flexible and one.effect.is_memoryless and one.slot not in taken
+        if one.effect.is_flexible
+        and one.effect.is_memoryless
+        and one.slot not in taken
+        and one.name not in state.banned
     ]
-    tried = {*additions(state.evidence, start, RIVALS), *flexible}
+    tried = {*additions(state.evidence, start, RIVALS, state.banned), *flexible}
     return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
 
 
@@ -235,12 +244,15 @@ def _strengths(model: ExtendedModel) -> int:
     return sum(parameter.null is not None for part in model.parts for parameter in part.effect.parameters)
 
 
-def _with_laws(state: _State, sessions: Sequence[Session], thresholds: Thresholds) -> _State:
-    """``state`` with a law in the place of a flexible curve, where one follows nearly as well.
+def _with_laws(given: _State, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> _State:
+    """``given`` with a law in the place of a flexible curve, where one follows nearly as well.
 
     No law is exact: one that leaves less than the square of the usual departure, of what the flexible curve explains,
-    is the law. A block is bent before a law is, so that only fits of the whole model compare them fairly.
+    is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else. A
+    block is bent before a law is, so that only fits of the whole model compare them fairly.
     """
+    state = given
+    curves = tuple(one.name for family in blocks().values() for one in family if one.is_memoryless)
     for block in state.chosen:
         if not (block.effect.is_flexible and block.effect.is_memoryless):
             continue
@@ -251,12 +263,27 @@ def _with_laws(state: _State, sessions: Sequence[Session], thresholds: Threshold
                 bare = bare.without(part.name)
         nothing = fit(likelihood, bare, FEW_STEPS)
         flexible = likelihood.cost(state.fit.model)
-        laws = [e for e in catalogue().values() if e.is_memoryless]
-        fits = [fit(likelihood, nothing.model.with_part(law, law.begun(law.shapes[0])), FEW_STEPS) for law in laws]
-        best = min((one for one in fits if not _is_stretched(one.model)), key=lambda one: one.cost, default=nothing)
-        if best.cost - flexible < thresholds.law_departure**2 * max(nothing.cost - flexible, 0.0):
-            state = _State(*_searched(best.model, sessions, thresholds), best)
-    return state
+        fits = [_curved(law, nothing.model, likelihood) for law in catalogue().values() if law.is_memoryless]
+        explained = max(nothing.cost - flexible, 0.0)
+        followed = [
+            one
+            for one in fits
+            if one.cost - flexible
+            < explained * (thresholds.departure if _is_stretched(one.model) else thresholds.law_departure) ** 2
+        ]
+        if followed:
+            best = min(followed, key=lambda one: one.cost)
+            state = _State(*_searched(best.model, sessions, thresholds, curves), best, curves)
+    return state if state is given else _settled(state, sessions, thresholds, progress)
+
+
+def _curved(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
+    """``model`` with a memoryless law: the best of fits from all its shapes, small and large.
+
+    A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
+    """
+    starts = [model.with_part(law, law.begun(shape, sizes)) for shape in law.shapes for sizes in SIZES]
+    return fit(likelihood, min((fit(likelihood, one, 1) for one in starts), key=lambda f: f.cost).model, FEW_STEPS)
 
 
 def _is_stretched(model: ExtendedModel) -> bool:
@@ -293,7 +320,7 @@ def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresho
     found = []
     for start in (_with_arm(bare, arm) for arm in [*arms, *(arm for _, arm in _arms(state.fit.model))]):
         given, _, best = _searched(start, sessions, thresholds)
-        found.append(fit(likelihood, _with(given, best, start), FEW_STEPS))
+        found.append(fit(likelihood, _with(given, best, start, likelihood), FEW_STEPS))
     nearest = min(found, key=lambda one: one.cost + state.evidence.odds * _effects(one.model))
     return _State(*_searched(nearest.model, sessions, thresholds), nearest)
 
@@ -328,17 +355,17 @@ def independent(sessions: Sequence[Session]) -> int:
 
 
 def _searched(
-    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
+    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, banned: Sequence[str] = ()
 ) -> tuple[Linearised, Evidence, Posterior]:
     """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
     given = linearised(model, sessions, thresholds)
     evidence = Evidence(given, given.noise_sd())
     start = tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)
-    first = step(evidence, start)
+    first = step(evidence, start, banned)
     new = [size for m, size in zip(first.members, first.sizes, strict=True) if m not in start]
     if max(new, default=0.0) > thresholds.linear:
         return given, evidence, first
-    return given, evidence, search(evidence, first.members)
+    return given, evidence, search(evidence, first.members, banned)
 
 
 def _screening(evidence: Evidence) -> tuple[tuple[str, float], ...]:
@@ -350,17 +377,28 @@ def _screening(evidence: Evidence) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(found, key=lambda one: -one[1]))
 
 
-def _with(given: Linearised, found: Posterior, model: ExtendedModel) -> ExtendedModel:
-    """``model`` with exactly the effects that were found; new ones at their linear estimates."""
+def _with(given: Linearised, found: Posterior, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:
+    """``model`` with exactly the effects that were found; new ones on the way to their linear estimates.
+
+    As far as is best of several lengths: a curve that is far from straight is far from its linear estimate.
+    """
     names = {given.candidates[m].name for m in found.members}
     for part in model.parts:
         if part.name not in names:
             model = model.without(part.name)
-    for member, strengths in zip(found.members, found.strengths, strict=True):
-        one = given.candidates[member]
-        if one.name not in model.names:
-            model = model.with_part(one.effect, one.start(strengths / given.scales[list(one.columns)]))
-    return model
+    new = [
+        (given.candidates[member], strengths / given.scales[list(given.candidates[member].columns)])
+        for member, strengths in zip(found.members, found.strengths, strict=True)
+        if given.candidates[member].name not in model.names
+    ]
+
+    def begun(length: float) -> ExtendedModel:
+        out = model
+        for one, strengths in new:
+            out = out.with_part(one.effect, one.start(length * strengths))
+        return out
+
+    return min((begun(length) for length in LENGTHS), key=likelihood.cost) if new else model
 
 
 def _worse(evidence: Evidence, best: Posterior) -> int | None:
@@ -390,6 +428,12 @@ def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds:
     return None
 
 
+def _error(sessions: Sequence[Session], model: ExtendedModel) -> float:
+    """Rms of what is left of what is fitted."""
+    left = np.concatenate([residual_of(session, model)[session.fitted] for session in sessions])
+    return float(np.sqrt(np.mean(left**2)))
+
+
 def _spread(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
     """Rms of ``signals``, (n,) each, where ``seen``, each about its own mean."""
     parts = [signal[mask] - signal[mask].mean() for signal, mask in zip(signals, seen, strict=True) if mask.any()]
@@ -417,15 +461,20 @@ def _members(
 
 
 def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:
-    """The other laws of a member's family, each fitted in its place, nearest first."""
+    """The other laws of a member's family, each fitted in its place, nearest first; a curve's are all curves."""
     channels = {e.name for e in available(likelihood.sessions)}
+    is_curve = one.effect.is_flexible and one.effect.is_memoryless
     found = []
     for law in catalogue().values():
-        if law.family != one.effect.family or law.name == one.name or law.name not in channels:
+        is_one = law.is_memoryless if is_curve else law.family == one.effect.family
+        if not is_one or law.name == one.name or law.name not in channels:
             continue
-        starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
-        best = min(starts, key=likelihood.cost)
-        found.append(Alternative(law.name, fit(likelihood, best, FEW_STEPS).cost - extended.cost))
+        if is_curve:
+            other = _curved(law, less.model, likelihood)
+        else:
+            starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
+            other = fit(likelihood, min(starts, key=likelihood.cost), FEW_STEPS)
+        found.append(Alternative(law.name, other.cost - extended.cost))
     return tuple(sorted(found, key=lambda a: a.margin))
 
 

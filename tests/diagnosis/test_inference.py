@@ -27,7 +27,12 @@ MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 
 
 def recording(
-    model: ExtendedModel = MODEL, seed: int = 0, noise: float = 0.001, repeats: int = 2, unit: str = "mbar"
+    model: ExtendedModel = MODEL,
+    seed: int = 0,
+    noise: float = 0.001,
+    repeats: int = 2,
+    unit: str = "mbar",
+    tare_n: float = 0.0,
 ) -> Recording:
     """What a model itself would read under triangles at three rates; for arithmetic, not for hidden effects."""
     protocol = dynamic_protocol((100, 300, 800), repeats=repeats, rest_s=4.0)
@@ -36,7 +41,10 @@ def recording(
     conditions = Conditions(time_s, load_n / model.full_scale_load_n, 1 / RATE_HZ)
     share = model.simulate(conditions) + noise * np.random.default_rng(seed).standard_normal(time_s.size)
     return Recording.from_arrays(
-        time_s=time_s, force_n=load_n, **{f"pressure_{unit}": share * model.full_scale_reading}, name=f"run_{seed}"
+        time_s=time_s,
+        force_n=load_n + tare_n,
+        **{f"pressure_{unit}": share * model.full_scale_reading},
+        name=f"run_{seed}",
     )
 
 
@@ -118,6 +126,16 @@ def plain() -> tuple[list[Recording], Diagnosis]:
     runs = [recording(STRONG, seed) for seed in range(3)]
     runs = [with_reading(one) for one in runs]
     return runs, diagnose(runs[:2], hold_out=[runs[2]])
+
+
+@pytest.mark.parametrize("values", [(0.08, 0.03), (0.13, 0.1)])
+def test_a_corner_below_the_least_load_is_a_dead_band_and_no_curve(values: tuple[float, float]) -> None:
+    """A tare lifts every load over the band, so that a fit that begins small has no slope towards it."""
+    model = MODEL.with_part(effect("dead_band"), np.array(values))
+    runs = [recording(model, seed, tare_n=24.0) for seed in range(3)]
+    found = diagnose(runs[:2], hold_out=[runs[2]])
+    assert {"dead_band", "load_cell_tare"} == {one.name for one in found.causes}
+    assert found.explained_percent > 90.0
 
 
 def test_a_curve_is_found_and_gains_on_data_not_fitted(plain: tuple[list[Recording], Diagnosis]) -> None:

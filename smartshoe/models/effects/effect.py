@@ -187,12 +187,12 @@ class Effect(ABC):
             raise UsageError(f"effect {self.name}: shape parameter {missing[0]} has no value")
         return np.array([at[p.name] if p.null is None else p.null for p in self.parameters], dtype=float)
 
-    def begun(self, shape: Mapping[str, float] | None = None) -> Array:
-        """As `start`, with each strength half its typical size away from null, on the side that physics allows."""
+    def begun(self, shape: Mapping[str, float] | None = None, sizes: float = 0.5) -> Array:
+        """As `start`, with each strength ``sizes`` typical ones away from null, on the side that physics allows."""
         values = self.start(shape)
         for k, p in enumerate(self.parameters):
             if p.null is not None:
-                values[k] = min(max(p.null + (0.5 if p.upper > p.null else -0.5) * p.size, p.lower), p.upper)
+                values[k] = min(max(p.null + (sizes if p.upper > p.null else -sizes) * p.size, p.lower), p.upper)
         return values
 
     def is_null(self, values: Array) -> bool:
