@@ -11,7 +11,7 @@ from smartshoe.arrays import Array, Integers
 from smartshoe.devices._base import Block
 from smartshoe.devices._events import Gap, Restarted, ShoeEvent
 from smartshoe.devices.serial_link.inbox import joined
-from smartshoe.devices.wire.clock import DeviceClock
+from smartshoe.devices.wire.clock import DeviceClock, at_once
 from smartshoe.devices.wire.information import Information
 from smartshoe.devices.wire.samples import Samples
 from smartshoe.errors import DeviceError
@@ -31,7 +31,7 @@ class Assembler:
     ``first`` are samples of the stream, for their names and unit; ``to`` is the unit of the blocks, the samples' own
     where it is None. ``counts_samples`` is False where the device has no counter of its own (text lines): gaps are
     then told from the time alone. A restarted device counts from zero: its time goes on where the host's clock says
-    that it must be, and the clock is fitted anew.
+    that it must be, and the clock is fitted anew. ``apart`` is the clock's.
     """
 
     def __init__(
@@ -41,13 +41,15 @@ class Assembler:
         to: Unit | None = None,
         named: Callable[[str], str] = str,
         counts_samples: bool = True,
+        apart: Callable[[Callable[[], None]], None] = at_once,
     ) -> None:
         self._information = information
         scaled = self._scaled(first)
         self.names = tuple(named(name) for name in scaled.names)
         self.comes_in = scaled.unit
         self.unit = to or scaled.unit
-        self.clock = DeviceClock()
+        self._apart = apart
+        self.clock = DeviceClock(apart)
         self.rate_hz: float | None = None
         self._counts_samples = counts_samples
         self._steps_s: list[float] = []
@@ -85,7 +87,7 @@ class Assembler:
             resumes_s = self._last[2] + max(float(arrival_s[0]) - self._last[3], 1e-6)
             self._shift_s = resumes_s - float(device_s[0])
             self._last = None
-            self.clock = DeviceClock()
+            self.clock = DeviceClock(self._apart)
             events.append(Restarted(float(arrival_s[0]), resumes_s))
         time_s = device_s + self._shift_s
         self._require_seconds(float(time_s[-1]), float(arrival_s[-1]))

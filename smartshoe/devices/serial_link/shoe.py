@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -139,6 +140,7 @@ class SerialShoe(Shoe):
                 find_unit(self.settings.unit),
                 self._named,
                 counts_samples=greeting.takes_commands,
+                apart=_in_a_thread,
             )
             self._require_convertible(assembler)
             self._reader = SerialReader(str(self), port, self._port, greeting, assembler, self.settings, self._clock)
@@ -200,6 +202,11 @@ class SerialShoe(Shoe):
         dropped = reader.inbox.take_dropped()
         if dropped is not None:
             reader.log.add(Dropped(self._clock(), *dropped))
+
+
+def _in_a_thread(work: Callable[[], None]) -> None:
+    """Do ``work`` while the port is read on."""
+    threading.Thread(target=work, name="law of delays", daemon=True).start()
 
 
 def _columns_of(settings: SerialSettings) -> tuple[str, ...]:

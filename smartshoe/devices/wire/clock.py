@@ -19,9 +19,10 @@ are of one estimator: the line so far, and the last one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from queue import SimpleQueue
 from typing import Literal
 
 import numpy as np
@@ -75,10 +76,20 @@ class ClockFit:
         return np.hypot(self.offset_sd_s, self.skew_sd_ppm * 1e-6 * lever)
 
 
-class DeviceClock:
-    """A streaming `ClockFit`; begin a new one (or `reset`) when the device restarts."""
+def at_once(work: Callable[[], None]) -> None:
+    """Do ``work`` now."""
+    work()
 
-    def __init__(self) -> None:
+
+class DeviceClock:
+    """A streaming `ClockFit`; begin a new one (or `reset`) when the device restarts.
+
+    To tell the delays' law takes a tenth of a second, seven times in the first ten minutes and once in ten from then
+    on. ``apart`` is given that work: it is done at once unless a reader, which must not wait, has it done in a thread.
+    """
+
+    def __init__(self, apart: Callable[[Callable[[], None]], None] = at_once) -> None:
+        self._apart = apart
         self.reset()
 
     def reset(self) -> None:
@@ -93,6 +104,7 @@ class DeviceClock:
         self._closed = self._line_due = 0
         self._law_due = LAW_FROM_BINS
         self._law: DelayLaw | None = None
+        self._told: SimpleQueue[DelayLaw | None] = SimpleQueue()
         self._likely: DelayLine | None = None
         self._centres: list[float] = []
         self._values: list[tuple[float, float, float]] = []
@@ -202,13 +214,18 @@ class DeviceClock:
         if self._law is not None:
             self._likely = line(self._law, self._likely or level)
         if self._law is None or self._closed >= self._law_due:
-            before, middle = self._likely or level, float(kept.time_s.mean())
-            law = DelayLaw.of(kept.delay_s - before.delay_s(kept.time_s), kept.came_with)
-            after = line(law, before)
-            if after is not None:
-                self._law = law.moved(after.delay_s(middle) - before.delay_s(middle))
-                self._likely = line(self._law, before)
             self._law_due = self._closed + min(self._closed, KEPT_BINS)
+            before, middle, told = self._likely or level, float(kept.time_s.mean()), self._told
+
+            def tell() -> None:
+                law = DelayLaw.of(kept.delay_s - before.delay_s(kept.time_s), kept.came_with)
+                after = line(law, before)
+                told.put(None if after is None else law.moved(after.delay_s(middle) - before.delay_s(middle)))
+
+            self._apart(tell)
+        if not self._told.empty() and (law := self._told.get()) is not None:
+            self._law = law
+            self._likely = line(law, self._likely or level)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

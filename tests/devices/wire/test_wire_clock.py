@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -194,6 +195,27 @@ def test_a_law_is_told_from_what_is_only_known_to_be_no_longer() -> None:
             assert found is not None
             slopes[is_said].append(found.slope)
     assert np.square(slopes[True]).mean() < 0.5 * np.square(slopes[False]).mean()
+
+
+def test_work_that_is_done_apart_is_taken_up_when_it_is_done() -> None:
+    given: list[Callable[[], None]] = []
+    clock, at_once = DeviceClock(given.append), DeviceClock()
+    rng = np.random.default_rng(9)
+    device_s = np.arange(8000) / RATE_HZ
+    arrival_s = np.maximum.accumulate(device_s + rng.exponential(0.02, device_s.size))
+    for start in range(0, 8000, 200):
+        here = slice(start, start + 200)
+        for each in (clock, at_once):
+            each.update(device_s[here], arrival_s[here])
+        assert clock.fit is not None
+        assert clock.fit.level != "likely" or start > 6000
+        if start == 6000:
+            assert given  # what was not done meanwhile holds nothing up
+            given[-1]()
+    assert clock.fit is not None
+    assert at_once.fit is not None
+    assert clock.fit.level == at_once.fit.level == "likely"
+    assert abs(clock.fit.skew_ppm - at_once.fit.skew_ppm) < 2.0 * at_once.fit.skew_sd_ppm
 
 
 @pytest.mark.bank
