@@ -12,6 +12,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MOST_NAMES = 10  # of columns in a sentence
+
+
+def first_names(names: Sequence[str]) -> str:
+    """The names, at most `MOST_NAMES` of them, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
+
 
 @dataclass(frozen=True, slots=True)
 class SummaryTable:

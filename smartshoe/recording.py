@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array, Index, Mask
-from smartshoe.display import Summarised, SummaryTable, panels, significant
+from smartshoe.display import Summarised, SummaryTable, first_names, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
 
@@ -277,7 +277,7 @@ class Recording(Summarised):
         if not found:
             raise MissingChannelError(
                 f"{self.label} has no reference load; name its column with --force, for example --force 'Load[N]'"
-                f" (columns: {', '.join(self.channels)})"
+                f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]
 
@@ -294,7 +294,7 @@ class Recording(Summarised):
             what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
             raise MissingChannelError(
                 f"{self.label} has {what}; name one column with --sensor, for example --sensor 'pressure[mbar]'"
-                f" (columns: {', '.join(self.channels)})"
+                f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]
 

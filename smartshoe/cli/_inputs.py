@@ -11,6 +11,7 @@ import click
 from smartshoe.recording import UNITS_OF_A_SHOE, Recording
 
 if TYPE_CHECKING:
+    from smartshoe.arrays import Array
     from smartshoe.calibration import Calibration
 
 MISSING_SHARE = 0.05  # of a signal's samples, from which on a person is told
@@ -109,13 +110,13 @@ def units_of(choices: Sequence[str]) -> dict[str, str]:
 
 def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
     """The recording with the named columns as the units' readings; raises `MissingChannelError` for one not there."""
+    from smartshoe.display import first_names
     from smartshoe.errors import MissingChannelError
-    from smartshoe.files.logs.picks import listed
 
     for unit, column in columns.items():
         channel = recording.channels.get(column)
         if channel is None:
-            names = listed(list(recording.channels))
+            names = first_names(list(recording.channels))
             raise MissingChannelError(f"{recording.label} has no column {column!r} for {unit}; it has {names}")
         recording = recording.without(column).with_channel(replace(channel, name=unit, role="sensor"))
     return recording
@@ -142,3 +143,14 @@ def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibrati
                 " the rest is extrapolated",
                 err=True,
             )
+
+
+def warn_of_forces_beyond(label: str, force_n: Array, calibration: Calibration) -> None:
+    """A warning on stderr where the forces (n,) that a calibration gave pass the largest load that it has seen."""
+    seen, top_n = calibration.load_range_n, float(force_n.max(initial=0.0))
+    if seen is not None and top_n > BEYOND * seen[1]:
+        click.echo(
+            f"warning: {label} comes to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N: the rest is"
+            " extrapolated, or the calibration is another unit's",
+            err=True,
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli._inputs import column_options, read_all, warn_of_another_unit
+from smartshoe.cli._inputs import column_options, read_all, warn_of_another_unit, warn_of_forces_beyond
 
 
 @click.command(
@@ -38,6 +38,7 @@ def command(
     if out_path is not None:
         write(result, out_path)
     estimate_n = result["force_estimate"].si
+    warn_of_forces_beyond(result.label, estimate_n, calibration)
     click.echo(
         f"{result.label}: {len(result)} samples, force {estimate_n.min():.1f} to {estimate_n.max():.1f} N,"
         f" mean {estimate_n.mean():.1f} N" + (f"; written to {out_path}" if out_path else "; --out keeps them")

@@ -26,14 +26,14 @@ def command(
     source: str, target: str, time: str | None, force: str | None, sensors: tuple[str, ...], unit: str | None
 ) -> None:
     """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
+    from smartshoe.display import first_names
     from smartshoe.files.logs import write
-    from smartshoe.files.logs.picks import listed
 
     (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)
     if Path(target).suffix.casefold() in PLAIN:
         recording = in_contract_units(recording)
     write(recording, target)
-    names = listed([f"{c.name} [{c.unit.symbol}]" for c in recording.channels.values()])
+    names = first_names([f"{c.name} [{c.unit.symbol}]" for c in recording.channels.values()])
     click.echo(f"{target}: {len(recording)} samples over {recording.duration_s:g} s of {names}")
 
 

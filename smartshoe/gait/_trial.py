@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.display import first_names
 from smartshoe.errors import InputError, MissingChannelError, UnitError, UsageError
 from smartshoe.gait._estimate import UnitLoad, calibration_of, estimate
 from smartshoe.gait._flag import Flag
@@ -121,7 +122,7 @@ def _sides(
     if not named:
         raise MissingChannelError(
             f"{recording.label} has no column of a shoe's unit: name them like left_heel_mbar or right_toe_n"
-            f" (columns: {', '.join(recording.channels) or 'none'})"
+            f" (columns: {first_names(list(recording.channels)) or 'none'})"
         )
     for name, channel in named.items():
         if channel.unit.quantity not in _QUANTITIES:

@@ -108,6 +108,20 @@ def print_validation(result: Mapping[str, Any]) -> None:
         " P% (the paper's) compares with raw",
         soft_wrap=True,
     )
+    worse = worse_than_a_line(result["overall"])
+    if worse:
+        console.print(worse, style="bold", soft_wrap=True)
+
+
+def worse_than_a_line(overall: Mapping[str, Any]) -> str | None:
+    """A sentence where the filter leaves more than the best static line does; else None."""
+    static_n, left_n = overall["rmse_static_n"], overall["rmse_compensated_n"]
+    if static_n is None or left_n is None or left_n <= static_n:
+        return None
+    return (
+        f"The filter makes it worse: {plain(left_n)} N are left (rms), {plain(static_n)} N by the best straight line"
+        " through the reading. Is the calibration this unit's, and is the load's sign right? If so, diagnose the unit."
+    )
 
 
 def print_summary(units: Sequence[Mapping[str, Any]], headline: str, grades: Mapping[str, str]) -> None:

@@ -256,3 +256,44 @@ def test_one_choice_of_columns_serves_both_logs_of_a_pair(tmp_path: Path, capsys
     gain = found["parameters"]["b1"]["value"] / found["parameters"]["a1"]["value"]
     assert gain == pytest.approx(-10.0 / 40.0, rel=0.02)  # N on 1 cm² for each count
     assert run_command(["identify", files[1], *columns]) == 3
+
+
+def test_a_calibration_of_a_unit_that_gives_less_is_noticed_by_its_forces(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "own.json"
+    assert run_command(["identify", str(table), "--calibration", str(own)]) == 0
+    capsys.readouterr()
+    assert run_command(["validate", str(table), "--calibration", str(own)]) == 0
+    assert run_command(["compensate", str(table), "--calibration", str(own)]) == 0
+    told = capsys.readouterr()
+    assert "makes it worse" not in told.out
+    assert "warning" not in told.err
+
+    header, *rows = table.read_text().splitlines()
+    doubled = [",".join([*row.split(",")[:2], str(2.0 * float(row.split(",")[2]))]) for row in rows]
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join([header, *doubled]))
+    assert run_command(["validate", str(other), "--calibration", str(own)]) == 0
+    assert "makes it worse" in capsys.readouterr().out
+    assert run_command(["compensate", str(other), "--calibration", str(own)]) == 0
+    assert "the calibration has seen" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["identify", "gait"])
+def test_an_error_lists_ten_columns_at_most(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "wide.csv"
+    rows = "".join(f"{k}" + ",1" * 40 + "\n" for k in range(3))
+    path.write_text("time_s," + ",".join(f"part{k}" for k in range(40)) + "\n" + rows)
+    assert run_command([command, str(path)]) == 3
+    said = capsys.readouterr().err
+    assert "part8" in said
+    assert "part12" not in said
+    assert "more" in said
+
+
+def test_a_line_of_a_million_cells_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text("time_s,force_n,pressure_mbar\n" + "1," * 1_000_000 + "\n0,1,2\n")
+    assert run_command(["identify", str(path)]) == 3
+    assert "line 2 has 1000001 cells" in capsys.readouterr().err

@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from smartshoe.display import first_names
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.files.logs._sheet import Column, Sheet
 from smartshoe.units import Unit, declared, find_unit
 
-MOST_NAMES = 10  # of columns in an error
 _CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
 
 
@@ -32,13 +32,7 @@ def unit_in_file(column: Column) -> Unit | None:
 
 def titles(sheet: Sheet) -> str:
     """The sheet's columns as a person reads them."""
-    return listed([column.label or column.name or "''" for column in sheet.columns])
-
-
-def listed(names: Sequence[str]) -> str:
-    """The names, at most `MOST_NAMES` of them, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    return first_names([column.label or column.name or "''" for column in sheet.columns])
 
 
 def _titled(columns: Sequence[Column], wanted: str) -> list[int]:

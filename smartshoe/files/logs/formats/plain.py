@@ -166,7 +166,9 @@ def read(path: Path) -> Sheet:
     if twice:
         raise FormatError(f"{path}, line {header_line} names column {twice[0]!r} twice: rename one")
     commas, line_count = _marks(path, header_line)
-    values = _read_fast(path, header, header_line)
+    # More cells than the header names are for the slow pass to find: pandas takes minutes for a line of millions.
+    fits = commas <= line_count * (len(header) - 1)
+    values = _read_fast(path, header, header_line) if fits else None
     notes = []
     if values is None or commas != values.shape[0] * (len(header) - 1):
         values, kept = _read_slowly(path, header, header_line)
