@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from smartshoe.recording import UNITS_OF_A_SHOE, Recording
+from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
 
 if TYPE_CHECKING:
     from smartshoe.arrays import Array
@@ -109,17 +109,38 @@ def units_of(choices: Sequence[str]) -> dict[str, str]:
 
 
 def with_units(recording: Recording, columns: Mapping[str, str]) -> Recording:
-    """The recording with the named columns as the units' readings; raises `MissingChannelError` for one not there."""
-    from smartshoe.display import first_names
-    from smartshoe.errors import MissingChannelError
+    """The recording with the named columns as the units' readings; a column may have its unit in brackets.
 
+    Raises `MissingChannelError` for one not there, `UnitError` for a unit that is not known or not the file's.
+    """
     for unit, column in columns.items():
-        channel = recording.channels.get(column)
-        if channel is None:
-            names = first_names(list(recording.channels))
-            raise MissingChannelError(f"{recording.label} has no column {column!r} for {unit}; it has {names}")
-        recording = recording.without(column).with_channel(replace(channel, name=unit, role="sensor"))
+        channel = _channel_of(recording, column, unit)
+        recording = recording.without(channel.name).with_channel(replace(channel, name=unit, role="sensor"))
     return recording
+
+
+def _channel_of(recording: Recording, column: str, unit: str) -> Channel:
+    """The channel that ``column`` names, in the unit that stands in brackets where the file gives none."""
+    from smartshoe.display import first_names
+    from smartshoe.errors import MissingChannelError, UnitError
+    from smartshoe.units import find_unit
+
+    if column in recording.channels:
+        return recording.channels[column]
+    base, _, symbol = (part.strip() for part in column.removesuffix("]").partition("["))
+    channel = recording.channels.get(base)
+    if channel is None:
+        names = first_names(list(recording.channels))
+        raise MissingChannelError(f"{recording.label} has no column {base!r} for {unit}; it has {names}")
+    said = find_unit(symbol)
+    if said is None:
+        raise UnitError(f"unit {symbol!r} in --sensor {unit}={column!r} is not known: use one such as N, kPa or mbar")
+    if channel.unit.quantity != "unknown" and channel.unit != said:
+        raise UnitError(
+            f"{recording.label}: column {base!r} is in {channel.unit.symbol} by the file, --sensor says {said.symbol}:"
+            " leave the unit out"
+        )
+    return replace(channel, unit=said)
 
 
 def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:

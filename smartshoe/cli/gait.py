@@ -57,7 +57,7 @@ class _EstimatorOption(click.Option):
     "sensors",
     multiple=True,
     metavar="UNIT=COLUMN",
-    help="Which column is which unit, where names do not tell (repeatable): left_heel='L_force'.",
+    help="Which column is which unit, where names do not tell (repeatable): left_heel='L_force[N]'.",
 )
 @click.option("--reference", metavar="FILE", help="A trial whose mean strides are the pattern to compare with.")
 @click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON (- for stdout).")

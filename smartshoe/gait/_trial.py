@@ -121,7 +121,8 @@ def _sides(
     named = {name: channel for name, channel in recording.channels.items() if name in UNITS_OF_A_SHOE}
     if not named:
         raise MissingChannelError(
-            f"{recording.label} has no column of a shoe's unit: name them like left_heel_mbar or right_toe_n"
+            f"{recording.label} has no column of a shoe's unit: name them like left_heel_mbar or right_toe_n, or"
+            f" say which is which, --sensor left_heel='{next(iter(recording.channels), 'COLUMN')}[N]'"
             f" (columns: {first_names(list(recording.channels)) or 'none'})"
         )
     for name, channel in named.items():

@@ -216,3 +216,19 @@ def test_a_folder_of_calibrations_serves_with_the_extended_ones_before_the_plain
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="holds no calibration"):
         load_calibrations([str(tmp_path / "empty")])
+
+
+def test_columns_of_any_name_are_mapped_with_their_unit(
+    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = [line for line in walk.read_text().splitlines() if not line.startswith("#")]
+    header, path = lines[0].split(","), tmp_path / "foreign.csv"
+    renamed = [f"part {k}" for k in range(len(header))]
+    renamed[0] = header[0]
+    path.write_text("\n".join([",".join(renamed), *lines[1:]]))
+    mapped = [f"--sensor={name.removesuffix('_n')}={renamed[k]}[N]" for k, name in enumerate(header) if k]
+    assert _json(capsys, str(path), *mapped)["strides"] == _json(capsys, str(walk))["strides"]
+    assert run_command(["gait", str(path), f"--sensor=left_heel={renamed[1]}[quux]"]) == 3
+    assert "'quux'" in capsys.readouterr().err
+    assert run_command(["gait", str(path)]) == 3
+    assert "--sensor left_heel=" in capsys.readouterr().err
