@@ -113,8 +113,8 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
         flags.append(
             Flag(
                 "uncalibrated",
-                f"the {foot.name} shoe's readings are in {foot.units[0].symbol or 'no unit that is known'} and have no calibration: events and"
-                " times are told, forces are not; give --calibration for each unit",
+                f"the {foot.name} shoe's readings are in {foot.units[0].symbol or 'no unit that is known'} and have no"
+                " calibration: events and times are told, forces are not; give --calibration for each unit",
                 foot=foot.name,
             )
         )
