@@ -25,18 +25,23 @@ def command(
     unit: str | None,
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
-    from smartshoe.calibration import Calibration, compensated
-    from smartshoe.cli._output import note
-    from smartshoe.files.logs import write
+    from smartshoe.cli._output import note, progress
 
-    calibration = Calibration.load(calibration_path)
-    (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
-    warn_of_another_unit([recording], calibration)
-    result = compensated(recording, calibration)
+    with progress(2 + (out_path is not None)) as step:
+        step("reading")
+        from smartshoe.calibration import Calibration, compensated
+        from smartshoe.files.logs import write
+
+        calibration = Calibration.load(calibration_path)
+        (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
+        warn_of_another_unit([recording], calibration)
+        step("filtering")
+        result = compensated(recording, calibration)
+        if out_path is not None:
+            step("writing")
+            write(result, out_path)
     for said in result.notes[len(recording.notes) :]:
         note(said)
-    if out_path is not None:
-        write(result, out_path)
     estimate_n = result["force_estimate"].si
     warn_of_forces_beyond(result.label, estimate_n, calibration)
     click.echo(

@@ -26,13 +26,17 @@ def command(
     source: str, target: str, time: str | None, force: str | None, sensors: tuple[str, ...], unit: str | None
 ) -> None:
     """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
+    from smartshoe.cli._output import progress
     from smartshoe.display import first_names
     from smartshoe.files.logs import write
 
-    (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)
-    if Path(target).suffix.casefold() in PLAIN:
-        recording = in_contract_units(recording)
-    write(recording, target)
+    with progress(2) as step:
+        step("reading")
+        (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)
+        if Path(target).suffix.casefold() in PLAIN:
+            recording = in_contract_units(recording)
+        step("writing")
+        write(recording, target)
     names = first_names([f"{c.name} [{c.unit.symbol}]" for c in recording.channels.values()])
     click.echo(f"{target}: {len(recording)} samples over {recording.duration_s:g} s of {names}")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,12 @@ from smartshoe.cli._output import figures_option
 from smartshoe.cli._ranges import FiniteRange
 
 if TYPE_CHECKING:
+    from smartshoe.cli._output import ShownSteps
     from smartshoe.diagnosis import Diagnosis
     from smartshoe.recording import Recording
+
+# Steps that usually follow one, without the report. The fits between the first two go on until one adds nothing.
+_USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing alternatives": 1}
 
 
 @click.command(
@@ -86,7 +91,13 @@ def command(
         recordings = read_all(files, unit=unit, **columns)
         others = read_all(held_out, unit=unit, **columns) if held_out else []
         folder = make_folder(out_folder) if out_folder is not None else None
-        found = diagnose(recordings, hold_out=others, material=material / 100.0, progress=step)
+        step("examining the data")
+        found = diagnose(
+            recordings,
+            hold_out=others,
+            material=material / 100.0,
+            progress=with_what_is_left(step, folder is not None),
+        )
         title = _title(recordings, unit)
         written: dict[str, Path] = {}
         if folder is not None:
@@ -111,6 +122,17 @@ def command(
         click.echo(f"{name}: {path}")
     if calibration_path is not None:
         click.echo(f"calibration: {calibration_path}")
+
+
+def with_what_is_left(step: ShownSteps, with_report: bool) -> Callable[[str], None]:
+    """``step``, told as well how many steps are usually left: fits go on until nothing is worth another one."""
+
+    def show(text: str) -> None:
+        step(text)
+        if text in _USUALLY_LEFT:
+            step.of(_USUALLY_LEFT[text] + with_report)
+
+    return show
 
 
 def _design(path: str, json_path: str | None) -> None:

@@ -25,14 +25,18 @@ def command(
     unit: str | None,
 ) -> None:
     """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
-    from smartshoe.calibration import Calibration
-    from smartshoe.calibration.validation import validate
-    from smartshoe.cli._output import emit_json
-    from smartshoe.report.tables import print_validation
+    from smartshoe.cli._output import emit_json, progress
 
-    calibration = Calibration.load(calibration_path)
-    recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
-    warn_of_another_unit(recordings, calibration)
-    result = validate(recordings, calibration).to_dict()
+    with progress(2) as step:
+        step("reading")
+        from smartshoe.calibration import Calibration
+        from smartshoe.calibration.validation import validate
+        from smartshoe.report.tables import print_validation
+
+        calibration = Calibration.load(calibration_path)
+        recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
+        warn_of_another_unit(recordings, calibration)
+        step("judging")
+        result = validate(recordings, calibration).to_dict()
     if not emit_json(result, json_path):
         print_validation(result)

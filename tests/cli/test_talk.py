@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from smartshoe.cli import run_command, talk
-from smartshoe.cli._output import progress
+from smartshoe.cli._output import ShownSteps, progress
+from smartshoe.cli.diagnose import with_what_is_left
 
 ROWS = "\n".join(f"{0.01 * k:.2f},{k},{k},good" for k in range(20))
 
@@ -66,3 +67,13 @@ def test_a_number_of_steps_that_is_known_late_brings_the_time_that_is_left(monke
     shown = terminal.getvalue()
     assert "two" in shown
     assert "left" in shown
+
+
+def test_diagnose_tells_the_steps_that_are_usually_left() -> None:
+    shown: list[str] = []
+    left: list[int] = []
+    tell = with_what_is_left(ShownSteps(shown.append, left.append), with_report=True)
+    for text in ("fitting the baseline", "fitting play hysteresis", "weighing alternatives"):
+        tell(text)
+    assert len(shown) == 3
+    assert left == [6, 2]
