@@ -47,7 +47,7 @@ def calibrated(unit: str) -> Calibration:
 
 @cache
 def walked() -> Any:
-    return trial(Person(body_weight_n=700.0), Walk(speed_m_per_s=1.3), 20.0, np.random.default_rng(11))
+    return trial(Person(body_weight_n=700.0), Walk(speed_m_per_s=1.3), 12.0, np.random.default_rng(11))
 
 
 def plain(**changes: Any) -> Calibration:

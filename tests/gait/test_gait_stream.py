@@ -90,9 +90,9 @@ def test_readings_in_mbar_go_through_the_same_filters() -> None:
 
 @pytest.mark.parametrize("name", ["static", "lead", "kalman", "smoother"])
 def test_an_estimator_gives_a_stream_the_forces_of_the_whole(name: str) -> None:
-    columns = {name.replace("_n", "_mbar"): 0.2 * values for name, values in columns_of(walked(40.0).recording).items()}
+    columns = {name.replace("_n", "_mbar"): 0.2 * values for name, values in columns_of(walked(24.0).recording).items()}
     columns["left_heel_mbar"][2000:2003] = np.nan
-    pressed = recorded(walked(40.0).time_s, {n: v for n, v in columns.items() if n.endswith(("heel_mbar", "toe_mbar"))})
+    pressed = recorded(walked(24.0).time_s, {n: v for n, v in columns.items() if n.endswith(("heel_mbar", "toe_mbar"))})
     units = [Calibration(a1=0.2, b0=5.2, b1=1.0, reading_unit=MILLIBAR, unit=name) for name in pressed.channels]
     found = analyse_stream(in_blocks(pressed, 1500), units, estimator=name)
     whole = analyse(pressed, units, estimator=name)
