@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from trials import Array, analysed, loads_of, ran, recorded, walked
+from trials import Array, analysed, loads_of, ran, recorded, stood, walked
 
+from simulators.people import Trial
 from smartshoe.errors import RefusedError
-from smartshoe.gait import Contacts, GaitResult, analyse
+from smartshoe.gait import ContactDetector, Contacts, Coverage, GaitResult, analyse
 from smartshoe.gait._force_sums import ForceSums
 from smartshoe.gait._strides import Stride
 from smartshoe.gait._trial import feet_of
+from smartshoe.gait._trial_sums import TrialSums
 from smartshoe.gait._window import analyse_window
 from smartshoe.gait.indices import deviations, sequence_errors
 from smartshoe.gait.phases import PHASES, crisp
@@ -176,15 +179,39 @@ def test_a_single_contact_has_its_phases_and_a_foot_without_any_is_in_swing() ->
 
 
 def test_double_support_is_what_both_stances_share_up_to_the_last_contact() -> None:
-    def foot(first_s: float, count: int) -> Contacts:
+    def foot(first_s: float, count: int, stance_s: float = 0.6) -> Contacts:
         strike_s = first_s + np.arange(float(count))
         once = np.full((count, 1), np.nan)
-        return Contacts(("heel",), strike_s, strike_s + 0.6, once, once, np.zeros(0), np.zeros((0, 1)))
+        return Contacts(("heel",), strike_s, strike_s + stance_s, once, once, np.zeros(0), np.zeros((0, 1)))
 
     strides = [_stride(float(k), toe_off_s=k + 0.6) for k in range(3)]
     assert both_down({"left": foot(0.0, 4), "right": foot(-0.5, 4)}, strides) == pytest.approx((20.0, 0.0))
     # Without the other foot nothing is shared, and it is in the air whenever this one is.
     assert both_down({"left": foot(0.0, 4), "right": foot(50.0, 2)}, strides) == pytest.approx((0.0, 40.0))
+    # Both at once and neither, in one stride: down from 0 to 0.4 s and from 0.3 to 0.7 s of each second.
+    short = [_stride(float(k), toe_off_s=k + 0.4) for k in range(3)]
+    assert both_down({"left": foot(0.0, 4, 0.4), "right": foot(-0.7, 5, 0.4)}, short) == pytest.approx((10.0, 30.0))
+
+
+@pytest.mark.parametrize(("samples", "gaps"), [(1, 0), (18, 0), (24, 1)])
+def test_a_stride_loses_its_say_where_a_tenth_of_a_second_is_missing_in_one_piece(samples: int, gaps: int) -> None:
+    left = _teeter(12.0)
+    columns = {f"left_{unit}_n": 350.0 * left for unit in ("heel", "toe")}
+    columns |= {f"right_{unit}_n": 350.0 * (1.0 - left) for unit in ("heel", "toe")}
+    columns["left_toe_n"][1230 : 1230 + samples] = np.nan  # 6.15 s: in the middle of a stance
+    found = analyse(recorded(np.arange(left.size) / RATE_HZ, columns))
+    assert sum(stride.gap for stride in found.strides if stride.foot == "left") == gaps
+    assert not any(stride.gap for stride in found.strides if stride.foot == "right")
+
+
+@pytest.mark.parametrize(("made", "moves"), [(walked, True), (stood, True), (None, False)])
+def test_a_trial_that_steps_or_stands_has_moved(made: Callable[[], Trial] | None, moves: bool) -> None:
+    feet, _ = feet_of([(made or walked)().recording], ())
+    sums = TrialSums(feet, 0.8)
+    if made is not None:
+        contacts = {name: ContactDetector(foot.rate_hz, foot.regions).apply(foot.load) for name, foot in feet.items()}
+        sums.add(analyse_window(feet, contacts, Coverage(0.8), None))
+    assert sums.moved == moves
 
 
 def test_shoes_that_nobody_wore_are_refused() -> None:

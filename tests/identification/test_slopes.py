@@ -138,42 +138,51 @@ def test_a_grey_boxs_shape_and_coefficients_move_as_their_slopes_say(direction: 
 
 
 @pytest.fixture(scope="module")
-def fits():  # type: ignore[no-untyped-def]
+def found():  # type: ignore[no-untyped-def]
     """Two recordings fitted together, each direction: constants and states of their own."""
     both = [press(load_noise=2.0, reading_noise=0.3, offset=3.0, rates=(200.0, 800.0), repeats=1, name="first")]
     both += [press(load_noise=2.0, reading_noise=0.3, offset=5.0, rates=(400.0,), repeats=1, seed=1, name="second")]
     ways = ("inverse", "forward")
     return {
-        way: identify(both, direction=way, estimator="output_error", initial_state="estimate", delay="estimate").fit
+        way: identify(both, direction=way, estimator="output_error", initial_state="estimate", delay="estimate")
         for way in ways
     }
 
 
 @pytest.mark.parametrize("direction", ["inverse", "forward"])
 @pytest.mark.parametrize("load_zero_free", [False, True])
-def test_zeros_and_their_errors_are_carried_from_the_fit(fits, direction: str, load_zero_free: bool) -> None:  # type: ignore[no-untyped-def]
-    fit = fits[direction]
+def test_zeros_and_their_errors_are_carried_from_the_fit(found, direction: str, load_zero_free: bool) -> None:  # type: ignore[no-untyped-def]
+    fit = found[direction].fit
     choice = Choice("toe", "gn", "free", MILLIBAR, None, load_zero_free, ())
 
     def zeros(theta: Array):  # type: ignore[no-untyped-def]
         values, slope, _ = _parameters(replace(fit, theta=theta), choice)
         return _offsets(replace(fit, theta=theta), choice, float(values[2] / values[0]), slope, 1.96)
 
-    found = zeros(fit.theta)[load_zero_free]
+    told = zeros(fit.theta)[load_zero_free]
     moves = differences(lambda at: np.array([one.value for one in zeros(at)[load_zero_free].values()]), fit.theta)
     wanted = np.sqrt(np.einsum("ij,jk,ik->i", moves, fit.covariance, moves))
-    assert [one.sd for one in found.values()] == pytest.approx(wanted, rel=1e-4)
+    assert [one.sd for one in told.values()] == pytest.approx(wanted, rel=1e-4)
     # A reading of 3 and 5 mbar at rest is a load of minus as much times the static gain.
     gain = coefficients(*TOE)[2] / coefficients(*TOE)[0]
     true = [-3.0 * gain, -5.0 * gain] if load_zero_free else [3.0, 5.0]
-    for one, value in zip(found.values(), true, strict=True):
+    for one, value in zip(told.values(), true, strict=True):
         assert abs(one.value - value) < 4.0 * one.sd
     assert all(one.value == 0.0 == one.sd for one in zeros(fit.theta)[not load_zero_free].values())
 
 
 @pytest.mark.parametrize("direction", ["inverse", "forward"])
-def test_every_told_parameter_moves_as_its_slope_says(fits, direction: str) -> None:  # type: ignore[no-untyped-def]
-    fit = fits[direction]
+def test_each_recordings_state_has_its_own_error(found, direction: str) -> None:  # type: ignore[no-untyped-def]
+    fit = found[direction].fit
+    for index, one in enumerate(found[direction].initial_states.values()):
+        move = differences(lambda at, own=index: np.array([fit.problem.state(at, own)]), fit.theta)[0]
+        assert one.value == pytest.approx(fit.problem.state(fit.theta, index))
+        assert one.sd == pytest.approx(np.sqrt(move @ fit.covariance @ move), rel=1e-6)
+
+
+@pytest.mark.parametrize("direction", ["inverse", "forward"])
+def test_every_told_parameter_moves_as_its_slope_says(found, direction: str) -> None:  # type: ignore[no-untyped-def]
+    fit = found[direction].fit
     for newtons in (None, 1.1):
         choice = Choice("toe", "gn", "free", MILLIBAR, newtons, False, ())
         values, slope, _ = _parameters(fit, choice)
@@ -182,8 +191,9 @@ def test_every_told_parameter_moves_as_its_slope_says(fits, direction: str) -> N
 
 
 @pytest.mark.parametrize("direction", ["inverse", "forward"])
-def test_the_bias_of_noise_on_the_input_is_the_slope_of_the_power_that_it_adds(fits, direction: str) -> None:  # type: ignore[no-untyped-def]
-    problem, theta, normal = fits[direction].problem, fits[direction].theta, fits[direction].evaluation.normal
+def test_the_bias_of_noise_on_the_input_is_the_slope_of_the_power_that_it_adds(found, direction: str) -> None:  # type: ignore[no-untyped-def]
+    fit = found[direction].fit
+    problem, theta, normal = fit.problem, fit.theta, fit.evaluation.normal
     first = problem.experiments[0]
 
     def power(at: Array) -> Array:
