@@ -1,7 +1,7 @@
 """A shoe's unit under a testing machine: one world's time, and two instruments with clocks of their own.
 
 The machine's trajectory presses the unit while the shoe streams; the shoe's other units lie beside the anvil. The
-shoe's clock runs too fast or slow and began before the machine's. *Left out:* the clock's wander with temperature,
+shoe's clock runs too fast or slow and began before the machine's. *Left out:* the clock's drift with temperature,
 the machine's compliance acting back on the unit, load that reaches the neighbours through the insole.
 """
 

@@ -1,8 +1,8 @@
 """Logger: what happens to the reading's channel between the sensor's pin and the file.
 
 *Clocks*: the reading's own transport delay, skew and jitter against the load's channel. *Analogue*: mains hum with
-a third of it in the third harmonic, a coarse lattice. *Digital*: spikes, held samples and dropouts in runs. Percent
-are of the sensor's range.
+a third of it in the third harmonic, a coarse quantisation grid. *Digital*: spikes, held samples and dropouts in runs.
+Percent are of the sensor's range.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Units with an effect that nobody told the engine of."""
+"""Units with an effect that the engine does not know of."""

@@ -118,17 +118,17 @@ def _as_catalogued(name: str) -> str:
 def conditions(p: Plan, subject: Subject) -> list[dict[str, Any]]:
     """Tare, offset and clock that the case has beside its effects: not small, and true causes where named."""
     found: list[dict[str, Any]] = []
-    told = [] if p.zero == "seen" else [True]
+    alike = [] if p.zero == "seen" else [True]
     if p.tare_n:
         found.append({
             "effect": "load_cell_tare", "family": "tare", "strength_percent": round(abs(p.tare_n) / 8.0, 4),
-            "size": f"{p.tare_n:+.2f} N in the log", "cannot_be_told_from": ["zero_offset"] if told else [],
+            "size": f"{p.tare_n:+.2f} N in the log", "cannot_be_told_from": ["zero_offset"] if alike else [],
         })  # fmt: skip
     if p.offset_share:
         found.append({
             "effect": "zero_offset", "family": "zero", "strength_percent": round(100.0 * abs(p.offset_share), 4),
             "size": f"{p.offset_share * subject.full_scale_mbar:+.3f} mbar",
-            "cannot_be_told_from": ["load_cell_tare"] if told else [],
+            "cannot_be_told_from": ["load_cell_tare"] if alike else [],
         })  # fmt: skip
     if p.late_s:
         found.append({
@@ -217,8 +217,8 @@ def _cut(p: Plan, made: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings without what was before them."""
     if p.zero == "seen":
         return tuple(made)
-    kept = [r.between(BEFORE_S, r.time_s[-1] + 1.0) for r in made]
-    return tuple(replace(r, time_s=r.time_s - r.time_s[0]) for r in kept)
+    cut = [r.between(BEFORE_S, r.time_s[-1] + 1.0) for r in made]
+    return tuple(replace(r, time_s=r.time_s - r.time_s[0]) for r in cut)
 
 
 def _logged_channels(p: Plan, recording: Recording) -> Recording:

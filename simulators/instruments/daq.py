@@ -72,7 +72,7 @@ class SimulatedMyRio:
         return logged_s, true_s
 
     def convert(self, voltage_v: Array, error_v: float | None = None) -> Array:
-        """The voltage (any shape) as logged: with the absolute error, on the converter's lattice, within 0-5 V."""
+        """The voltage (any shape) as logged: with the absolute error, quantised by the converter, within 0-5 V."""
         p = self.parameters
         counts = np.rint((voltage_v + (self.error_v if error_v is None else error_v)) / p.step_v)
         return np.clip(counts, 0, 2**p.bits - 1) * p.step_v

@@ -30,7 +30,7 @@ SIDEWAYS = 0.5  # of the sway between heel and forefoot, between left and right
 
 @dataclass(frozen=True, eq=False)
 class Sway:
-    """A slow wander of unit spread: waves of random phase with a spectrum that falls with frequency."""
+    """Slow coloured noise of unit spread: waves of random phase with a spectrum that falls with frequency."""
 
     frequency_hz: Array
     phase: Array
@@ -42,7 +42,7 @@ class Sway:
         return cls(low * (high / low) ** rng.random(WAVES), rng.uniform(0.0, 2.0 * np.pi, WAVES))
 
     def at(self, time_s: Array) -> Array:
-        """The wander (n,) at the times (n,)."""
+        """The noise (n,) at the times (n,)."""
         weight = self.frequency_hz**-0.5
         weight = weight / np.sqrt(0.5 * np.sum(weight**2))
         made = np.zeros(time_s.shape)

@@ -1,4 +1,4 @@
-"""What the compiled time stepping is told of a bladder: its constants by name, each as its kernel multiplies it.
+"""What the compiled time stepping takes from a bladder: its constants by name, each as its kernel multiplies it.
 
 Stresses are in units of the ambient pressure, deformations in shares of the gas volume, times in s. A NamedTuple of
 numbers: numba takes it as it is.

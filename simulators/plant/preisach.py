@@ -19,7 +19,7 @@ from numba import njit
 
 from smartshoe.arrays import Array
 
-MEMORY = 256  # turning points kept; beyond it the two innermost are forgotten (a loop smaller than all others)
+MEMORY = 256  # turning points stored; beyond it the two innermost are forgotten (a loop smaller than all others)
 
 
 @njit(cache=True)

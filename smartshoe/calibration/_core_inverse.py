@@ -15,7 +15,7 @@ RINGING = -0.5
 class CoreInverse(Inverse):
     """`Core.recursion` solved for the new load, which is exact for loads that are straight lines between samples.
 
-    With z_k = A z_(k-1) + b f_(k-1) + c f_k and p = direct f + read . z, the state that is kept is what z will be
+    With z_k = A z_(k-1) + b f_(k-1) + c f_k and p = direct f + read . z, the stored state is what z will be
     without the new load, s_k = z_k - c f_k. Where the sampling is so coarse that this recursion rings (`RINGING`),
     the bilinear transform of the network takes its place: ``is_exact`` is then False. It never rings beyond bound,
     as the network's zeros do not grow with time.

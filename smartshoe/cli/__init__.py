@@ -144,12 +144,12 @@ def run_command(arguments: Sequence[str]) -> int:
     except Exception as error:
         if common.debug:
             raise
-        return _told(error)
+        return _reported(error)
     finally:
         talk.reset(before)
 
 
-def _told(error: Exception) -> int:
+def _reported(error: Exception) -> int:
     """Print what ended a command as one sentence; the exit status."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         click.echo(error.ctx.get_help() if error.ctx else "", err=True)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def counting(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar that is told (done, whole), on a terminal; nothing elsewhere."""
+    """A bar that is given (done, whole), on a terminal; nothing elsewhere."""
     if not sys.stderr.isatty():
         yield lambda _done, _whole: None
         return

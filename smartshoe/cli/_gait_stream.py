@@ -60,14 +60,14 @@ def gait_of_stream(
         step("events, strides, forces")
         write = None if folder is None else stack.enter_context(tables(folder))
 
-        def told(events: Sequence[Event], strides: Sequence[Stride]) -> None:
+        def report(events: Sequence[Event], strides: Sequence[Stride]) -> None:
             if events:
                 step(f"events, strides, forces: {events[-1].time_s / 3600.0:.2f} h")
             if write is not None:
                 write(events, strides)
 
         sources = [read_blocks(file, time=time) for file in files]
-        found = analyse_stream(sources, calibrations, body_weight_n, coverage, told, estimator)
+        found = analyse_stream(sources, calibrations, body_weight_n, coverage, report, estimator)
     if folder is not None:
         written = {"result": folder / "gait.json"} | {name: folder / f"{name}.csv" for name in ("strides", "events")}
         write_text(written["result"], json_text(found.to_dict()))

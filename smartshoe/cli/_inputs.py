@@ -1,4 +1,4 @@
-"""The options by which any command is told which columns of a file are what."""
+"""The options by which any command learns which columns of a file are what."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from smartshoe.arrays import Array
     from smartshoe.calibration import Calibration
 
-MISSING_SHARE = 0.05  # of a signal's samples, from which on a person is told
+MISSING_SHARE = 0.05  # of a signal's samples, from which on it is reported
 BEYOND = 1.1  # of the largest load that a calibration has seen
 
 _F = TypeVar("_F", bound=Callable[..., Any])

@@ -52,12 +52,12 @@ def note(text: str) -> None:
 
 
 def _nothing(_: object) -> None:
-    """Nobody is told."""
+    """Nothing is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShownSteps:
-    """``show`` is told the name of each step; ``of`` how many are still to come, for the time that is left."""
+    """``show`` is given the name of each step; ``of`` how many are still to come, for the time that is left."""
 
     show: Callable[[str], None] = _nothing
     of: Callable[[int], None] = _nothing

@@ -143,7 +143,7 @@ def _begun(out_folder: str | None, resume: str | None, options: dict[str, Any]) 
             raise UsageError("--out is missing: give a new folder for the session's data and results")
         folder = SessionFolder.begin(out_folder, _plan(options))
         if options["store"] is not None:
-            make_folder(options["store"])  # what cannot be written to is told before anything is pressed
+            make_folder(options["store"])  # what cannot be written to is reported before anything is pressed
         return folder
     given = [name for name in ("shoe", "machine", "unit", "protocols") if options[name]]
     if given or out_folder is not None:

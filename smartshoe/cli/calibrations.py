@@ -276,7 +276,7 @@ def retire_command(serial_number: str, date: str | None, note: str, store_folder
 
 def _event(store_folder: str | None, what: str, serial_number: str, date: str | None, note: str) -> None:
     store = _opened(store_folder)
-    store.latest(serial_number)  # a wrong serial number is told here, not when its history is missed
+    store.latest(serial_number)  # a wrong serial number is refused here, not when its history is missed
     event = getattr(store, what)(serial_number, date or _today(), note)
     click.echo(f"unit {serial_number}: {event.says}")
 

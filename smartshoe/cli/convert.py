@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PLAIN = (".csv", ".txt")
 # What the plain table names beside each other; of each quantity the first is what anything else becomes.
-KEPT_UNITS = {"force": ("N",), "pressure": ("mbar", "Pa", "kPa", "bar"), "length": ("mm",), "temperature": ("°C",)}
+WRITABLE_UNITS = {"force": ("N",), "pressure": ("mbar", "Pa", "kPa", "bar"), "length": ("mm",), "temperature": ("°C",)}
 
 
 @click.command("convert", epilog="Example: smartshoe convert Specimen_RawData_1.csv left_toe.h5")
@@ -46,9 +46,9 @@ def in_contract_units(recording: Recording) -> Recording:
     from smartshoe.units import find_unit
 
     for channel in list(recording.channels.values()):
-        kept = KEPT_UNITS.get(channel.unit.quantity, (channel.unit.symbol,))
-        wanted = find_unit(kept[0])
-        if channel.unit.symbol in kept or wanted is None:
+        writable = WRITABLE_UNITS.get(channel.unit.quantity, (channel.unit.symbol,))
+        wanted = find_unit(writable[0])
+        if channel.unit.symbol in writable or wanted is None:
             continue
         values = channel.unit.convert(channel.values, wanted)
         values.flags.writeable = False

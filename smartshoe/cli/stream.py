@@ -76,7 +76,7 @@ class _StreamRun:
         self.is_stopped = self.has_begun = False
         self._out = out
         self._table: StreamTable | None = None
-        self._samples = self._told = 0
+        self._samples = self._reported = 0
 
     def until(self, shoe: Shoe, forces: StreamedForces, duration_s: float | None) -> None:
         """Read until ``duration_s`` of the device's time have passed, or the stream ends."""
@@ -107,7 +107,7 @@ class _StreamRun:
             self._samples += len(block)
             last_s = float(block.time_s[-1])
             if last_s >= due_s:
-                click.echo(seconds.told(last_s))
+                click.echo(seconds.report(last_s))
                 if self._lost(shoe) > lost:
                     lost = self._lost(shoe)
                     note(f"samples lost so far: {lost}")
@@ -128,9 +128,9 @@ class _StreamRun:
 
     def _tell_events(self, shoe: Shoe) -> None:
         events = shoe.events
-        for event in events[self._told :]:
+        for event in events[self._reported :]:
             note(event.says)
-        self._told = len(events)
+        self._reported = len(events)
 
     def close(self) -> None:
         """Close the table and say where it is."""

@@ -179,22 +179,22 @@ class Shoe(Device):
 
     def record(self, duration_s: float | None = None, name: str = "trial") -> Recording:
         """Everything that comes, or the first ``duration_s``, as one recording; raises where nothing comes."""
-        kept: list[Block] = []
+        blocks: list[Block] = []
         start: float | None = None
         for block in self.blocks():
             if not len(block):
                 continue
             start = float(block.time_s[0]) if start is None else start
-            kept.append(block)
+            blocks.append(block)
             if duration_s is not None and block.time_s[-1] - start >= duration_s:
                 break
-        if not kept or start is None:
+        if not blocks or start is None:
             raise DeviceError(f"{self} sent no samples")
-        time_s = np.concatenate([block.time_s for block in kept])
-        readings = np.concatenate([np.where(b.missing, np.nan, b.readings) for b in kept])
+        time_s = np.concatenate([block.time_s for block in blocks])
+        readings = np.concatenate([np.where(b.missing, np.nan, b.readings) for b in blocks])
         channels = {
-            unit_name: Channel.from_values(unit_name, readings[:, column], kept[0].unit, "sensor")
-            for column, unit_name in enumerate(kept[0].names)
+            unit_name: Channel.from_values(unit_name, readings[:, column], blocks[0].unit, "sensor")
+            for column, unit_name in enumerate(blocks[0].names)
         }
         whole = Recording(time_s, channels, name=name, source=str(self))
         return whole if duration_s is None else whole.between(start, start + duration_s)

@@ -126,7 +126,7 @@ def align_reading(machine_s: Array, load: Array, logger_s: Array, reading: Array
     if found.misfit <= LARGEST_MISFIT:
         return Alignment(found.delay_s, found.delay_sd_s, found.rate, found.rate_sd, correlation, found.residual)
     at_corners = follow_corners(machine_s, load, logger_s, reading, delay)
-    if at_corners is None:  # then the unit's lag cannot be told from a delay, and stays in it
+    if at_corners is None:  # then the unit's lag cannot be distinguished from a delay, and stays in it
         return align(machine_s, load, logger_s, reading)
     return Alignment(*at_corners, correlation, found.residual, True)
 
@@ -179,11 +179,11 @@ def join_with_clocks(
         raise InputError(f"{machine_log.label} and {logger_log.label} share no time: give the logs of one test")
     ours, theirs = machine_log.channels.values(), logger_log.channels.values()
     if ticks == "logger":
-        moved, kept = [_moved(c, machine_s, on_machine_s) for c in ours], [c.taken(inside) for c in theirs]
+        moved, others = [_moved(c, machine_s, on_machine_s) for c in ours], [c.taken(inside) for c in theirs]
     else:
-        moved, kept = [c.taken(inside) for c in ours], [_moved(c, at, on_machine_s) for c in theirs]
+        moved, others = [c.taken(inside) for c in ours], [_moved(c, at, on_machine_s) for c in theirs]
     channels = {channel.name: channel for channel in moved}
-    for channel in kept:
+    for channel in others:
         name = channel.name if channel.name not in channels else f"logger_{channel.name}"
         role: Role = "auxiliary" if channel.role == "load" else channel.role
         channels[name] = replace(channel, name=name, role=role)

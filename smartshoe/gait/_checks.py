@@ -89,7 +89,7 @@ def _one_shoe(foot: str) -> list[Flag]:
     return [
         Flag(
             "one_shoe",
-            f"the {other} shoe is missing: total force, double support and symmetry are not told, and body weight"
+            f"the {other} shoe is missing: total force, double support and symmetry are not reported, and body weight"
             f" counts the {foot} foot twice",
             foot=other,
         )
@@ -114,7 +114,7 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
             Flag(
                 "uncalibrated",
                 f"the {foot.name} shoe's readings are in {foot.units[0].symbol or 'no unit that is known'} and have no"
-                " calibration: events and times are told, forces are not; give --calibration for each unit",
+                " calibration: events and times are reported, forces are not; give --calibration for each unit",
                 foot=foot.name,
             )
         )
@@ -157,8 +157,8 @@ def _shoe(foot: Foot, series: FootSeries, loaded: bool, moving: bool) -> list[Fl
 
 
 def _late(absent: Sequence[str]) -> str:
-    told = [says for region, says in (("heel", "heel strikes late"), ("toe", "toe offs early")) if region in absent]
-    return f", {' and '.join(told)}, and compared with a whole shoe it is no equal" if told else ""
+    affected = [says for region, says in (("heel", "heel strikes late"), ("toe", "toe offs early")) if region in absent]
+    return f", {' and '.join(affected)}, and compared with a whole shoe it is no equal" if affected else ""
 
 
 def _units(foot: Foot, series: FootSeries) -> list[Flag]:
@@ -171,7 +171,7 @@ def _units(foot: Foot, series: FootSeries) -> list[Flag]:
                 Flag(
                     "saturated",
                     f"{unit.name} stands on its rail in {plain_percent(unit.saturated)} % of the record: the load is"
-                    " higher there than is told",
+                    " higher there than is reported",
                     foot.name, region, where_text(spans),
                 )
             )  # fmt: skip

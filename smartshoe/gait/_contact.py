@@ -86,7 +86,7 @@ class ContactDetector:
 
     Offset, drift and body weight do not matter: thresholds are shares of the foot's own loads above its own floor
     in swing. Loads are looked at ``window_s`` at a time with 3 s on either side, counted from the first sample,
-    so that blocks of any size give the same numbers; a contact is told within ``window_s`` + 3 s of its end.
+    so that blocks of any size give the same numbers; a contact is reported within ``window_s`` + 3 s of its end.
     ``least_load``, in the loads' unit: what varies less is no step (0 for readings in a unit of their own).
     """
 
@@ -115,7 +115,7 @@ class ContactDetector:
         self._waiting: list[Array] = []
         self._held = 0  # samples in hand
         self._first = 0  # place of the first of them
-        self._done = 0  # place up to which edges were told
+        self._done = 0  # place up to which edges were reported
         self._last_edge = -np.inf
         self._last_floor = -np.inf
         self._rising_next: bool | None = None

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 WINDOW_S = 120.0
-HEAD_S = 60.0  # looked at before anything is told: which columns, at what rate, of which sign
+HEAD_S = 60.0  # looked at before anything is reported: which columns, at what rate, of which sign
 LISTED = 2000  # strides, and the events up to the last of them, that a result lists
 PEAKS = 1000  # stances whose peaks are what is usual
 Report = Callable[[Sequence[Event], Sequence[Stride]], None]
@@ -48,21 +48,21 @@ def analyse_stream(
     calibrations: CalibrationsLike | Iterable[CalibrationsLike] = (),
     body_weight_n: float | None = None,
     coverage: float | Coverage = 1.0,
-    told: Report | None = None,
+    report: Report | None = None,
     estimator: str | None = None,
 ) -> DayResult:
     """The trial whose recording comes in consecutive ``blocks`` of any size, in memory that does not grow with it.
 
-    ``blocks`` of both shoes, or a list of two iterables, one for each shoe. ``told`` is called with events and strides
-    in order as they are known, some minutes after they happened; the other arguments are those of `analyse`, with
-    whose result this one agrees whatever the blocks' size. Recording that stops for more than 10 s ends what is under
-    way, and the analysis goes on after it. What an ``estimator`` must know of a reading's noise and of how fast loads
-    change is that of the first minute. Raises what `analyse` raises.
+    ``blocks`` of both shoes, or a list of two iterables, one for each shoe. ``report`` is called with events and
+    strides in order as they are known, some minutes after they happened; the other arguments are those of `analyse`,
+    with whose result this one agrees whatever the blocks' size. Recording that stops for more than 10 s ends what is
+    under way, and the analysis goes on after it. What an ``estimator`` must know of a reading's noise and of how fast
+    loads change is that of the first minute. Raises what `analyse` raises.
     """
     covered = checked(body_weight_n, coverage, estimator)
     sources = _sources(_several(blocks))
     feet, flags = feet_of([head for head, _ in sources], given_calibrations(calibrations), estimator)
-    day = _Day(feet, sources, covered, body_weight_n, told)
+    day = _Day(feet, sources, covered, body_weight_n, report)
     day.run()
     return day.result(flags)
 
@@ -92,9 +92,9 @@ class _Day:
         sources: Sequence[tuple[Recording, Iterator[Recording]]],
         coverage: Coverage,
         body_weight_n: float | None,
-        told: Report | None,
+        report: Report | None,
     ) -> None:
-        self.feet, self.coverage, self.body_weight_n, self._told = feet, coverage, body_weight_n, told
+        self.feet, self.coverage, self.body_weight_n, self._report = feet, coverage, body_weight_n, report
         self.label = sources[0][0].label
         self._channels: dict[str, tuple[Channel, ...]] = {}
         self._of_source: list[list[tuple[str, slice]]] = []
@@ -167,16 +167,16 @@ class _Day:
 
     def _push(self, source: int, piece: Piece) -> None:
         for name, columns in self._of_source[source]:
-            self._tell(name, self._streams[name].push(piece.values[:, columns], piece.missing[:, columns]))
+            self._add(name, self._streams[name].push(piece.values[:, columns], piece.missing[:, columns]))
         self._settle(at_end=False)
 
-    def _tell(self, foot: str, told: Contacts) -> None:
-        self.sums.add_contacts(foot, told)
-        self._events += events_of({foot: told})
+    def _add(self, foot: str, contacts: Contacts) -> None:
+        self.sums.add_contacts(foot, contacts)
+        self._events += events_of({foot: contacts})
 
     def _end(self) -> None:
         for name, stream in self._streams.items():
-            self._tell(name, stream.finish())
+            self._add(name, stream.finish())
         end_s = max(stream.end_s - 1.0 / stream.rate_hz for stream in self._streams.values())
         self.flags.add_run(self._run_s, end_s)
         self._settle(at_end=True)
@@ -215,8 +215,8 @@ class _Day:
             self._listed_events += events
             if len(self._listed) > LISTED:
                 self._cut_lists()
-        if self._told is not None and (events or strides):
-            self._told(events, strides)
+        if self._report is not None and (events or strides):
+            self._report(events, strides)
         self._settled_s = end_s
         if np.isfinite(end_s):
             for stream in self._streams.values():

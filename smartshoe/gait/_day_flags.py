@@ -95,6 +95,6 @@ class DayFlags:
         if self._windows < 2:
             return flag
         where = flag.where if flag.where != "all" else where_text([(window.start_s, window.end_s)])
-        more = f" and in {count - 1} more stretches, to {self._ends_s[key]:.1f} s" if count > 1 else ""
-        says = f"in {count} of {self._windows} stretches of the record, in the first of them: {flag.says}"
+        more = f" and in {count - 1} more windows, to {self._ends_s[key]:.1f} s" if count > 1 else ""
+        says = f"in {count} of {self._windows} windows of the record, in the first of them: {flag.says}"
         return replace(flag, says=says, where=where + more)

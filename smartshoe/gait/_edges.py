@@ -211,6 +211,6 @@ def _levels(least: Array, usual: Array, noise: float) -> tuple[Array, Array]:
 
 
 def _rows(signal: Array, first: Index, turn: int, width: int) -> Array:
-    """Stretches (k, width) of the signal from ``first`` on, forwards or backwards; its end values beyond its ends."""
+    """Segments (k, width) of the signal from ``first`` on, forwards or backwards; its end values beyond its ends."""
     index = first[:, None] + turn * np.arange(width)[None, :]
     return np.asarray(signal[np.clip(index, 0, signal.size - 1)])

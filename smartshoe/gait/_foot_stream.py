@@ -22,7 +22,7 @@ class Detector(ContactDetector):
 
     @property
     def known_s(self) -> float:
-        """Up to when all that ended is told."""
+        """Up to when all that ended is reported."""
         return self.start_s + self._done / self.sample_rate_hz
 
     @property
@@ -104,7 +104,7 @@ class FootStream:
         return known_s if known_s - last_s > HORIZON_S else min(known_s, last_s)
 
     def _hold_floor(self, until_s: float) -> None:
-        """Where no swing was seen for long, the last floor is that of ``until_s`` too: what was told stays true."""
+        """Where no swing was seen for long, the last floor is that of ``until_s`` too: what was reported stays true."""
         floor_s, floor = self._contacts.floor_time_s, self._contacts.floor
         if not self._is_over and floor_s.size and until_s > floor_s[-1]:
             self._contacts = replace(

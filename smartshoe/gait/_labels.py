@@ -36,12 +36,12 @@ def label_flags(feet: Mapping[str, Foot], series: Mapping[str, FootSeries], stri
     """Metatarsals, columns or shoes that seem exchanged."""
     flags: list[Flag] = []
     for name, foot in feet.items():
-        told = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", Path(foot.source).stem.casefold())}
-        if told and name not in told:
+        named = {side for side in FEET if re.search(rf"(?<![a-z]){side}(?![a-z])", Path(foot.source).stem.casefold())}
+        if named and name not in named:
             flags.append(
                 Flag(
                     "left_right_swapped",
-                    f"{foot.source} is named {told.pop()} and holds columns of the {name} shoe: one of them is wrong,"
+                    f"{foot.source} is named {named.pop()} and holds columns of the {name} shoe: one of them is wrong,"
                     " and the loads cannot say which",
                     foot=name,
                 )

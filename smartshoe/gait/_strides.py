@@ -94,7 +94,7 @@ def _loses(gaps: tuple[Index, Index], first: int, last: int, rate_hz: float) -> 
 
 
 def with_runs(strides: Sequence[Stride]) -> list[Stride]:
-    """The strides of both feet in order of their start, each told whether it runs.
+    """The strides of both feet in order of their start, each with whether it runs.
 
     The stance share is that of the stride and of the other foot's that begins nearest: a limp has a foot that is down
     for less than half of its stride, and still walks.

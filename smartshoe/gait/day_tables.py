@@ -17,9 +17,9 @@ DIGITS = 9  # of a number, as in the tables of a short trial
 
 @contextmanager
 def tables(folder: Path) -> Iterator[Callable[[Sequence[Event], Sequence[Stride]], None]]:
-    """What `smartshoe.gait._day.analyse_stream` tells, as ``events.csv`` and ``strides.csv`` in ``folder``.
+    """What `smartshoe.gait.analyse_stream` reports, as ``events.csv`` and ``strides.csv`` in ``folder``.
 
-    Yields the function to hand to ``told``. The files are there when the block ends without an error, whole.
+    Yields the function to hand to ``report``. The files are there when the block ends without an error, whole.
     """
     with ExitStack() as stack:
         files = []
@@ -28,11 +28,11 @@ def tables(folder: Path) -> Iterator[Callable[[Sequence[Event], Sequence[Stride]
             files.append(stack.enter_context(path.open("w", encoding="utf-8", newline="\n")))
             files[-1].write(",".join(row.__dataclass_fields__) + "\n")
 
-        def told(events: Sequence[Event], strides: Sequence[Stride]) -> None:
+        def report(events: Sequence[Event], strides: Sequence[Stride]) -> None:
             for file, rows in zip(files, (events, strides), strict=True):
                 file.writelines(map(_line, rows))
 
-        yield told
+        yield report
 
 
 def _line(row: Any) -> str:

@@ -13,7 +13,7 @@ from smartshoe.gait._strides import Stride
 
 Activity = Literal["walking", "running", "standing", "mixed"]
 
-MOSTLY = 0.85  # of the time in which anything is told, that makes an activity the trial's
+MOSTLY = 0.85  # of the time in which any activity is known, that makes an activity the trial's
 LONGEST_STEP_S = 2.0
 ROUNDING = 1e-9  # of a stride
 

@@ -1,4 +1,4 @@
-"""One pass over an experiment: error and gradient of the first-order model, kept only as their inner products.
+"""One pass over an experiment: error and gradient of the first-order model, stored only as their inner products.
 
 The slow twin, with which the tests compare, is `smartshoe.identification._prediction_error`.
 """

@@ -344,7 +344,7 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
     p, before = 0.0, 0.0
     for k in range(pressure.size):
         known = pressure[k] - w - half * flow
-        # p + half flow(p) = known rises with p: Newton from the last output moved along, kept in a bracket.
+        # p + half flow(p) = known rises with p: Newton from the last output moved along, held in a bracket.
         low, high = min(known, 0.0), max(known, 0.0)
         p = min(max(p + known - before, low), high)
         before = known

@@ -1,6 +1,6 @@
 """Compiles the fit's kernels beside other work, the first time that this machine runs them.
 
-Compiled code is kept on disk, so that this happens once an installation. A scenario's devices take a second or two on
+Compiled code is cached on disk, so that this happens once an installation. A scenario's devices take a second or two on
 one core before the first fit: by then a second core has the kernels ready.
 """
 
@@ -52,7 +52,7 @@ def compile_all() -> None:
 
 
 def compile_alone() -> bool:
-    """Compile, each kernel once whoever else is at it, unless nothing can be kept here; whether it was done."""
+    """Compile, each kernel once whoever else is at it, unless nothing can be cached here; whether it was done."""
     if not os.access(CACHE, os.W_OK):
         return False
     compile_each_kernel_once()

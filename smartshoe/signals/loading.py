@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 
-# A ramp counts where it spans this share of the record's load range; slower wandering is hold or rest.
+# A ramp counts where it spans this share of the record's load range; slower drifting is hold or rest.
 LEAST_SPAN = 0.3
 SAME_RATE = 0.10
 

@@ -218,11 +218,11 @@ def test_lists_are_bounded_and_everything_is_handed_on(monkeypatch: pytest.Monke
     events: list[Event] = []
     strides: list[Stride] = []
 
-    def told(new_events: Any, new_strides: Any) -> None:
+    def report(new_events: Any, new_strides: Any) -> None:
         events.extend(new_events)
         strides.extend(new_strides)
 
-    found = analyse_stream(in_blocks(various(), 3000), coverage=0.8, told=told)
+    found = analyse_stream(in_blocks(various(), 3000), coverage=0.8, report=report)
     whole = various_whole()
     assert [(e.foot, e.event) for e in events] == [(e.foot, e.event) for e in whole.events]
     assert [s.start_s for s in strides] == pytest.approx([s.start_s for s in whole.strides], abs=ROUNDING)

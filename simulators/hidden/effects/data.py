@@ -55,10 +55,10 @@ def single_samples(amount: float, draws: Draws, y: Array, at: Surroundings) -> A
 
 EFFECTS = [
     Hideable("quantisation", "data", "logger", "lattice", "%", 1.0, 40.0, lambda a, d, s: reading(lattice_percent=a),
-        law="rounding", says="an even lattice beside the converter's", source="coarse converter",
+        law="rounding", says="an even grid beside the converter's", source="coarse converter",
         catalogue=lambda a, d, s, hz: {"step_mbar": 0.01 * a * s.range_mbar},
         laws=(
-            Law("cut_off", "log", "an even lattice that cuts off, not from zero", "truncation", floor_of_bits, 0.035,
+            Law("cut_off", "log", "an even grid that cuts off, not from zero", "truncation", floor_of_bits, 0.035,
                 0.3, uniform(begins=(0.0, 1.0)), bends=None),
             Law("companding", "log", "steps that grow with the reading", "ITU-T G.711", companding, 0.06, 0.3,
                 uniform(mu=(0.5, 4.0)), bends=None),

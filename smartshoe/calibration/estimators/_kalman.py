@@ -104,13 +104,13 @@ class KalmanRun(ForceRun):
                 measured[at] = None
             found = self._filter.batch_filter(measured, update_first=True)
             self._held = (np.concatenate([self._held[0], found[0]]), np.concatenate([self._held[1], found[1]]))
-        return self._told(0 if self._lag is None else self._lag)
+        return self._estimated(0 if self._lag is None else self._lag)
 
     def finish(self) -> ForceEstimate:
         """The forces that wait for readings after them."""
-        return self._told(0)
+        return self._estimated(0)
 
-    def _told(self, waiting: int) -> ForceEstimate:
+    def _estimated(self, waiting: int) -> ForceEstimate:
         means, covariances = self._held
         count = max(len(means) - waiting, 0)
         if self._lag is not None and count:

@@ -79,9 +79,10 @@ class CalibrationStore:
         if valid_for_days is not None and not (math.isfinite(valid_for_days) and valid_for_days > 0.0):
             raise UsageError(f"valid for {valid_for_days:g} days: give a number above 0, or none")
         where = calibration.unit if position is None else position
-        kept = replace(calibration, serial_number=serial, unit=where, created=calibration.created or iso(at)).to_dict()
+        created = calibration.created or iso(at)
+        stored = replace(calibration, serial_number=serial, unit=where, created=created).to_dict()
         history = self.history(serial)
-        same = [entry for entry in history if entry.fingerprint == files.fingerprint(kept)]
+        same = [entry for entry in history if entry.fingerprint == files.fingerprint(stored)]
         said = (at, valid_for_days, note)
         for entry in same:
             if (entry.date, entry.valid_for_days, entry.note) == said:
@@ -99,9 +100,9 @@ class CalibrationStore:
             "note": note,
             "order": 1 + max((entry.order for entry in history), default=0),
         }
-        path = files.write_calibration(self.folder, kept, about)
+        path = files.write_calibration(self.folder, stored, about)
         return files.entry_of(self.folder, path.relative_to(self.folder).as_posix(), {
-            **about, "fingerprint": files.fingerprint(kept)
+            **about, "fingerprint": files.fingerprint(stored)
         })  # fmt: skip
 
     def place(self, serial_number: str, position: str, date: When, note: str = "") -> HistoryEvent:
@@ -141,10 +142,10 @@ class CalibrationStore:
         entries: list[Entry] = []
         events: list[HistoryEvent] = []
         for relative, state in now.items():
-            kept = known.get(relative)
-            fresh = isinstance(kept, dict) and kept.get("state") == list(state)
+            cached = known.get(relative)
+            fresh = isinstance(cached, dict) and cached.get("state") == list(state)
             try:
-                item = kept["item"] if fresh and kept is not None else files.read_item(self.folder, relative)
+                item = cached["item"] if fresh and cached is not None else files.read_item(self.folder, relative)
                 if relative.startswith(f"{files.EVENTS}/"):
                     events.append(files.event_of(item))
                 else:
@@ -228,7 +229,7 @@ class CalibrationStore:
         return history[-1]
 
     def nearest(self, serial_number: str, date: When, *, refuse_expired: bool = False) -> Found:
-        """The calibration nearest in time to ``date`` that no repair parts from it; of two as near, the earlier.
+        """The calibration nearest in time to ``date`` with no repair between them; of two as near, the earlier.
 
         Raises `UsageError` where the unit is not known, `RefusedError` where it was retired by then or no
         calibration lies between the same repairs, and where what is found has expired and ``refuse_expired``.

@@ -21,7 +21,7 @@ from smartshoe.models.parameter import Parameter
 
 DAYS_OF_A_YEAR = 365.25
 ROUNDING = 1e-12
-JUMP_CHANCE = 0.01  # of a jump being told anywhere in a history that has none
+JUMP_CHANCE = 0.01  # of a jump being reported anywhere in a history that has none
 LEAST_FREEDOM = 2  # calibrations beyond levels and slope, to judge a jump by
 
 
@@ -47,9 +47,9 @@ class DriftStep:
 class Trend:
     """A quantity over the life: ``values`` and ``sds`` (n,) at ``days`` (n,) since the first calibration.
 
-    ``pieces`` (n,) number the stretches between ``repairs`` and ``jumps``, each with a level of its own; ``per_year``
-    is the slope that they share, None where it cannot be told; ``levels`` are what the fit says at day 0, one a piece.
-    ``scatter`` is the spread about the fit over what the sds explain (1: all of it; NaN where there is no sd or
+    ``pieces`` (n,) number the segments between ``repairs`` and ``jumps``, each with a level of its own; ``per_year``
+    is the slope that they share, None where it cannot be estimated; ``levels`` are what the fit says at day 0, one a
+    piece. ``scatter`` is the spread about the fit over what the sds explain (1: all of it; NaN where there is no sd or
     nothing is left to judge by).
     """
 
@@ -294,7 +294,7 @@ def _trend_says(
 ) -> str:
     said = []
     if slope is None:
-        said.append(f"{_words(name)}: no trend can be told apart from the repairs")
+        said.append(f"{_words(name)}: no trend can be distinguished from the repairs")
     elif not math.isfinite(slope.sd):
         said.append(f"{_words(name)}: {slope.value:.3g} {slope.unit}, from too few calibrations for an interval")
     else:

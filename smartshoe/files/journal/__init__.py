@@ -1,4 +1,4 @@
-"""Data that must not be lost: appended to a file, checked, on disk before anyone is told of it."""
+"""Data that must not be lost: appended to a file, checked, on disk before anyone learns of it."""
 
 from smartshoe.files.journal._appending import AppendedFile
 from smartshoe.files.journal._journal import Contents, Journal, read_journal

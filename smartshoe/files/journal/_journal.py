@@ -17,7 +17,7 @@ from smartshoe.files.journal._records import LONGEST_PAYLOAD, OPENING, Record, p
 class Contents:
     """What a journal holds: its whole records, in order.
 
-    ``torn_bytes`` at the end belong to a record that was being written when the writer stopped (nobody was told of
+    ``torn_bytes`` at the end belong to a record that was being written when the writer stopped (nobody had learnt of
     it). ``damage`` are spans (start, stop) in bytes between whole records: a fault of the disk.
     """
 

@@ -1,4 +1,4 @@
-"""Vendor files to `Recording` and back: `read` and `write` for every format, told by content first, suffix second."""
+"""Vendor files to `Recording` and back: `read` and `write` for every format, known by content first, suffix second."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def detect(path: Path | str) -> Format:
 def read_sheet(path: Path | str) -> Sheet:
     """The columns of any readable file as they stand in it; raises `InputError` and its kin.
 
-    The one place where a format's reader runs, ours or another's: whatever goes wrong in it is told in one sentence.
+    The one place where a format's reader runs, ours or another's: whatever goes wrong in it becomes one sentence.
     """
     path = Path(path)
     format_ = detect(path)

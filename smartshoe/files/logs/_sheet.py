@@ -23,7 +23,7 @@ class Column:
     """One column as it stands in the file: ``name`` and ``unit`` are the file's texts ('' where it gives none).
 
     ``values`` (n,) hold NaN where a cell is empty. ``role`` is set only by formats that store roles (our own HDF5
-    and MAT files); elsewhere the role is told from name and unit, or by the user. ``label`` is the header's whole
+    and MAT files); elsewhere the role follows from name and unit, or by the user. ``label`` is the header's whole
     text where that is more than the name (``force_n``, ``Time[s]``): a user may choose the column by either.
     """
 
@@ -68,7 +68,7 @@ class Format:
     """A file format: how it is recognised, read and written.
 
     ``title`` is what a person calls it ("NI TDMS file"). ``sniff(path, head)`` says whether the first bytes ``head``
-    are of this format; ``read`` gives the `Sheet`, and whatever it raises is told in one sentence (`FormatError` and
+    are of this format; ``read`` gives the `Sheet`, and whatever it raises becomes one sentence (`FormatError` and
     `InputError` in its own words); ``write`` is None where the format is read only. Formats are ``asked`` in that
     order: 0 has an unmistakable beginning, 9 takes any text. ``is_text`` says that a binary file is none of it.
     """

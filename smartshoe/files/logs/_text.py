@@ -35,7 +35,7 @@ def _is_gb2312(run: bytes) -> bool:
 
 
 def encoding_of(data: bytes) -> tuple[str, str | None]:
-    """The encoding of ``data`` and, where it had to be told from plausibility, a sentence that says so."""
+    """The encoding of ``data`` and, where it was chosen by plausibility, a sentence that says so."""
     for mark, encoding in _BOMS:
         if data.startswith(mark):
             return encoding, None
@@ -81,7 +81,7 @@ def read_lines(path: Path) -> tuple[list[str], list[str]]:
 
 
 def head_lines(head: bytes) -> list[str]:
-    """The whole lines in the first bytes ``head`` of a text file; an encoding that cannot be told yields none."""
+    """The whole lines in the first bytes ``head`` of a text file; an unknown encoding yields none."""
     try:
         encoding, _ = encoding_of(head[: head.rfind(b"\n") + 1] if b"\x00" not in head else head)
         text = head.decode(encoding, errors="replace")

@@ -17,10 +17,10 @@ SHORTEST_S = 1.0
 FEWEST = 20
 BLOCK_S = 0.25
 STILL = 0.002  # of full scale, 1.6 N of 800: a person who stands sways by more
-SETTLED = 0.005  # of full scale over the stretch: what a silicone tube that was just let go still loses
+SETTLED = 0.005  # of full scale over the segment: what a silicone tube that was just let go still loses
 EVEN = 0.03  # of full scale: how far a unit may lie from what all units share; weight is never that even
 COMMON = 0.2  # of the largest full scale: 8 K are 13.5 % of a 200 mbar range, 16 % of what 800 N read in it
-TOLD = 0.05  # of full scale: from there on a common shift is worth a word
+REPORTED = 0.05  # of full scale: from there on a common shift is worth a word
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ def _zero_of(
         says = f"{reading} and sways by {100 * sway / scale:.2g} % of full scale: nobody may stand in the shoe"
     elif moved > max(SETTLED * scale, 4.0 * noise):
         says = f"{reading} and still settles by {100 * moved / scale:.2g} % of full scale: wait half a minute"
-    elif abs(shift) > TOLD * scale:
+    elif abs(shift) > REPORTED * scale:
         verdict = "warning"
         says = f"{reading}, with the others {100 * shift / scale:.2g} % of full scale from zero, as warm air would"
     else:

@@ -120,7 +120,7 @@ def _whole_strides(
 
 
 def _standing(total: Array, rate_hz: float, body_weight_n: float) -> tuple[Array | None, slice, str]:
-    """The stretch in which somebody stands still on the units, in blocks: their means, the span, its length."""
+    """The segment in which somebody stands still on the units, in blocks: their means, the span, its length."""
     from scipy.ndimage import uniform_filter1d
 
     second = max(1, round(rate_hz))

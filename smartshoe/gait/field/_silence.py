@@ -134,7 +134,7 @@ def _saturated(time: Array, values: Array, name: str, high: float | None, rise: 
         return []
     runs = [(a, b) for a, b in _runs(values == top) if b - a + 1 >= RAIL_RUN]
     share = sum(b - a + 1 for a, b in runs) / values.size
-    # One flat top may be chance or a lattice; a rail is met again and again, or for long.
+    # One flat top may be chance or quantisation; a rail is met again and again, or for long.
     if share < RAIL_SHARE or (high is None and len(runs) < CYCLES):
         return []
     says = (

@@ -1,6 +1,6 @@
 """Swings of a foot, from the sum of its units, wherever the zero has gone: flat valleys between stances.
 
-Coarse on purpose: what is needed is a stretch in which the foot is surely off the ground, not the moment of toe off.
+Coarse on purpose: what is needed is a time in which the foot is surely off the ground, not the moment of toe off.
 """
 
 from __future__ import annotations

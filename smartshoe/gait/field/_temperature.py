@@ -90,7 +90,7 @@ def temperature_sensitivity(
     if warm.shape != zeros.shape or warm.ndim != 1 or warm.size < 3:
         raise UsageError("give a temperature and a zero a moment, three moments at least")
     if float(np.ptp(warm)) < 0.5:
-        says = f"the temperature moved by {float(np.ptp(warm)):.2g} K only: what it does to the zero cannot be told"
+        says = f"the temperature moved by {float(np.ptp(warm)):.2g} K only: what it does to the zero is not known"
         return CheckResult("temperature_sensitivity", "unknown", says)
     from scipy.stats import linregress, t
 

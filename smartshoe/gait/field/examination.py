@@ -27,7 +27,7 @@ REST_LONGEST_S = 5.0
 STEPS_ON = 0.05  # of full scale: what a unit moves by when the shoe is stepped into
 BEFORE_S = 0.3  # of the rest is left out before that: a hand on the shoe
 LOADED_NOISES = 50.0  # of a reading's noise: a step moves it by more, a rest never
-DRIFT_TOLD = 0.02  # of full scale
+REPORTED_DRIFT = 0.02  # of full scale
 ZERO_REPEATS = 0.002  # of full scale: how well a sensor's zero repeats from day to day (HDI data sheet: 0.1 % typical)
 WORST: tuple[Verdict, ...] = ("fault", "warning", "unknown", "ok")
 
@@ -232,7 +232,7 @@ def _at_rest(
     expected: Array,
     by_unit: Mapping[str, Calibration],
 ) -> list[CheckResult]:
-    """The zero of the stretch before somebody steps in, where there is one."""
+    """The zero of the time before somebody steps in, where there is one."""
     held = np.column_stack([channel.values for channel in group.values()])  # missing samples repeat the last one
     first = np.median(held[: max(2, int(0.2 / np.median(np.diff(time_s))))], axis=0)
     noise = np.array([white_noise_sd(column) for column in held.T])
@@ -298,7 +298,7 @@ def _in_swing(
         return []
     found = []
     for name, zero_n in zip(names, follower.zero, strict=True):
-        large = abs(zero_n) > DRIFT_TOLD * follower.full_scale
+        large = abs(zero_n) > REPORTED_DRIFT * follower.full_scale
         says = f"{name} shows {zero_n:.2g} N in swing at the end"
         says += ": zero it in swing, or before use" if large else ", as good as nothing"
         found.append(

@@ -162,7 +162,7 @@ def _check_protocols(machine: TestMachine, protocols: dict[str, Protocol], sourc
 def check_simulated(scenario: Scenario, source: ScenarioText) -> None:
     """Open every simulated device of the scenario and check its protocols, and move nothing.
 
-    So a misspelt option is told before the first experiment. Devices that are not simulated are left alone. Raises
+    So a misspelt option is reported before the first experiment. Devices that are not simulated are left alone. Raises
     `ScenarioError`, which points into the scenario.
     """
     protocols = protocols_of(scenario, source)
@@ -207,8 +207,8 @@ def _chosen(recordings: dict[str, Recording], use: tuple[str, ...]) -> tuple[str
 
 def diagnosed_on(recordings: dict[str, Recording], settings: DiagnoseTable) -> list[Recording]:
     """The recordings that a diagnosis is fitted to: those in use, or all that are not held out."""
-    kept = set(settings.hold_out)
-    used = settings.use or tuple(name for name in recordings if name not in kept)
+    held_out = set(settings.hold_out)
+    used = settings.use or tuple(name for name in recordings if name not in held_out)
     return [recordings[name] for name in used if name in recordings]
 
 
@@ -236,7 +236,7 @@ def run(scenario: Scenario, source: ScenarioText, progress: Progress = _silent) 
     """
     settings = scenario.identify
     results: list[UnitResult] = []
-    # Before the fits, so that a trial that cannot be is told at once.
+    # Before the fits, so that a trial that cannot be is refused at once.
     recorded = simulate_trial(scenario, source, progress)
     if recorded is not None:
         calibrated = {unit.name for unit in scenario.unit}

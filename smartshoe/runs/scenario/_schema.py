@@ -163,7 +163,7 @@ class IdentifyTable(_Table):
 
 
 class DiagnoseTable(_Table):
-    """``[diagnose]``: which experiments are diagnosed, and which are kept for judging; no table, no diagnosis."""
+    """``[diagnose]``: which experiments are diagnosed, and which are held out; no table, no diagnosis."""
 
     use: tuple[str, ...] = ()
     hold_out: tuple[str, ...] = ()
@@ -177,7 +177,7 @@ class ValidateTable(_Table):
 
 
 class TrialGaitTable(_Table):
-    """``[trial.gait]``: what the analysis is told of the person and the units."""
+    """``[trial.gait]``: what the analysis is given of the person and the units."""
 
     body_weight_n: PositiveFloat | None = None
     coverage: float = Field(default=1.0, gt=0.0, le=1.0)

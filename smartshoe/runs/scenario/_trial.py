@@ -174,10 +174,10 @@ def analyse_trial(table: TrialTable, recorded: RecordedTrial, calibrations: Sequ
     """Events, strides and forces of the trial by the calibrations; raises what `smartshoe.gait.analyse` raises."""
     from smartshoe.gait import Coverage, analyse
 
-    told = table.gait
-    coverage = Coverage.midfoot(told.coverage) if told.coverage_course == "midfoot" else Coverage(told.coverage)
-    found = analyse([recorded.recording], calibrations, told.body_weight_n, coverage)
-    raw_n = static_forces(recorded.recording, calibrations, told.coverage)
+    given = table.gait
+    coverage = Coverage.midfoot(given.coverage) if given.coverage_course == "midfoot" else Coverage(given.coverage)
+    found = analyse([recorded.recording], calibrations, given.body_weight_n, coverage)
+    raw_n = static_forces(recorded.recording, calibrations, given.coverage)
     truth = recorded.truth
     against = None
     if truth is not None and set(raw_n) == set(truth.feet) == set(found.feet):

@@ -81,8 +81,8 @@ def _with_instrument(channel: Channel, described: ChannelDescription) -> Channel
 
 
 @contextmanager
-def kept_on_disk(what: Path) -> Iterator[None]:
-    """Within the block, a disk that refuses is `InputError` in a sentence: nothing half-written, the rest kept."""
+def writing_to_disk(what: Path) -> Iterator[None]:
+    """Within the block, a disk that refuses is `InputError` in a sentence: nothing half-written, the rest unharmed."""
     try:
         yield
     except (OSError, UsageError) as error:
@@ -181,7 +181,7 @@ class SessionFolder:
     def keep_log(self, log: Recording | Path, name: str, columns: dict[str, Any]) -> None:
         """Keep the machine's log below ``raw/`` (a file as it is, byte by byte) and note it."""
         target = self.path / RAW / f"{name}{log.suffix if isinstance(log, Path) else '.csv'}"
-        with kept_on_disk(target):
+        with writing_to_disk(target):
             if isinstance(log, Path):
                 with replacing(target) as temporary:
                     shutil.copyfile(log, temporary)
@@ -234,7 +234,7 @@ class SessionFolder:
     def _checked(self, said: dict[str, Any]) -> Path:
         path = inside(self.path, str(said["file"]), self.path / JOURNAL)
         if _sha256(path) != said["sha256"]:
-            raise InputError(f"{path} is not the file that the session kept (its sha256 differs): restore it")
+            raise InputError(f"{path} is not the file that the session recorded (its sha256 differs): restore it")
         return path
 
     def accepted(self) -> dict[str, Attempt]:

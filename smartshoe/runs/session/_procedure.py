@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SILENT_S = 30.0
 IDLE_S = 0.05
-TOLD_EVERY_S = 15.0
+REPORT_EVERY_S = 15.0
 REST_OVER_S = 5.0
 AT_REST_SHARE = 1e-4  # of the range, from one stretch to the next
 LOOK_AT_EVERY_S = 2.0  # of the stream, while it runs
@@ -110,12 +110,12 @@ class _Stream:
     def __init__(self, shoe: Shoe, folder: SessionFolder, operator: Operator) -> None:
         self._blocks: Iterator[Block] = shoe.blocks()
         self._shoe, self._folder, self._operator = shoe, folder, operator
-        self._told = 0
+        self._reported = 0
         self.has_ended = False
         self.is_live = False
         self.is_first = not folder.attempts()
         self.time_s: float | None = None
-        self.kept: list[Block] = []
+        self.blocks: list[Block] = []
 
     def next(self, experiment: str, elapsed_s: float) -> Block | None:
         """The next block with samples in it, None where none came (or none will)."""
@@ -128,7 +128,7 @@ class _Stream:
             return None
         self.is_live = self.is_live or block.arrival_s is not None
         self._folder.keep(block)
-        self.kept.append(block)
+        self.blocks.append(block)
         self.time_s = float(block.time_s[-1])
         self._operator.show(block, experiment, elapsed_s)
         return block
@@ -139,8 +139,8 @@ class _Stream:
         return 0.0 if self.time_s is None else self.time_s
 
     def begin(self) -> None:
-        """A pressing begins: what is kept in memory starts anew."""
-        self.kept = []
+        """A pressing begins: what is in memory starts anew."""
+        self.blocks = []
 
     def record(self, experiment: str, duration_s: float) -> None:
         """``duration_s`` of the stream, or what there is of it within `SILENT_S` of silence."""
@@ -160,9 +160,9 @@ class _Stream:
         size = 1.0 if channel.range_ is None else channel.range_[1] - channel.range_[0]
         begin_s, before = self.last_s, np.inf
         while not self.has_ended and self.last_s - begin_s < longest_s:
-            first = len(self.kept)
+            first = len(self.blocks)
             self.record(experiment, REST_OVER_S)
-            blocks = self.kept[first:]
+            blocks = self.blocks[first:]
             readings = [block.readings[:, block.names.index(unit)] for block in blocks]
             if not readings:
                 return
@@ -180,10 +180,10 @@ class _Stream:
 
     def _note_events(self) -> None:
         events = self._shoe.events
-        for event in events[self._told :]:
+        for event in events[self._reported :]:
             self._folder.note("shoe", **event.to_dict())
             self._operator.tell(event.says)
-        self._told = len(events)
+        self._reported = len(events)
 
 
 def _experiment(
@@ -241,7 +241,7 @@ def _press(
             operator.tell(fault.says)
             operator.tell("stop the test on the machine")
             return fault
-    evidence = _evidence(folder, protocol, stream.kept, folder.attempts()[-1].load())
+    evidence = _evidence(folder, protocol, stream.blocks, folder.attempts()[-1].load())
     return first_fault(AT_THE_END, evidence)
 
 
@@ -255,7 +255,7 @@ class _Pressing:
         self._start_s = self._looked_s = stream.last_s
         self._operator = operator
         self._done_s: float | None = None
-        self._began = self._heard = self._told = time.monotonic()
+        self._began = self._heard = self._reported = time.monotonic()
 
     def is_over(self, number: int) -> bool:
         """Record the next block; True once the log is there and the stream covers the test."""
@@ -291,8 +291,8 @@ class _Pressing:
             return
         if waited_s > bound_s:
             raise self._machine.late(waited_s)
-        if time.monotonic() - self._told > TOLD_EVERY_S:
-            self._told = time.monotonic()
+        if time.monotonic() - self._reported > REPORT_EVERY_S:
+            self._reported = time.monotonic()
             self._operator.tell(f"waiting for the machine's log: {self._machine.reason}")
 
     def look(self) -> PressingFault | None:
@@ -301,7 +301,7 @@ class _Pressing:
         if not (self._machine.by_hand and stream.is_live) or stream.last_s - self._looked_s < LOOK_AT_EVERY_S:
             return None
         self._looked_s = stream.last_s
-        return first_fault(AS_IT_GOES, _evidence(self._folder, self._protocol, stream.kept))
+        return first_fault(AS_IT_GOES, _evidence(self._folder, self._protocol, stream.blocks))
 
 
 def _evidence(

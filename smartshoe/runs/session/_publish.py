@@ -11,7 +11,7 @@ from smartshoe.files.logs import write
 from smartshoe.report.calibration import DiagnosisLink, UnitReport, write_page
 from smartshoe.runs.session._analysis import SessionResult
 from smartshoe.runs.session._checks import AT_THE_END
-from smartshoe.runs.session._folder import kept_on_disk
+from smartshoe.runs.session._folder import writing_to_disk
 from smartshoe.version import __version__
 
 if TYPE_CHECKING:
@@ -24,10 +24,10 @@ def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
 
     Returns what to tell of, by what it is.
     """
-    with kept_on_disk(folder):
+    with writing_to_disk(folder):
         unit, written = _write(result, folder)
     entry = _stored(result)
-    with kept_on_disk(folder):
+    with writing_to_disk(folder):
         written["report"] = _write_page(result, folder, unit, entry)
     return written if entry is None else {**written, "stored": entry.path}
 

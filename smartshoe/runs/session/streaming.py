@@ -95,7 +95,7 @@ WIDTH, TIME_WIDTH, CELL_WIDTH = 80, 10, 17  # characters of a line, its time, on
 
 
 class Seconds:
-    """What a stream did since a person was last told: the least and the most of each unit, in N where calibrated.
+    """What a stream did since the last report to a person: the least and the most of each unit, in N where calibrated.
 
     A walking foot's one value at an instant says nothing; how far it was unloaded and loaded within a second does.
     """
@@ -118,7 +118,7 @@ class Seconds:
                 self._low[name] = min(self._low.get(name, np.inf), float(values.min()))
                 self._high[name] = max(self._high.get(name, -np.inf), float(values.max()))
 
-    def told(self, time_s: float) -> str:
+    def report(self, time_s: float) -> str:
         """The line (two where there are many units) at ``time_s``; from then on it counts anew."""
         cells = [
             f"{self._low[name]:.1f} to {self._high[name]:.1f}" if name in self._low else "–" for name in self._symbols

@@ -83,13 +83,13 @@ def shown_figures(result: StudyResult) -> list[str]:
 
 def careful(result: StudyResult) -> list[tuple[str, str]]:
     """What to be careful with, each sentence once, with the trials that it is said of."""
-    told: dict[str, list[str]] = {}
+    by_flag: dict[str, list[str]] = {}
     for trial in result.trials:
         for flag in trial.flags:
-            files = told.setdefault(str(flag["says"]), [])
+            files = by_flag.setdefault(str(flag["says"]), [])
             if trial.entry.file not in files:
                 files.append(trial.entry.file)
-    return [(_some(files, len(result.trials)), says) for says, files in told.items()]
+    return [(_some(files, len(result.trials)), says) for says, files in by_flag.items()]
 
 
 def _some(files: list[str], of: int) -> str:
@@ -105,14 +105,14 @@ def headline(result: StudyResult) -> str:
     if len(result.conditions) < 2:
         return "one condition only: there is nothing to compare, and its figures stand below"
     if not result.differences:
-        return "no subject did two conditions: differences within subjects cannot be told"
+        return "no subject did two conditions: differences within subjects cannot be estimated"
     if not clear:
         return "no figure differs clearly between conditions (each interval holds zero, or there is none)"
-    told = []
+    sentences = []
     for each in clear[:3]:
         sign = "+" if each.change.mean > 0 else ""
-        told.append(f"{SHOWN[each.figure]} {sign}{plain(each.change.mean, 2)} from {each.start} to {each.end}")
-    return "; ".join(told) + (f"; {len(clear) - 3} more" if len(clear) > 3 else "")
+        sentences.append(f"{SHOWN[each.figure]} {sign}{plain(each.change.mean, 2)} from {each.start} to {each.end}")
+    return "; ".join(sentences) + (f"; {len(clear) - 3} more" if len(clear) > 3 else "")
 
 
 def is_clear(mean: Mean) -> bool:

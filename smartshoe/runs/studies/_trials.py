@@ -115,7 +115,7 @@ def calibrations_for(recording: Recording, place: Path | None, entry: TrialEntry
 
 
 def flat_figures(found: GaitResult) -> dict[str, float]:
-    """The summary's figures by name: what is told of each foot as the mean of both, and by foot (``NAME.left``).
+    """The summary's figures by name: what is known of each foot as the mean of both, and by foot (``NAME.left``).
 
     Forces also in percent of body weight, so that subjects compare.
     """

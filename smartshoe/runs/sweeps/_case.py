@@ -47,7 +47,7 @@ def computed(case: Case) -> str:
             f"case {case.name} could not be computed here ({type(error).__name__}: {error}): mend that, and the same"
             " command goes on"
         ) from error
-    except Exception as error:  # one case's fault must not cost the others: it is told with its name
+    except Exception as error:  # one case's fault must not cost the others: it is reported with its name
         said = f"{type(error).__name__}: {_sentence(error, case)} (a fault of smartshoe's: please report it)"
         outcome = {"status": "failed", "says": said, "figures": {}}
     return json_text(

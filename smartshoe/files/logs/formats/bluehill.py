@@ -1,7 +1,7 @@
 """Bluehill raw-data CSV of Instron's testing machines, in the dialects that its locales and versions write.
 
 Up to 24 and more lines ``Section : name;value;unit``, a row of names in any language, below it a row of units in
-brackets, then numbers. The unit row is what the format is recognised by; the columns are told by their units.
+brackets, then numbers. The unit row is what the format is recognised by; the columns are recognised by their units.
 """
 
 from __future__ import annotations

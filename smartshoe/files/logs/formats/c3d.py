@@ -68,10 +68,10 @@ def _events(parameters: Any) -> dict[str, str]:
     if times.ndim != 2 or times.shape[0] < 2:
         return {}
     sides, labels = (_texts(group, key, times.shape[1]) for key in ("CONTEXTS", "LABELS"))
-    kept: dict[str, list[float]] = {}
+    events: dict[str, list[float]] = {}
     for side, label, (minutes, seconds) in zip(sides, labels, times[:2].T, strict=True):
-        kept.setdefault(f"events {side} {label}".strip(), []).append(MINUTE_S * minutes + seconds)
-    return {key: " ".join(f"{time_s:g}" for time_s in sorted(each)) for key, each in kept.items()}
+        events.setdefault(f"events {side} {label}".strip(), []).append(MINUTE_S * minutes + seconds)
+    return {key: " ".join(f"{time_s:g}" for time_s in sorted(each)) for key, each in events.items()}
 
 
 FORMAT = Format("c3d", "C3D file", (".c3d",), _sniff, read, asked=0)

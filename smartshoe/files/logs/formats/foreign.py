@@ -138,7 +138,7 @@ def read(path: Path) -> Sheet:
     if not rows:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
 
-    kept, clocks = [], {}
+    used, clocks = [], {}
     for index in range(width):
         column = [row[index] for row in rows]
         if is_moment(column[0]) and not is_number(column[0]):
@@ -147,13 +147,13 @@ def read(path: Path) -> Sheet:
             )
             said.setdefault(f"start of {names[index]}", column[0])
         elif any(map(is_number, column)) or all(map(is_missing, column)):
-            kept.append(index)
+            used.append(index)
         else:
             notes.append(f"Column {names[index]} holds text and was left out.")
-    if len(kept) < width:
-        rows = [[row[index] for index in kept] for row in rows]
-    table = numbers_of(path, [names[index] for index in kept], rows, numbers)
-    read_ = dict(zip(kept, table.columns, strict=True))
+    if len(used) < width:
+        rows = [[row[index] for index in used] for row in rows]
+    table = numbers_of(path, [names[index] for index in used], rows, numbers)
+    read_ = dict(zip(used, table.columns, strict=True))
     columns = [
         clocks.get(index) or Column(names[index], units[index], read_[index], label=labels[index])
         for index in range(width)

@@ -74,7 +74,7 @@ def read(path: Path) -> Sheet:
 def _even(time_s: Array) -> Array:
     """Times (n,) without the steps of 0 and 2 that the program's rounding leaves in an even row of them.
 
-    As they are where a sample is further off than that: then the row is not even, and its times are told as they stand.
+    As they are where a sample is further off than that: then the row is not even, and its times stay as they are.
     """
     step_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
     even = time_s[0] + step_s * np.arange(time_s.size)

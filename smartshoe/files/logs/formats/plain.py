@@ -148,14 +148,14 @@ def _read_slowly(path: Path, header: list[str], header_line: int) -> tuple[Array
                 f"{path}, line {number} has {len(row)} cells where the header names {len(header)} columns: mend or"
                 " remove that line"
             )
-    kept = [
+    used = [
         index
         for index, name in enumerate(header)
         if name == "time_s" or not is_moment(next((row[index] for row in rows if not is_missing(row[index])), ""))
     ]
-    names = [header[index] for index in kept]
-    cells = [[row[index] for index in kept] for row in rows] if len(kept) < len(header) else rows
-    return np.column_stack(numbers_of(path, names, cells, numbers).columns), kept
+    names = [header[index] for index in used]
+    cells = [[row[index] for index in used] for row in rows] if len(used) < len(header) else rows
+    return np.column_stack(numbers_of(path, names, cells, numbers).columns), used
 
 
 def read(path: Path) -> Sheet:
@@ -171,10 +171,10 @@ def read(path: Path) -> Sheet:
     values = _read_fast(path, header, header_line) if fits else None
     notes = []
     if values is None or commas != values.shape[0] * (len(header) - 1):
-        values, kept = _read_slowly(path, header, header_line)
-        left_out = [name for index, name in enumerate(header) if index not in kept]
+        values, used = _read_slowly(path, header, header_line)
+        left_out = [name for index, name in enumerate(header) if index not in used]
         if left_out:
-            header = [header[index] for index in kept]
+            header = [header[index] for index in used]
             notes = [f"time_s is the time: {', '.join(left_out)}, dates or times of day, left out"]
     if values.shape[0] == 0:
         raise InputError(f"{path} holds a header and no data rows: give a file with samples")
@@ -221,10 +221,10 @@ def write(recording: Recording, path: Path) -> None:
     channels = list(recording.channels.values())
     # The reader tells roles from the names as they will stand in the header.
     split = [split_column(column_name(channel)) for channel in channels]
-    told = roles_of([name for name, _ in split], [unit for _, unit in split])
+    roles = roles_of([name for name, _ in split], [unit for _, unit in split])
     lines += [
         (f"role {column_name(channel)}", channel.role)
-        for channel, role in zip(channels, told, strict=True)
+        for channel, role in zip(channels, roles, strict=True)
         if channel.role != role
     ]
     lines += [("note", note) for note in recording.notes]
