@@ -88,14 +88,14 @@ class ForceFilter(ABC):
             start = int(np.argmax(finite))
             self._last = float(block[start])
             self._begin(self._last)
-        readings = block[start:]
-        if not readings.size:
+        values = block[start:]
+        if not values.size:
             return force_n
         if not finite[start:].all():
-            index = np.where(finite[start:], np.arange(readings.size), -1)
+            index = np.where(finite[start:], np.arange(values.size), -1)
             np.maximum.accumulate(index, out=index)
-            readings = np.where(index >= 0, readings[index], self._last)
-        self._last = float(readings[-1])
+            values = np.where(index >= 0, values[index], self._last)
+        self._last = float(values[-1])
         # One code path for floats and blocks, so that any chunking gives the same bits.
-        force_n[start:] = self._advance(readings, count + start)
+        force_n[start:] = self._advance(values, count + start)
         return force_n

@@ -20,7 +20,7 @@ LEAST_RELAXING, MOST_RELAXING = -0.9, 5.0
 def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     """The best standard linear solid over a grid of poles, linear in the rest, so that no local optimum is taken.
 
-    Either sign of what relaxes is allowed: a baseline that is kept from following the data leaves structure that no
+    Either sign of what relaxes is allowed: a baseline that may not follow the data leaves structure that no
     effect made.
     """
     fitted = [session for session in sessions if session.fitted.any()]
@@ -55,7 +55,7 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
 
 
 def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
-    """``signal`` (n,) through a first-order lag, the first value having lasted for ever."""
+    """``signal`` (n,) through a first-order lag, started in steady state."""
     keep = float(np.exp(-step_s / tau_s))
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=np.array([keep * signal[0]]))[0])
 

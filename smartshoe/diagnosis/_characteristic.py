@@ -1,4 +1,4 @@
-"""The static characteristic, reading over load, without any model: what can be told where no model of a unit holds."""
+"""The static characteristic, reading over load, without any model: what is known where no model of a unit holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference load without its noise, corners kept.
+"""The reference load without its noise, corners unchanged.
 
 Noise on the load imitates physics: a simulation that smooths it (a lag), or that keeps it out of rests (a dead band),
 fits better for no reason of the unit's. A testing machine's load is straight lines with corners; so each sample is
@@ -23,7 +23,7 @@ def noise_sd(signal: Array) -> float:
     """White noise's standard deviation from third differences, which no ramp or bend reaches.
 
     The median finds the scale, the mean square of what lies within `CLIPPED` of it the value: on a converter's
-    lattice a median is a whole number of steps.
+    quantisation grid a median is a whole number of steps.
     """
     if signal.size < 10:
         return 0.0

@@ -143,7 +143,7 @@ class Evidence:
         return np.asarray(found / size) if size > 0 else np.ones(len(columns)) / math.sqrt(len(columns))
 
     def posterior(self, members: Members) -> Posterior:
-        """The evidence of the set ``members`` (numbers of candidates); kept once computed."""
+        """The evidence of the set ``members`` (numbers of candidates); cached."""
         members = tuple(sorted(members))
         if members not in self._seen:
             # How far an equation departs goes with its size, which is first found as if it were exact.

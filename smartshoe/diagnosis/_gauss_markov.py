@@ -1,6 +1,6 @@
 """Whether what is left over is nothing but noise that remembers: stationary, Gaussian, first-order, deaf to the load.
 
-Slow noise does not average out within a block of seconds, so that it looks like structure. It is told from structure by
+Slow noise does not average out within a block of seconds, so that it looks like structure. It differs from structure by
 what it must be. White and first-order noise together are an autoregressive moving average of order one (Granger and
 Morris 1976), and what it leaves when it predicts the next sample, the innovations, is
 

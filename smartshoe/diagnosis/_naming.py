@@ -1,4 +1,4 @@
-"""From members of a model to names: how sure each is, what cannot be told from it, and which of them are causes."""
+"""From members of a model to names: how sure each is, what is equivalent to it, and which of them are causes."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ FLOOR = 1e-9
 
 
 def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
-    """Standard deviation of the white noise that tells as much as ``residuals`` (n,) each, where ``kept``, tell.
+    """Standard deviation of the white noise that is worth as much as ``residuals`` (n,) each, where ``kept``, are.
 
     Least squares is the best predictor where what is left is an error of the model; its samples say the same thing
     again for as long as they are correlated, and so count only once each correlation time beside a prior

@@ -31,7 +31,7 @@ def noise_kinds(
     """What the residual at the full rate shows, for recordings in which no fault of the data would imitate it.
 
     Where structure is left that no effect has ``explained``, it would be taken for coloured noise. Where no load cycle
-    repeats, the ``memory`` of what is left tells of it. Nothing weaker than ``material`` (share of full scale) is told.
+    repeats, the ``memory`` of what is left tells of it. Nothing weaker than ``material`` (share of full scale) counts.
     """
     found = []
     for session in fine:

@@ -43,7 +43,7 @@ def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tupl
 
 
 def _scaled(unit: str, scale: Scale, gain: float) -> tuple[float, str]:
-    """Factor and unit in which a share of full scale is told; the chain's shares come out ``gain`` times as large."""
+    """Factor and unit in which a share of full scale is given; the chain's shares come out ``gain`` times as large."""
     factor = 1.0
     if "FS_reading" in unit:
         factor, unit = factor * gain * abs(scale.reading), unit.replace("FS_reading", scale.unit.symbol)

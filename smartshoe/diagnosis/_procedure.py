@@ -58,7 +58,7 @@ def diagnose(
         Load and reading of one unit (recordings, paths or DataFrames), each a session of its own unless its metadata
         ``continues`` names another.
     hold_out
-        Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is kept.
+        Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is.
     material
         Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given.
     thresholds
@@ -122,7 +122,7 @@ def _refused(
 
 
 def _seen(recording: Recording) -> str | None:
-    """What can be told of a recording without a model."""
+    """What is known of a recording without a model."""
     decay = decay_of(recording)
     return decay.says if decay is not None else characteristic_of(recording)
 

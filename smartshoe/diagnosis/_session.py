@@ -59,7 +59,7 @@ class Session:
     """One recording on an even grid, in shares of full scale (`smartshoe.models.effects.Conditions`).
 
     ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
-    kept from every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
+    left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
     """
 
@@ -261,7 +261,7 @@ def kernel(factor: int) -> Array:
 
 
 def smoothed(signal: Array, weights: Array, factor: int) -> Array:
-    """(m,) ``signal`` (n,) averaged and thinned; the ends are mirrored through their end points, slope kept."""
+    """(m,) ``signal`` (n,) averaged and thinned; the ends are mirrored through their end points, slope unchanged."""
     half = weights.size // 2
     if not half:
         return np.array(signal[::factor], dtype=float)

@@ -98,7 +98,7 @@ class _EvenRun:
         self.number, self.start_s, self.rate_hz = number, start_s, rate_hz
         self.last_s = start_s
         self._next = 0  # place of the next even row
-        self._next = 0  # place of the next row to be handed on
+        self._handed_on = 0  # rows so far
         self._end: tuple[Array, Mask] | None = None  # the last row that came
         self._values: list[Array] = []
         self._missing: list[Mask] = []
@@ -141,9 +141,9 @@ class _EvenRun:
                 seen = self._bridged(seen, gone)
             part = seen[:size]
             is_last = at_end and values.shape[0] <= size
-            yield Piece(self.number, self.start_s, self._next, part, gone[:size], is_last)
+            yield Piece(self.number, self.start_s, self._handed_on, part, gone[:size], is_last)
             self._anchor = part[-1]
-            self._next += part.shape[0]
+            self._handed_on += part.shape[0]
             values, missing = values[size:], missing[size:]
         self._values, self._missing = [values], [missing]
 

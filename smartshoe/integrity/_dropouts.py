@@ -1,7 +1,7 @@
 """Dropouts: the reading falls to the unloaded value, or to nothing, while the load stays.
 
 What is lost is the whole reading: it falls to one level, from whatever load. A reading that falls by one amount from
-whatever load (a level that switches), or that falls and wanders back (a draught over a sensor), has not dropped out.
+whatever load (a level that switches), or that falls and drifts back (a draught over a sensor), has not dropped out.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
 
 GONE = 0.25  # of the expected reading at most is left
-LEAST_EXPECTED = 0.03  # of the span: below, a dropout cannot be told from rest
+LEAST_EXPECTED = 0.03  # of the span: below, a dropout cannot be distinguished from rest
 EDGE, BESIDE = 0.5, 5
 LET_GO = 0.3  # of the span
 BELOW_REST = 0.05  # of the span
 MOST_PASSES = 10  # two are usual; each finds less, since fewer are left
 LEVEL = 0.01  # of the span: within which dropouts end at one level
 CLEAR = 6.5  # standard deviations of noise, as of spikes
-STANDS = 0.005  # of the span: how far a level may wander within a dropout
+STANDS = 0.005  # of the span: how far a level may drift within a dropout
 AT_LEVEL = 0.8  # of the samples: edges may be caught halfway
 COMMON, MOST_COMMON = 0.02, 20  # share of the samples, and how many such values
 FEWEST = 3  # falls of two samples at most

@@ -1,4 +1,4 @@
-"""Held samples: a value repeated exactly where neither lattice, nor rest, nor a rail would repeat it."""
+"""Held samples: a value repeated exactly where neither grid, nor rest, nor a rail would repeat it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NEIGHBOURS = 40
 BESIDE, STILL = 14, 3
 CAUGHT = 0.4  # of the slope on either side, that a held run's mean slope up to the next value has at least
 LONG = 8  # repeats; from there on the slopes on both sides say little of what lies between
-SMALLEST_WIDTH = 0.15  # of the lattice step: what noise is taken for at least, where motion is judged
+SMALLEST_WIDTH = 0.15  # of the grid step: what noise is taken for at least, where motion is judged
 
 
 def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
@@ -42,7 +42,7 @@ def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
 def held(view: View, bad: Mask) -> Mask:
     """(m,) readings that repeat the last one although noise or motion must have changed it; none that is ``bad``.
 
-    The chance of an honest run is at most that of noise staying within one lattice step, however the step lies,
+    The chance of an honest run is at most that of noise staying within one grid step, however the step lies,
     while the signal moves on by d a sample. d is the least of three slopes: before the run, after it, and from its
     value to the next over its whole length, which a held run catches up with and a dead band or a friction does not.
     """
@@ -73,7 +73,7 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     reading = view.reading
     y = reading.values
     repeats = stops - starts
-    # Where no lattice was told the smallest gap between readings is an upper bound of its step.
+    # Where no grid is known the smallest gap between readings is an upper bound of its step.
     step = max(reading.step or reading.least_gap, FLOAT_STEP * view.span)
     least = np.minimum(_noise_beside(y, starts, stops), view.noise_at_load[starts])
     # A rail repeats without being held. Between two levels an undithered signal toggles, which looks like half a step
@@ -156,7 +156,7 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     caught = (y[after_first] - y[starts]) / (repeats + 1)
     agree = (np.sign(before) == np.sign(caught)) & (np.sign(after) == np.sign(caught))
     least = np.minimum(np.minimum(np.abs(before), np.abs(after)), np.abs(caught))
-    # What a friction or a dead band has kept is not caught up with.
+    # What a friction or a dead band has held back is not caught up with.
     kept = np.abs(caught) < CAUGHT * np.minimum(np.abs(before), np.abs(after))
     jump, onward = y[after_first] - y[stops], y[np.minimum(stops + 2, m - 1)] - y[after_first]
     kept |= (repeats >= LONG) & (np.abs(jump) < 2.5 * np.abs(onward))
@@ -173,7 +173,7 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     plain = (np.abs(view.load.values[b] - view.load.values[a]) - 5.0 * view.load.quiet_noise - view.load.step) / span
     moved = np.maximum(np.where(repeats > 2 * view.near, steady, plain), 0.0)
     least = np.where(repeats >= LONG, np.minimum(least, 2.0 * view.gain * moved), least)
-    # A slope between two lattice values is uncertain by a step.
+    # A slope between two grid values is uncertain by a step.
     out: Array = np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
     return out
 

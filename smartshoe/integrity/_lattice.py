@@ -1,4 +1,4 @@
-"""Quantisation: a lattice of values that is coarse beside the signal and beside its noise."""
+"""Quantisation: a grid of values that is coarse beside the signal and beside its noise."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
 
-# A lattice of step q adds an error of q/sqrt(12). It is a fault where that is at least 0.03 % of the reading's span
+# A grid of step q adds an error of q/sqrt(12). It is a fault where that is at least 0.03 % of the reading's span
 # (beside a diagnosis's materiality of 0.02 %) and at least a quarter of the noise that is there without it: below, the
-# noise dithers the lattice and hides it.
+# noise dithers the grid and hides it.
 MATERIAL_SHARE = 0.0003
 BESIDE_NOISE = 0.25
 LEAST_RUNS = 10

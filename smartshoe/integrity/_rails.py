@@ -12,7 +12,7 @@ from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
 
 LEAST_TIES = 5
-MOST_TIES = 10  # times as many: levels of a lattice at a peak differ by a few times
+MOST_TIES = 10  # times as many: levels of a grid at a peak differ by a few times
 LEAST_RUN = 3
 NOISY_RUN = 8  # ties in a row at which noise does not come to rest by chance
 FEW_BEYOND = 0.01  # of all samples: spikes may lie beyond the rail
@@ -78,11 +78,11 @@ def _rail(view: View, bad: Mask, inward: float) -> float | None:
     tied = np.flatnonzero(count >= LEAST_TIES)
     if tied.size == 0 or count[: tied[0]].sum() > FEW_BEYOND * count.sum():
         return None
-    # On a lattice the converter's noise ties beyond the rail too, but nowhere as often as at it.
+    # On a grid the converter's noise ties beyond the rail too, but nowhere as often as at it.
     outer = count[: 1 + int(np.searchsorted(np.cumsum(count), FEW_BEYOND * count.sum()))]
     most = int(np.argmax(outer))
     at = most if outer[most] > MOST_TIES * count[tied[0]] else int(tied[0])
-    # A rail cuts noise off: where readings lie just beyond, those that tie are held or lie on a lattice.
+    # A rail cuts noise off: where readings lie just beyond, those that tie are held or lie on a grid.
     beyond = np.abs(levels[:at] - levels[at]) <= NOISES * view.reading.quiet_noise
     return float(levels[at]) if count[:at][beyond].sum() <= FEW_JUST_BEYOND * count[at] else None
 

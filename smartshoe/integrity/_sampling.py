@@ -18,7 +18,7 @@ SMALL_SHARE = 0.001
 
 
 def short_recording(recording: Recording) -> Iterator[Finding]:
-    """Kind ``short_recording``: fatal, since nothing can be told from so little."""
+    """Kind ``short_recording``: fatal, since so little shows nothing."""
     if len(recording) >= LEAST_SAMPLES and recording.duration_s >= LEAST_DURATION_S:
         return
     says = (

@@ -1,4 +1,4 @@
-"""Scales that faults do not move: local noise, lattice step, corners. All are medians of something."""
+"""Scales that faults do not move: local noise, grid step, corners. All are medians of something."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def local_scale(deviation: Array, step: float = 0.0, block: int = BLOCK) -> Arra
     """(n,) root mean square of ``deviation`` near each sample, large ones cut short: largest of three blocks.
 
     The largest, so that the sample at the foot of a noisy stretch is judged by that stretch. What is beyond three
-    medians and one lattice ``step`` counts as that much.
+    medians and one grid ``step`` counts as that much.
     """
     n = deviation.size
     if n == 0:
@@ -90,10 +90,10 @@ def own_corner(values: Array, near: int) -> Array:
 
 
 def lattice_step(levels: Array, count: Index) -> float:
-    """The step of the lattice on which values lie; 0 where there is none that can be told.
+    """The step of the grid on which values lie; 0 where there is none that can be found.
 
     ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left
-    out where most occur often: a spike need not lie on the lattice.
+    out where most occur often: a spike need not lie on the grid.
     """
     often = count > 1
     if often.sum() >= 3 and count[often].sum() > 0.7 * count.sum():
@@ -104,7 +104,7 @@ def lattice_step(levels: Array, count: Index) -> float:
     gaps = gaps[gaps > 1e-9 * np.max(np.abs(levels))]  # two readings of one level that differ by rounding
     if gaps.size < 2:
         return 0.0
-    # One step is a gap that occurs often, and the largest of which the others are multiples; values off the lattice
+    # One step is a gap that occurs often, and the largest of which the others are multiples; values off the grid
     # have made some gaps what they are.
     place, number = np.unique(np.rint(np.log(gaps) / SAME_GAP).astype(np.int64), return_counts=True)
     often_enough = number >= min(OFTEN, int(number.max()))

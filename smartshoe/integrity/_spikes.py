@@ -18,7 +18,7 @@ from smartshoe.integrity._view import Signal, View
 from smartshoe.signals.masks import runs_of
 
 NOISES = 6.5  # the largest of 1e6 normal deviates reaches 5.1 of this scale
-STEPS = 2.0  # of a lattice
+STEPS = 2.0  # of a grid
 CORNERS = 4.0  # of what the other channel's corner explains
 LEAST_SHARE = 0.0005  # of the span
 BESIDE = 6  # samples on either side, that a line is laid through: as many as a corner's echo leaves straight
@@ -29,7 +29,7 @@ AS_LARGE = 0.5  # of the spikes' usual size
 
 
 def isolated(signal: Signal, corner: Array, scale: float, span: float, near: int, jitter: Array | float = 0.0) -> Mask:
-    """(m,) samples off their five-point median by more than noise, lattice, own corners and the other channel's.
+    """(m,) samples off their five-point median by more than noise, grid, own corners and the other channel's.
 
     ``corner`` (m,) is the other channel's `View.load_corner`; ``scale`` turns its unit into this signal's. ``jitter``
     is what an error of the sampling time may bring in. The foot of a ramp leaves its median alone; the tip of a

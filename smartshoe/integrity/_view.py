@@ -26,7 +26,7 @@ LEAST_NOISE = 1e-4  # of the range: less is arithmetic
 STEEP, FLAT, FEWEST = 0.5, 0.05, 50  # of a steep slope; samples
 JITTERY = 3.0  # times: a second difference holds a ramp's corners too, which do not treble a median
 JITTERS = 5.0  # standard deviations
-DITHERED = 0.7  # of a lattice step: less noise than this may be the toggling between two levels
+DITHERED = 0.7  # of a grid step: less noise than this may be the toggling between two levels
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +43,18 @@ class Signal:
 
     @cached_property
     def step(self) -> float:
-        """The lattice's step, 0 where there is none."""
+        """The grid's step, 0 where there is none."""
         return lattice_step(*self.levels)
 
     @cached_property
     def least_gap(self) -> float:
-        """The smallest difference between two values that differ: no lattice's step is larger."""
+        """The smallest difference between two values that differ: no grid's step is larger."""
         gaps = np.diff(self.levels[0])
         return float(gaps.min()) if gaps.size else 0.0
 
     @cached_property
     def is_noisy(self) -> bool:
-        """Whether second differences change sign more often than not: noise above one lattice step, not curvature."""
+        """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
         second = np.diff(self.values, 2)
         product = second[1:] * second[:-1]
         least = max(DITHERED * self.step, LEAST_NOISE * float(np.ptp(self.values)))
@@ -209,7 +209,7 @@ class View:
 
     @cached_property
     def jump(self) -> Array:
-        """(m - 1,) increments of the reading beyond what load, local slope, noise and lattice explain; signed, else 0.
+        """(m - 1,) increments of the reading beyond what load, local slope, noise and grid explain; signed, else 0.
 
         Increments over gaps of time count as explained.
         """

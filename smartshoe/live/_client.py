@@ -36,23 +36,23 @@ class Client:
         return self._desk.hello(self.view)
 
     def news(self) -> list[str]:
-        """What is no picture and was not told yet, as JSON."""
-        told: list[str] = []
+        """What is no picture and was not sent yet, as JSON."""
+        messages: list[str] = []
         while self.answers:
-            told.append(json.dumps(self.answers.popleft(), allow_nan=False))
+            messages.append(json.dumps(self.answers.popleft(), allow_nan=False))
         notes, steps = self._session.news(self._noted, self._stepped)
         if notes or steps:
             self._noted, self._stepped = self._session.noted, self._session.stepped
-            told.append(json.dumps({"type": "news", "notes": notes, "steps": steps}, allow_nan=False))
+            messages.append(json.dumps({"type": "news", "notes": notes, "steps": steps}, allow_nan=False))
         task = self._session.task
         if task is not None and task.version != self._tasked:
             self._tasked = task.version
-            told.append(json.dumps(task.to_dict(), allow_nan=False))
+            messages.append(json.dumps(task.to_dict(), allow_nan=False))
         state = self._desk.state()
         if state is not self._state:
             self._state = state
-            told.append(state)
-        return told
+            messages.append(state)
+        return messages
 
     def frame(self) -> bytes | None:
         """The next picture; None while the page is paused."""

@@ -1,4 +1,4 @@
-"""What all pages share: reductions of the traces, the checks, the state that is told twice a second."""
+"""What all pages share: reductions of the traces, the checks, the state that is sent twice a second."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Desk:
         """Each shoe's traces in ``view``; those of views that no page has any more are let go."""
         if view not in self._reductions:
             wanted = {client.view for client in self.clients} | {view}
-            self._reductions = {each: kept for each, kept in self._reductions.items() if each in wanted}
+            self._reductions = {each: reduction for each, reduction in self._reductions.items() if each in wanted}
             self._reductions[view] = [Reduction(live, view) for live in self.session.shoes]
         return self._reductions[view]
 

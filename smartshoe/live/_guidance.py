@@ -12,7 +12,7 @@ PROGRESS_STEP_S = 0.2
 class Guidance:
     """The sentence that stands, how far the pressing is, and an answer where one is waited for; for any thread.
 
-    ``version`` rises with each change that a page is to be told.
+    ``version`` rises with each change that a page is to show.
     """
 
     def __init__(self) -> None:

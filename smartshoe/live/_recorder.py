@@ -54,8 +54,8 @@ def table_paths(path: Path, sides: Sequence[str]) -> list[Path]:
     """A file for each shoe: ``path`` itself for one, with the side (or a number) in its name for several."""
     if len(sides) == 1:
         return [path]
-    told = sides if all(sides) and len(set(sides)) == len(sides) else [str(k + 1) for k in range(len(sides))]
-    return [path.with_name(f"{path.stem}_{side}{path.suffix}") for side in told]
+    names = sides if all(sides) and len(set(sides)) == len(sides) else [str(k + 1) for k in range(len(sides))]
+    return [path.with_name(f"{path.stem}_{side}{path.suffix}") for side in names]
 
 
 def journal_path(path: Path) -> Path:

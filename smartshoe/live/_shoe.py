@@ -146,7 +146,7 @@ class LiveShoe:
         if self._first_s is None:
             self._first_s = float(block.time_s[0])
         if self._reference_s is None or device_s - self._first_s < REFERENCE_S:
-            # The first line is rough: where it began is told better by a later one.
+            # The first line is rough: a later one says better where it began.
             self._reference_s = float(clock.host_time(self._first_s - shift_s)) - self._first_s
         self._offset_s = host_s - device_s - self._reference_s
 

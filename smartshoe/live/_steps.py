@@ -17,7 +17,7 @@ from smartshoe.gait.phases import FLAT, HEEL, PUSH, SWING
 
 ON, OFF = 0.08, 0.05  # of the rise: the foot bears above, has left below
 UNIT_ON, UNIT_OFF = 0.12, 0.06  # of the unit's own rise
-LEAST_UNIT = 0.03  # of the foot's rise: what a unit that bears next to nothing may wander by
+LEAST_UNIT = 0.03  # of the foot's rise: what a unit that bears next to nothing may drift by
 FOLLOW_S = 0.5  # how fast the floor follows what the unloaded foot reads
 FORGET_S = 60.0  # how fast the highest load is forgotten
 APART_S = 0.05

@@ -25,7 +25,7 @@ class _AnsweredError(Exception):
 
 
 class PageOperator:
-    """What ``other`` is told and shown, a page is as well; who ``asks`` takes the answer that comes first.
+    """What ``other`` is asked and shown, a page is as well; who ``asks`` takes the answer that comes first.
 
     ``keyboard`` says that ``other`` waits for a person too. The page is there from the first sample on: ``ready`` is
     called with its address. Use it in a with block.

@@ -63,7 +63,7 @@ class Chart:
 
     ``says`` tells in words what is to be seen: it is the text for those who do not see it. Charts of one ``group``
     share cursor and zoom. ``dates``: x is in seconds since 1970.
-    ``window`` is what is seen of x at first, all where it is None; its samples are kept whole where they fit.
+    ``window`` is what is seen of x at first, all where it is None; its samples stay whole where they fit.
     ``weight`` is the chart's part of the page's numbers, where the others have 1.
     """
 

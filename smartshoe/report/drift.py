@@ -60,7 +60,7 @@ def _chart(drift: Drift, trend: Trend) -> Chart:
 
 
 def newtons_a_year(drift: Drift) -> dict[str, tuple[float, float, float]]:
-    """What gain and zero moved in newtons a year, with the 95 % interval; where the slope is told."""
+    """What gain and zero moved in newtons a year, with the 95 % interval; where the slope is known."""
     gain = drift.trends.get(STATIC_GAIN)
     if gain is None:
         return {}

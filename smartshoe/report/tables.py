@@ -21,8 +21,8 @@ def new_console() -> Console:
     console = Console(highlight=False, markup=False)
     if console.is_terminal:
         return console
-    told = os.environ.get("COLUMNS", "")
-    width = int(told) if told.isdigit() and int(told) >= NARROWEST else USUAL
+    given = os.environ.get("COLUMNS", "")
+    width = int(given) if given.isdigit() and int(given) >= NARROWEST else USUAL
     return Console(highlight=False, markup=False, width=width)
 
 

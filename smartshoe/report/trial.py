@@ -103,14 +103,14 @@ def notes(result: Mapping[str, Any]) -> list[str]:
             f" {order['observed']['meta4_before_meta1_percent']:.1f} % as observed."
         )
     if against is not None:
-        told = [
+        by_kind = [
             f"{kind.replace('_', ' ')} {errors['median_ms']:.1f} ms ({errors['p95_ms']:.1f} ms)"
             + (f", {errors['missed']} missed, {errors['false']} false" if errors["missed"] + errors["false"] else "")
             for kind, errors in against["events"].items()
             if errors["median_ms"] is not None and errors["true"] > 9
         ]
-        if told:
-            said.append(f"Events, median error (95th percentile): {'; '.join(told)}.")
+        if by_kind:
+            said.append(f"Events, median error (95th percentile): {'; '.join(by_kind)}.")
     said += [f"{flag['kind'].replace('_', ' ')}: {flag['says']}." for flag in result["gait"]["flags"]]
     return said
 

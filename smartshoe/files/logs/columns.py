@@ -63,12 +63,12 @@ def roles_of(names: Sequence[str], units: Sequence[Unit | None]) -> list[Role]:
 
 
 def _rename(
-    names: list[str], roles: Sequence[Role], units: Sequence[Unit], declared: Sequence[bool], has_header: bool
+    names: list[str], roles: Sequence[Role], units: Sequence[Unit], is_declared: Sequence[bool], has_header: bool
 ) -> None:
-    """Give load, command and a single pressure the plain table's names; those that the file has ``declared`` stay."""
+    """Give load, command and a single pressure the plain table's names; a name ``is_declared`` by the file stays."""
     sensors = [i for i, role in enumerate(roles) if role == "sensor"]
     for index, role in enumerate(roles):
-        if declared[index]:
+        if is_declared[index]:
             continue
         wanted = {"load": LOAD_NAME, "command": COMMAND_NAME}.get(role)
         if role == "sensor":
@@ -187,11 +187,11 @@ class _Assignment:
             if lengths and roles[lengths[0]] == "auxiliary" and "displacement" not in names:
                 names[lengths[0]] = "displacement"
         # A plain table's names are the user's own, and so are those in a file that stores roles.
-        declared = [
+        is_declared = [
             index not in self.chosen and (sheet.format == "plain" or sheet.columns[index].role is not None)
             for index in columns
         ]
-        _rename(names, roles, units, declared, sheet.has_header)
+        _rename(names, roles, units, is_declared, sheet.has_header)
         return _unique(names)
 
     def channels(self, columns: Sequence[int], names: Sequence[str]) -> dict[str, Channel]:

@@ -103,8 +103,8 @@ def headline(judgements: Sequence[Judgement]) -> tuple[Grade, str]:
         return worst, f"{one.unit} is {grade_word(one.grade)}: {one.says}{'; ' + one.does if one.does else ''}"
     said = f"{good} of {len(judgements)} units good" if good < len(judgements) else f"All {good} units good"
     rest = sorted((one for one in judgements if one.grade != "good"), key=lambda one: WORST_FIRST.index(one.grade))
-    told = "; ".join(f"{one.unit}: {one.whole}" for one in rest)
-    return worst, f"{said}; {told}" if told else said
+    others = "; ".join(f"{one.unit}: {one.whole}" for one in rest)
+    return worst, f"{said}; {others}" if others else said
 
 
 def grade_word(grade: Grade) -> str:

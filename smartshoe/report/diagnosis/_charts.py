@@ -157,8 +157,8 @@ def _means(found: EvidenceView, x: Array, edges: Array) -> tuple[Array, list[Lin
     """The judged error's means before and after over ``x`` (judged samples,), where there are samples."""
     each = [(when, colour, binned(x, residual[found.judged], edges)) for when, colour, residual in _residuals(found)]
     filled = np.isfinite(each[0][2].mean)
-    kept = [(when, colour, Binned(*(v[filled] for v in (one.x, one.mean, one.sd)))) for when, colour, one in each]
-    return kept[0][2].x, [_line(*one) for one in kept]
+    drawn = [(when, colour, Binned(*(v[filled] for v in (one.x, one.mean, one.sd)))) for when, colour, one in each]
+    return drawn[0][2].x, [_line(*one) for one in drawn]
 
 
 def over_cycles(found: EvidenceView, unit: str) -> Chart | None:

@@ -54,7 +54,7 @@ class EvidenceView:
     """Every usable sample of every recording, one after the other. All (n,) except ``starts`` and ``names``.
 
     ``time_s`` runs on from recording to recording, each of which begins at its ``starts``. ``before`` and ``after``
-    are measured less simulated reading, ``judged`` marks what was not fitted (everything where nothing was kept).
+    are measured less simulated reading, ``judged`` marks what was not fitted (everything where nothing was held out).
     """
 
     time_s: Array
@@ -71,7 +71,7 @@ class EvidenceView:
 
     @cached_property
     def judged(self) -> Mask:
-        """(n,) what was not fitted, or everything where nothing was kept from the fit."""
+        """(n,) what was not fitted, or everything where nothing was held out."""
         return self.held_out if self.held_out.any() else np.ones(self.held_out.size, dtype=bool)
 
     @cached_property
@@ -265,15 +265,15 @@ def _two_digits(value: float) -> float:
 
 def _merged(rates: Sequence[float], alike: float = 0.25, most: int = 6) -> list[float]:
     """Rates with those that lie within ``alike`` of each other as one, at most ``most`` of them."""
-    kept: list[list[float]] = []
+    groups: list[list[float]] = []
     for rate in rates:
         if rate <= 0:
             continue
-        if kept and rate <= (1.0 + alike) * kept[-1][0]:
-            kept[-1].append(rate)
+        if groups and rate <= (1.0 + alike) * groups[-1][0]:
+            groups[-1].append(rate)
         else:
-            kept.append([rate])
-    means = [_two_digits(float(np.median(group))) for group in kept]
+            groups.append([rate])
+    means = [_two_digits(float(np.median(group))) for group in groups]
     if len(means) > most:
         means = [means[k] for k in np.unique(np.linspace(0, len(means) - 1, most).round().astype(int))]
     return means
@@ -295,6 +295,6 @@ def spectrum(found: EvidenceView, residual: Array) -> tuple[Array, Array]:
         return frequency, power
     place = np.floor(24 * np.log10(frequency / frequency[0])).astype(np.intp)
     count = np.bincount(place)
-    kept = (count > 0) & (np.bincount(place, power) > 0)
-    mean = np.bincount(place, power)[kept] / count[kept]
-    return np.bincount(place, frequency)[kept] / count[kept], np.sqrt(mean)
+    filled = (count > 0) & (np.bincount(place, power) > 0)
+    mean = np.bincount(place, power)[filled] / count[filled]
+    return np.bincount(place, frequency)[filled] / count[filled], np.sqrt(mean)

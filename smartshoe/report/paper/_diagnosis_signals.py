@@ -189,8 +189,8 @@ def _short(name: str) -> str:
 
 def _path(load_n: Array, values: Array) -> tuple[Array, Array]:
     """A loop with fewer points: those at which ``values`` are extreme."""
-    _, kept, load = thin(np.arange(load_n.size, dtype=float), values, load_n)
-    return load, kept
+    _, thinned, load = thin(np.arange(load_n.size, dtype=float), values, load_n)
+    return load, thinned
 
 
 def _limit(values: Array) -> float:
