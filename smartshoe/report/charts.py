@@ -92,7 +92,7 @@ class Chart:
 
 
 def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
-    """Indices of at most about ``most`` samples that keep each stretch's extremes of every signal."""
+    """Indices of at most about ``most`` samples that keep each segment's extremes of every signal."""
     if x.size <= most:
         return np.arange(x.size)
     block = -(-x.size * 2 * len(signals) // most)
@@ -100,7 +100,7 @@ def reduced(x: Array, signals: Sequence[Array], most: int) -> Index:
     start = np.arange(count) * block
     chosen = [np.array([0, x.size - 1])]
     for signal in signals:
-        # The last stretch may be shorter than the others: its end stands in for what it lacks.
+        # The last segment may be shorter than the others: its end stands in for what it lacks.
         filled = np.pad(np.where(np.isfinite(signal), signal, 0.0), (0, count * block - x.size), mode="edge")
         cut = filled.reshape(count, block)
         chosen += [start + cut.argmin(axis=1), start + cut.argmax(axis=1)]

@@ -14,7 +14,7 @@ from smartshoe.report.diagnosis._sentences import file_name
 from smartshoe.report.diagnosis.views import (
     Binned,
     EvidenceView,
-    Stretch,
+    TraceSegment,
     binned,
     edges_of,
     loops_at_two_rates,
@@ -77,21 +77,21 @@ def over_time(found: EvidenceView, unit: str) -> Chart:
 
 def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
     """The load cycle on which the baseline is furthest off: the load, and what each simulation misses."""
-    stretch = worst_cycle(traces)
-    if stretch is None:
+    segment = worst_cycle(traces)
+    if segment is None:
         return None
-    trace = stretch.trace
-    usable = trace.usable[stretch.span]
-    lines = [Line("before", np.where(usable, (trace.reading - trace.baseline)[stretch.span], np.nan), BEFORE)]
+    trace = segment.trace
+    usable = trace.usable[segment.span]
+    lines = [Line("before", np.where(usable, (trace.reading - trace.baseline)[segment.span], np.nan), BEFORE)]
     if _differs(trace):
-        lines.append(Line("after", np.where(usable, (trace.reading - trace.extended)[stretch.span], np.nan), AFTER))
-    held = "not fitted" if trace.held_out[stretch.span].mean() > 0.5 else "fitted"
+        lines.append(Line("after", np.where(usable, (trace.reading - trace.extended)[segment.span], np.nan), AFTER))
+    held = "not fitted" if trace.held_out[segment.span].mean() > 0.5 else "fitted"
     says = f"{file_name(trace.name)}, the cycle on which the simulation is furthest off ({held})."
     panels = [
-        Panel("load (N)", [Line("load", trace.load_n[stretch.span], "load")], height=90),
+        Panel("load (N)", [Line("load", trace.load_n[segment.span], "load")], height=90),
         Panel(f"measured − simulated ({unit})", lines, height=200),
     ]
-    return Chart("The worst cycle", says, "time (s)", trace.time_s[stretch.span], panels)
+    return Chart("The worst cycle", says, "time (s)", trace.time_s[segment.span], panels)
 
 
 def _differs(trace: Trace) -> bool:
@@ -101,12 +101,12 @@ def _differs(trace: Trace) -> bool:
 def loops(traces: Sequence[Trace], unit: str) -> list[Chart]:
     """Reading against load less a straight line, loading and unloading apart, at the slowest and the fastest rate."""
     return [
-        _loop(rate, stretch, unit) for rate, stretch in loops_at_two_rates(traces) if stretch.stop - stretch.start > 20
+        _loop(rate, segment, unit) for rate, segment in loops_at_two_rates(traces) if segment.stop - segment.start > 20
     ]
 
 
-def _loop(rate: float, stretch: Stretch, unit: str) -> Chart:
-    trace, span = stretch.trace, stretch.span
+def _loop(rate: float, segment: TraceSegment, unit: str) -> Chart:
+    trace, span = segment.trace, segment.span
     load_n, reading = trace.load_n[span], trace.reading[span]
     straight = np.polynomial.Polynomial.fit(load_n, reading, 1)
     top = int(np.argmax(load_n))

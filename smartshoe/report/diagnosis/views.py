@@ -147,7 +147,7 @@ def slope(time_s: Array, load_n: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class TraceSegment:
     """Samples ``start:stop`` of a trace."""
 
     trace: Trace
@@ -160,9 +160,9 @@ class Stretch:
         return slice(self.start, self.stop)
 
 
-def worst_cycle(traces: Sequence[Trace]) -> Stretch | None:
+def worst_cycle(traces: Sequence[Trace]) -> TraceSegment | None:
     """The load cycle on which the baseline simulation is furthest off, among those not fitted where there are any."""
-    found: list[tuple[bool, float, Stretch]] = []
+    found: list[tuple[bool, float, TraceSegment]] = []
     for trace in traces:
         edges = np.flatnonzero(np.diff(trace.cycle)) + 1
         for start, stop in zip([0, *edges], [*edges, trace.cycle.size], strict=True):
@@ -174,7 +174,7 @@ def worst_cycle(traces: Sequence[Trace]) -> Stretch | None:
                 (
                     bool(trace.held_out[start:stop].mean() > 0.5),
                     float(np.mean(error**2)),
-                    Stretch(trace, int(start), int(stop)),
+                    TraceSegment(trace, int(start), int(stop)),
                 )
             )
     if not found:
@@ -182,14 +182,14 @@ def worst_cycle(traces: Sequence[Trace]) -> Stretch | None:
     return max(found, key=lambda one: one[:2])[2]
 
 
-def loops_at_two_rates(traces: Sequence[Trace]) -> list[tuple[float, Stretch]]:
+def loops_at_two_rates(traces: Sequence[Trace]) -> list[tuple[float, TraceSegment]]:
     """A cycle at the lowest and one at the highest loading rate (N/s), not fitted ones first; empty without cycles."""
-    owner: dict[int, Stretch] = {}
+    owner: dict[int, TraceSegment] = {}
     found: list[Cycle] = []
     for trace in traces:
         step = max(1, trace.time_s.size // ENOUGH)
         for cycle in cycles(trace.time_s[::step], trace.load_n[::step]):
-            owner[id(cycle)] = Stretch(trace, step * cycle.start, min(step * cycle.stop, trace.time_s.size))
+            owner[id(cycle)] = TraceSegment(trace, step * cycle.start, min(step * cycle.stop, trace.time_s.size))
             found.append(cycle)
     groups = by_rate(found)
     chosen = sorted({min(groups), max(groups)}) if groups else []

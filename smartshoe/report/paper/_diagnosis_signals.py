@@ -15,7 +15,7 @@ from smartshoe.report.diagnosis.views import (
     BINS,
     MOST_GROUPS,
     EvidenceView,
-    Stretch,
+    TraceSegment,
     binned,
     edges_of,
     loops_at_two_rates,
@@ -41,16 +41,16 @@ def beside_measurement(traces: Sequence[Trace], unit: str) -> Figure | None:
     with mpl.rc_context(STYLE):
         figure, axes = figure_of(10.6, 5.4, 2, 2)
         figure.subplots_adjust(left=0.085)
-        whole = Stretch(trace, 0, trace.time_s.size)
-        for column, (stretch, title) in enumerate(
+        whole = TraceSegment(trace, 0, trace.time_s.size)
+        for column, (segment, title) in enumerate(
             ((worst, "the cycle where the simulation is worst"), (whole, "the whole recording"))
         ):
             signal, off = axes[column], axes[2 + column]
-            time_s, reading = trace.time_s[stretch.span], trace.reading[stretch.span]
-            usable = trace.usable[stretch.span]
+            time_s, reading = trace.time_s[segment.span], trace.reading[segment.span]
+            usable = trace.usable[segment.span]
             signal.plot(*thin(time_s, reading), color=MEASURED, lw=2.2, alpha=0.45, label="measured")
             for values, colour, line, label in _simulations(trace, changed):
-                part = values[stretch.span]
+                part = values[segment.span]
                 signal.plot(*thin(time_s, part), line, color=colour, label=label)
                 off.plot(*thin(time_s[usable], (reading - part)[usable]), color=colour, lw=0.8, label=label)
             off.axhline(0.0, color=MEASURED, lw=0.6)
@@ -73,15 +73,15 @@ def loops(traces: Sequence[Trace], unit: str) -> Figure | None:
     with mpl.rc_context(STYLE):
         figure, axes = figure_of(10.6, 5.4, len(chosen), 2)
         figure.subplots_adjust(left=0.085)
-        for column, (rate, stretch) in enumerate(chosen):
-            trace = stretch.trace
+        for column, (rate, segment) in enumerate(chosen):
+            trace = segment.trace
             above, below = axes[column], axes[len(chosen) + column]
-            load_n, reading = trace.load_n[stretch.span], trace.reading[stretch.span]
+            load_n, reading = trace.load_n[segment.span], trace.reading[segment.span]
             line = np.polynomial.Polynomial.fit(load_n, reading, 1)
             above.plot(*_path(load_n, reading), color=MEASURED, lw=2.2, alpha=0.45, label="measured")
             below.plot(*_path(load_n, reading - line(load_n)), color=MEASURED, lw=2.0, alpha=0.45)
             for values, colour, style, label in _simulations(trace, _differs(trace)):
-                part = values[stretch.span]
+                part = values[segment.span]
                 above.plot(*_path(load_n, part), style, color=colour, label=label)
                 below.plot(*_path(load_n, part - line(load_n)), style, color=colour)
             above.set_title(f"{rate:g} N/s ({_short(trace.name)})", fontsize=9)
@@ -205,7 +205,7 @@ def _mean_and_band(axis: Any, x: Array, values: Array, colour: str, label: str =
 
 
 def _held_out_spans(found: EvidenceView) -> list[tuple[float, float]]:
-    """Stretches of time that were not fitted; none where all or nothing was."""
+    """Segments of time that were not fitted; none where all or nothing was."""
     mask = found.held_out
     if not mask.any() or mask.all():
         return []

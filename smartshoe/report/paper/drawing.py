@@ -32,7 +32,7 @@ STYLE: Any = {
 
 
 def thin(x: Array, *signals: Array) -> tuple[Array, ...]:
-    """At most about `MOST` points that keep each stretch's extremes of the first signal."""
+    """At most about `MOST` points that keep each segment's extremes of the first signal."""
     if x.size <= MOST:
         return (x, *signals)
     block = -(-x.size // (MOST // 2))
