@@ -31,6 +31,7 @@ from smartshoe.protocol import (
     static_protocol,
 )
 from smartshoe.runs.scenario._keys import Tables, with_values
+from smartshoe.runs.scenario._shipped import or_shipped
 from smartshoe.runs.scenario.lines import line_of
 
 
@@ -270,9 +271,9 @@ class ScenarioText:
 def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, ScenarioText]:
     """A TOML file's tables as they stand in it, and the file itself; raises `ScenarioError`.
 
-    ``what`` says what the file should be.
+    ``what`` says what the file should be. ``scenarios/NAME.toml`` is found wherever smartshoe is installed.
     """
-    file = Path(path)
+    file = or_shipped(Path(path))
     try:
         text = read_text(file, what)
     except InputError as error:
