@@ -7,7 +7,7 @@ from __future__ import annotations
 
 
 class SmartShoeError(Exception):
-    """Root of every error that smartshoe raises on purpose; ``exit_status`` is the contract's."""
+    """Root of every error that smartshoe raises on purpose; ``exit_status`` is the command line's."""
 
     exit_status = 2
 

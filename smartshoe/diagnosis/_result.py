@@ -158,7 +158,7 @@ class Trace:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Summarised):
-    """What measured data says of its simulation; see the contract's section 4 for `to_dict`.
+    """What measured data says of its simulation; `to_dict` is what `smartshoe diagnose --json` writes.
 
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).

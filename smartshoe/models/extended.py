@@ -39,7 +39,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:
-    """Chinimilli 2016, eq. (2), with ``parts`` at their places of the chain.
+    """The standard linear solid (Chinimilli 2016, equation 2) with effects, ``parts``, at their places of the chain.
 
     ``gain`` is the reading of a held full-scale load as a share of ``full_scale_reading`` (in ``reading_unit``);
     ``relaxing_share`` kappa and ``relaxation_rate_per_s`` a give p/f = (s + a)/((1 + kappa) s + a). ``wall_ratio`` is

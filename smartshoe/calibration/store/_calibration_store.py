@@ -34,7 +34,7 @@ def default_folder() -> Path:
 
 
 class CalibrationStore:
-    """Calibrations in a folder of plain files (see `smartshoe.calibration.store._files`), read anew at each question.
+    """Calibrations in a folder of plain files that are read anew at each question.
 
     Dates are ISO texts, dates or datetimes (UTC where they do not say). Nothing is overwritten or removed. Several
     processes may add and read at once. ``faults`` says of each file that could not be used why.
