@@ -16,6 +16,13 @@ CLIPPED = """
 }).map(e => e.tagName + ': ' + e.textContent.slice(0, 60))
 """
 
+STACKED_PX = 36  # a column of letters: no word of six stands in it
+STACKED = """
+[...document.querySelectorAll('th, td')].filter(e =>
+  e.checkVisibility() && e.clientWidth && e.clientWidth < LEAST && e.textContent.trim().length > 5
+).map(e => e.textContent.slice(0, 40))
+"""
+
 SMALL = """
 (() => {
   const found = [], walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
@@ -74,6 +81,7 @@ def look(browser: Browser) -> list[str]:
     if wide > 0:
         found.append(f"the page is {wide} px wider than the window")
     found += [f"clipped: {text}" for text in browser.run(CLIPPED)]
+    found += [f"a column of letters: {text}" for text in browser.run(STACKED.replace("LEAST", str(STACKED_PX)))]
     found += [f"too small: {text}" for text in browser.run(SMALL.replace("LEAST", str(SMALLEST_PX)))]
     found += [f"too faint: {text}" for text in browser.run(FAINT.replace("LEAST", str(LEAST_CONTRAST)))]
     return found

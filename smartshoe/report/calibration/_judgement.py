@@ -83,7 +83,7 @@ def judge(unit: UnitReport) -> Judgement:
     if share > BAD_PERCENT:
         return Judgement(unit.name, "bad", left, look_into)
     if looks_like_friction(unit.validation.rates):
-        says = f"a loop of {plain(loop, 2)} % stays at every rate, as friction leaves it"
+        says = f"a loop of up to {plain(loop, 2)} % stays at every rate, as friction leaves it"
         return Judgement(unit.name, "look", says, look_into)
     if loop > LOOP_PERCENT:
         return Judgement(unit.name, "look", f"a loop of {plain(loop, 2)} % of full scale stays", look_into)
