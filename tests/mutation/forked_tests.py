@@ -161,7 +161,7 @@ def _said_within(pipe: int, wall_s: float) -> bytes | None:
 
 
 def _wall_s(costs: Costs) -> float:
-    return 60.0 + WALL * (sum(costs.values()) + SLOWER * max(costs.values(), default=0.0))
+    return 600.0 + WALL * (sum(costs.values()) + SLOWER * max(costs.values(), default=0.0))
 
 
 def _ended(answer: tuple[Any, float]) -> Ended:
