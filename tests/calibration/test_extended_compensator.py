@@ -24,6 +24,14 @@ def _error(model: ExtendedModel, conditions: Conditions) -> np.ndarray:
     return np.asarray(force_n / model.full_scale_load_n - conditions.load)
 
 
+def test_single_precision_has_steps_of_its_own_and_only_where_it_is_asked_for() -> None:
+    filter_ = ExtendedCompensator(chain_of(["play_hysteresis"], 1), 100.0)
+    plain, single = filter_.c_steps(), filter_.c_steps(single=True)
+    assert plain == tuple((name, inverse.c_step(name)) for name, inverse in filter_.blocks)
+    assert single == tuple((name, inverse.c_single(name)) for name, inverse in filter_.blocks)
+    assert plain != single
+
+
 @given(
     gain=st.floats(0.1, 10.0), share=st.floats(0.01, 5.0), rate=st.floats(0.01, 20.0), hz=st.floats(50.0, 1000.0),
     seed=seeds,

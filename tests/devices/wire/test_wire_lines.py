@@ -178,8 +178,10 @@ def test_the_checksum_is_nmeas() -> None:
     assert line_checksum("GPGLL,5300.97914,N,00259.98174,E,125926,A") == 0x28
 
 
-def test_comments_may_say_who_speaks() -> None:
-    data = b"# firmware: walk-3\n# serial: R-7\n# rate: 100 Hz\n" + _lines(10, 10)[0]
+@pytest.mark.parametrize("mark", [b"# ", b"#"])
+def test_comments_may_say_who_speaks(mark: bytes) -> None:
+    data = b"".join(mark + said + b"\n" for said in (b"firmware: walk-3", b"serial: R-7", b"rate: 100 Hz"))
+    data += _lines(10, 10)[0]
     _, decoder = _feed(data)
     assert decoder.information is not None
     assert decoder.information.serial_number == "R-7"
