@@ -30,7 +30,8 @@ def split_url(url: str) -> tuple[str, str, dict[str, str]]:
 @cache
 def _offered() -> dict[str, EntryPoint]:
     """By scheme; looked for once, since reading what each installed package offers takes as long as a simulation."""
-    return {entry.name: entry for entry in reversed(entry_points(group=GROUP))}
+    # From Python 3.12 on, entry points are taken by name and not by place, so that they cannot be reversed themselves.
+    return {entry.name: entry for entry in reversed(tuple(entry_points(group=GROUP)))}
 
 
 def schemes() -> tuple[str, ...]:
