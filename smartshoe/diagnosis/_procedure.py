@@ -353,7 +353,10 @@ def _zero_cause(
         thresholds.zero_deviations,
         f"it is {deviations:.3g} standard deviations from nothing",
     )
-    sure = thresholds.seen_confidence, 1.0 / (1.0 + len(zero.alternatives))
+    sure = (
+        thresholds.least_confidence if zero.alternatives else thresholds.seen_confidence,  # by its model alone, or seen
+        1.0 / (1.0 + len(zero.alternatives)),
+    )
     evidence = (seen, *_held_out_evidence(zero.size, won))
     return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
 

@@ -78,7 +78,10 @@ class Thresholds:
         "logistic regression on 306 cases of two worlds",
     )
     least_confidence: float = threshold(
-        0.6, "probability", "of the kind; below it no cause is named", "three to two for being right"
+        0.667,
+        "probability",
+        "of the kind; below it no cause is named; of a zero that is never seen",
+        "two to one for being right",
     )
     seen_confidence: float = threshold(0.97, "probability", "of a zero or tare seen at rest", "bank")
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")

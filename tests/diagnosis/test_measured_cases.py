@@ -264,8 +264,7 @@ class TestSensors:
         found = _sensor(measured, name)
         right = [cause for cause in found.causes if cause.effect.family in KINDS[name]]
         assert right
-        # Loops and curve of the microfluidic sensor are of one size, and rounding says which of them is first.
-        assert right[0] is found.causes[0] or (name == "microfluidic" and right[0].size > 0.9 * found.causes[0].size)
+        assert right[0] is found.causes[0]
         assert right[0].held_out.ci95[0] > 0
 
     def test_one_rate_in_one_cycle_claims_no_cause_and_says_why(self, measured: Path) -> None:
