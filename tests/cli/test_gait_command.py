@@ -232,3 +232,19 @@ def test_columns_of_any_name_are_mapped_with_their_unit(
     assert "'quux'" in capsys.readouterr().err
     assert run_command(["gait", str(path)]) == 3
     assert "--sensor left_heel=" in capsys.readouterr().err
+
+
+def test_a_walk_that_lacks_every_third_sample_says_that_no_stride_counts(
+    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = [line for line in walk.read_text().splitlines() if not line.startswith("#")]
+    rng, path = np.random.default_rng(3), tmp_path / "gaps.csv"
+    rows = [line.split(",") for line in lines[1:]]
+    holes = rng.random((len(rows), len(rows[0]) - 1)) < 0.33
+    kept = [",".join([row[0], *("" if hole else cell for cell, hole in zip(row[1:], own, strict=True))])
+            for row, own in zip(rows, holes, strict=True)]  # fmt: skip
+    path.write_text("\n".join([lines[0], *kept]))
+    assert run_command(["gait", str(path)]) == 0
+    told = capsys.readouterr()
+    assert "no stride is whole enough" in told.out
+    assert "of the samples of left_heel" in told.err

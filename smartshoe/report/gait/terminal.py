@@ -80,7 +80,8 @@ def print_gait(found: GaitFindings, title: str) -> None:
         if depends_on_coverage(found):
             console.print(COVERAGE_NOTE, soft_wrap=True)
     else:
-        console.print(f"{title}: {found.activity}")
+        none = ", but no stride is whole enough to count: see below" if found.activity in ("walking", "running") else ""
+        console.print(f"{title}: {found.activity}{none}", soft_wrap=True)
     said = [
         ("cadence", summary["cadence_steps_per_min"], " steps/min"),
         ("double support", summary["double_support_percent"], " %"),
