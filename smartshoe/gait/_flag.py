@@ -10,6 +10,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.signals.masks import runs_of
 
 MOST_SPANS = 3
+JOINED_S = 0.5  # spans less than that apart are one
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +28,12 @@ class Flag:
         return {"kind": self.kind, "foot": self.foot, "unit": self.unit, "where": self.where, "says": self.says}
 
 
-def spans_of(time_s: Array, mask: Mask, join_s: float = 0.5) -> list[tuple[float, float]]:
-    """Begin and end in s of the runs of True, those less than ``join_s`` apart as one."""
+def spans_of(time_s: Array, mask: Mask) -> list[tuple[float, float]]:
+    """Begin and end in s of the runs of True, those less than `JOINED_S` apart as one."""
     first, after = runs_of(mask)
     spans: list[tuple[float, float]] = []
     for start, stop in zip(time_s[first], time_s[after - 1], strict=True):
-        if spans and start - spans[-1][1] < join_s:
+        if spans and start - spans[-1][1] < JOINED_S:
             spans[-1] = (spans[-1][0], float(stop))
         else:
             spans.append((float(start), float(stop)))

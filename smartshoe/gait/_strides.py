@@ -52,16 +52,14 @@ class Stride:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def strides_of(
-    foot: str, contacts: Contacts, time_s: Array, force_n: Array | None, missing: Mask, longest_s: float = LONGEST_S
-) -> list[Stride]:
+def strides_of(foot: str, contacts: Contacts, time_s: Array, force_n: Array | None, missing: Mask) -> list[Stride]:
     """The strides of one foot; ``force_n`` (n,) is its whole vertical force, None where it is not known."""
     if len(contacts) < 2:
         return []
     start_s, end_s, toe_off_s = contacts.strike_s[:-1], contacts.strike_s[1:], contacts.toe_off_s[:-1]
     flat_s, heel_off_s = contacts.foot_flat_s, contacts.heel_off_s
     with np.errstate(invalid="ignore"):
-        good = (end_s - start_s <= longest_s) & np.isfinite(toe_off_s)
+        good = (end_s - start_s <= LONGEST_S) & np.isfinite(toe_off_s)
     rate_hz = (time_s.size - 1) / (time_s[-1] - time_s[0])
     gaps = runs_of(missing)
     gone = np.concatenate([[0], np.cumsum(missing)])

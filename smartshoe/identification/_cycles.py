@@ -94,7 +94,7 @@ def repeated_cycles(recordings: Sequence[Recording], *, skip_first: int = 0) -> 
     return [group for group in groups if group.last_s > group.first_s]
 
 
-def averaged_reading(recordings: Sequence[Recording], *, skip_first: int = 0) -> list[Array]:
+def averaged_reading(recordings: Sequence[Recording]) -> list[Array]:
     """Per recording (n,): the mean of the *other* repeats' readings at each sample's place, NaN outside of repeats.
 
     In the first recording's reading unit; each recording's own reading at rest is put in the place of the others'.
@@ -113,7 +113,7 @@ def averaged_reading(recordings: Sequence[Recording], *, skip_first: int = 0) ->
         rests.append(float(np.median(reading[resting])) if resting.any() else 0.0)
         signals.append(reading - rests[-1])
     averaged = [np.full(len(recording), np.nan) for recording in recordings]
-    for group in repeated_cycles(recordings, skip_first=skip_first):
+    for group in repeated_cycles(recordings):
         for repeat in group.repeats:
             places_s = group.places_s(repeat, recordings)
             inside = group.covers(places_s)

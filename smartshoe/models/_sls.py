@@ -53,11 +53,6 @@ class StandardLinearSolid:
         return self.a1 * (1.0 + self.k1 * self.x_over_nrt)
 
     @property
-    def relaxation_time_s(self) -> float:
-        """c/k2."""
-        return self.c / self.k2
-
-    @property
     def static_gain(self) -> float:
         """Force per reading of a load that lasts: b1/a1 = 1 + k1 X."""
         return 1.0 + self.k1 * self.x_over_nrt

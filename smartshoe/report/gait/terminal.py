@@ -40,11 +40,11 @@ def _peaks(found: GaitFindings, foot: str) -> str:
     return f"{plain(float(np.mean(own)))} ± {plain(NORMAL_95 * sd, 2)}"
 
 
-def _cv(spread: dict[str, Any] | None, digits: int = 3) -> str:
+def _cv(spread: dict[str, Any] | None) -> str:
     if not spread or spread["mean"] is None:
         return "–"
     cv = spread["cv_percent"]
-    return plain(spread["mean"], digits) + ("" if cv is None else f" ({cv:.1f} %)")
+    return plain(spread["mean"], 3) + ("" if cv is None else f" ({cv:.1f} %)")
 
 
 def by_foot(found: GaitFindings) -> list[tuple[str, list[str]]]:
