@@ -93,18 +93,22 @@ def _watched(server: LiveServer, session: LiveSession, arrived: dict[int, float]
     with Browser() as browser:
         browser.open(server.url)
         browser.until("typeof live !== 'undefined' && live.drawn > 20")
-        # The frame after the one that draws: what was drawn is on the screen by then.
+        # Seen in the animation frame after the one that draws: what was drawn is on the screen by then. Beside it, when
+        # each picture was at the page, when drawing it began, and how long that took.
         browser.run(
-            "window.seen = [], (() => { let before = -1; const look = () => { if (live.drawn !== before) {"
-            " const n = before = live.drawn; requestAnimationFrame(() => seen.push([n, Date.now()])); }"
-            " requestAnimationFrame(look); }; look(); })(), 0"
+            "window.seen = [], window.parts = [], (() => { const got = {}, add = picture, plain = draw;"
+            " picture = (frame) => { got[frame.number] = performance.now(); add(frame); };"
+            " draw = () => { const frame = live.last, begun = performance.now(); plain(); if (!frame) return;"
+            " requestAnimationFrame(() => seen.push([frame.number, Date.now()]));"
+            " parts.push([frame.number, performance.timeOrigin + got[frame.number], begun - got[frame.number],"
+            " performance.now() - begun]); }; })(), 0"
         )
         time.sleep(2.0)
         before, cpu_s, wall_s = memory_kb(), time.process_time(), time.perf_counter()
         heap = browser.run("performance.memory.usedJSHeapSize")
         time.sleep(SECONDS)
         cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
-        seen = browser.run("seen")
+        seen, parts = browser.run("seen"), browser.run("parts")
         heap_after = browser.run("performance.memory.usedJSHeapSize")
         assert browser.errors == []
     late_ms = np.array([at - 1e3 * arrived[number] for number, at in seen if number in arrived])
@@ -112,6 +116,13 @@ def _watched(server: LiveServer, session: LiveSession, arrived: dict[int, float]
         f"\nport to pixel: median {np.median(late_ms):.0f} ms, 95 % {np.quantile(late_ms, 0.95):.0f} ms,"
         f" {late_ms.size} frames"
     )
+    at_page = np.array([at - 1e3 * arrived[number] for number, at, _, _ in parts if number in arrived])
+    for what, part in (
+        ("port to page", at_page),
+        ("page to the drawing's begin", np.array([wait for _, _, wait, _ in parts])),
+        ("drawing", np.array([took for _, _, _, took in parts])),
+    ):
+        print(f"  of it {what}: median {np.median(part):.1f} ms, 95 % {np.quantile(part, 0.95):.1f} ms")
     print(f"frames drawn a second: {len(seen) / wall_s:.1f}; server's processor time {100 * cpu_s / wall_s:.1f} %")
     print(f"memory: server {memory_kb() - before} kB in {wall_s:.0f} s, page's heap {(heap_after - heap) / 1e3:.0f} kB")
     print(f"lost {health(server)['lost']}, clocks {[live.clock_dict() for live in session.shoes]}")

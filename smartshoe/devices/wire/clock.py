@@ -105,6 +105,7 @@ class DeviceClock:
         self._law_due = LAW_FROM_BINS
         self._law: DelayLaw | None = None
         self._told: SimpleQueue[DelayLaw | None] = SimpleQueue()
+        self._is_asked = False
         self._likely: DelayLine | None = None
         self._centres: list[float] = []
         self._values: list[tuple[float, float, float]] = []
@@ -213,7 +214,8 @@ class DeviceClock:
 
         if self._law is not None:
             self._likely = line(self._law, self._likely or level)
-        if self._law is None or self._closed >= self._law_due:
+        if self._closed >= self._law_due and not self._is_asked:
+            self._is_asked = True
             self._law_due = self._closed + min(self._closed, KEPT_BINS)
             before, middle, told = self._likely or level, float(kept.time_s.mean()), self._told
 
@@ -223,9 +225,11 @@ class DeviceClock:
                 told.put(None if after is None else law.moved(after.delay_s(middle) - before.delay_s(middle)))
 
             self._apart(tell)
-        if not self._told.empty() and (law := self._told.get()) is not None:
-            self._law = law
-            self._likely = line(law, self._likely or level)
+        if not self._told.empty():
+            self._is_asked, law = False, self._told.get()
+            if law is not None:
+                self._law = law
+                self._likely = line(law, self._likely or level)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

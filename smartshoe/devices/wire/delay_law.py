@@ -21,7 +21,7 @@ import numpy as np
 from smartshoe.arrays import Array, Integers, Mask
 from smartshoe.devices.wire.delay_line import CRYSTALS_SD, SETTLED, DelayLine, of_few
 
-CELLS = 400  # of the tables
+CELLS = 600  # of the tables
 TOP = 0.995  # the quantile of the delays at which the tables end
 STRAY = 0.01
 LEAST_PROBABILITY = 1e-9

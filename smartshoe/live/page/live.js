@@ -147,7 +147,7 @@ function words() {
 function clockWords(shoe) {
   const of = live.hello.shoes.length > 1 ? shoe.shoe + ": " : "";
   const share = (100 * shoe.lost) / Math.max(shoe.samples + shoe.lost, 1);
-  const lost = shoe.lost ? counted(shoe.lost) + " lost (" + (share < 0.01 ? "under 0.01" : share.toFixed(2)) + " %)" : "none lost";
+  const lost = shoe.lost ? counted(shoe.lost) + " lost (" + (share < 0.01 ? "under 0.01" : share.toFixed(2)) + "\u00a0%)" : "none lost";
   const words = [[shoe.lost ? "warning" : "ok", of + counted(shoe.samples) + " samples, " + lost]];
   if (STATES[shoe.state]) words.unshift([shoe.state === "over" ? "" : "fault", of + STATES[shoe.state]]);
   const clock = shoe.clock;
@@ -155,13 +155,13 @@ function clockWords(shoe) {
   else if (clock.sd_ms === 0) words.push(["ok", of + "time is the recording's own"]);
   else {
     words.push([clock.sd_ms < 1 ? "ok" : "warning", of + "times are right within " + (1.96 * clock.sd_ms).toFixed(clock.sd_ms < 0.05 ? 2 : 1) +
-      " ms (95 %), up to one constant delay"]);
+      " ms (95\u00a0%), up to one constant delay"]);
     words.push(["", of + "its clock is " + Math.abs(clock.skew_ppm).toFixed(0) + " ppm " + (clock.skew_ppm > 0 ? "slow" : "fast") + " against this computer's"]);
   }
   return words;
 }
 
-function counted(number) { return number.toLocaleString("en").replaceAll(",", " "); }
+function counted(number) { return number.toLocaleString("en").replaceAll(",", "\u202f"); }
 
 function list(element, items) {
   const key = JSON.stringify(items);
@@ -173,13 +173,24 @@ function list(element, items) {
 }
 
 function noted() {
-  const items = live.notes.slice(-100).reverse().map((note) => {
+  const items = [];
+  let losses = null; // one after the other they are one line, so that a person's marks do not drown in them
+  for (const note of live.notes.slice().reverse()) {
+    const isGap = note.kind === "gap" && !note.before;
+    if (isGap && losses) {
+      losses.more++;
+      losses.text.data = losses.says + "; " + losses.more + " more such since " + note.time_s.toFixed(2) + " s";
+      continue;
+    }
+    if (items.length === 100) break;
     const item = document.createElement("li"), time = document.createElement("time");
+    const text = document.createTextNode(note.says + (note.before ? " (before the restart)" : ""));
     item.className = note.kind + (note.before ? " before" : "");
     time.textContent = note.time_s.toFixed(2) + " s";
-    item.append(time, note.says + (note.before ? " (before the restart)" : ""));
-    return item;
-  });
+    item.append(time, text);
+    items.push(item);
+    losses = isGap ? { text, says: note.says, more: 0 } : null;
+  }
   by("notes").replaceChildren(...items);
 }
 

@@ -89,14 +89,19 @@ class Strip {
   }
   marks(g, x, bottom, notes, from) {
     g.font = "12px system-ui, sans-serif"; g.textBaseline = "top"; g.textAlign = "left";
-    for (const note of notes) {
-      if (note.before || note.time_s < from || !SHOWN[note.kind]) continue;
-      if (note.shoe !== null && note.shoe !== this.shoe) continue;
-      const at = Math.round(x(note.time_s)) + 0.5;
-      g.strokeStyle = g.fillStyle = css(note.kind === "mark" ? "--ink" : "--warn");
-      g.lineWidth = 1; g.setLineDash(note.kind === "mark" ? [] : [3, 3]);
-      g.beginPath(); g.moveTo(at, 2); g.lineTo(at, bottom); g.stroke();
-      g.fillText(note.kind === "mark" ? note.says : SHOWN[note.kind], at + 3, 2);
+    const shown = notes.filter((note) => !note.before && note.time_s >= from && SHOWN[note.kind] && (note.shoe === null || note.shoe === this.shoe));
+    // A person's marks come first, losses last: they are short strokes, with a word only where it stands free.
+    const rank = (note) => (note.kind === "mark" ? 0 : note.kind === "gap" ? 2 : 1), taken = [];
+    const strokes = shown.filter((note) => note.kind === "gap").map((note) => x(note.time_s));
+    for (const note of shown.sort((a, b) => rank(a) - rank(b))) {
+      const at = Math.round(x(note.time_s)) + 0.5, isMark = note.kind === "mark", isGap = note.kind === "gap";
+      g.strokeStyle = g.fillStyle = css(isMark ? "--ink" : "--warn");
+      g.lineWidth = 1; g.setLineDash(isMark || isGap ? [] : [3, 3]);
+      g.beginPath(); g.moveTo(at, 2); g.lineTo(at, isGap ? 14 : bottom); g.stroke();
+      const word = isMark ? note.says : SHOWN[note.kind], end = at + g.measureText(word).width + 8;
+      if (taken.some(([left, right]) => at < right && end > left) || (isGap && strokes.some((other) => other > at + 1 && other < end))) continue;
+      taken.push([at, end]);
+      g.fillText(word, at + 3, 2);
     }
     g.setLineDash([]);
   }
