@@ -77,7 +77,7 @@ def test_everything_imports_where_there_are_no_pseudo_terminals() -> None:
         "import sys\n"
         "for name in ('pty', 'tty', 'termios', 'fcntl'):\n"
         "    sys.modules[name] = None\n"
-        "from smartshoe.devices.serial_link import port, reader, shoe\n"
+        "from smartshoe.devices.serial_link import _port, _reader, shoe\n"
         "import simulators.wire.emulator, simulators.wire.serving, simulators.wire.pty_line, simulators.wire.firmware\n"
         "from simulators.wire.pty_line import PtyLine\n"
         "from smartshoe.errors import DeviceError\n"
