@@ -248,8 +248,9 @@ def _with_laws(given: _State, sessions: Sequence[Session], thresholds: Threshold
     """``given`` with a law in the place of a flexible curve, where one follows nearly as well.
 
     No law is exact: one that leaves less than the square of the usual departure, of what the flexible curve explains,
-    is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else. A
-    block is bent before a law is, so that only fits of the whole model compare them fairly.
+    is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
+    One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
+    is, so that only fits of the whole model compare them fairly.
     """
     state = given
     curves = tuple(one.name for family in blocks().values() for one in family if one.is_memoryless)
@@ -263,17 +264,19 @@ def _with_laws(given: _State, sessions: Sequence[Session], thresholds: Threshold
                 bare = bare.without(part.name)
         nothing = fit(likelihood, bare, FEW_STEPS)
         flexible = likelihood.cost(state.fit.model)
-        fits = [_curved(law, nothing.model, likelihood) for law in catalogue().values() if law.is_memoryless]
-        explained = max(nothing.cost - flexible, 0.0)
-        followed = [
-            one
-            for one in fits
-            if one.cost - flexible
-            < explained * (thresholds.departure if _is_stretched(one.model) else thresholds.law_departure) ** 2
-        ]
-        if followed:
-            best = min(followed, key=lambda one: one.cost)
-            state = _State(*_searched(best.model, sessions, thresholds, curves), best, curves)
+        misses: list[tuple[float, Fit]] = []
+        for law in (e for e in catalogue().values() if e.is_memoryless):
+            one = _curved(law, nothing.model, likelihood)
+            # A law of another family is another name, with the odds against one.
+            other = state.evidence.odds if law.family != block.effect.family else 0.0
+            most = thresholds.departure if _is_stretched(one.model) else thresholds.law_departure
+            missed = (one.cost + other - flexible) / max(nothing.cost - flexible, other, 1e-9)
+            if missed < most**2:
+                misses.append((missed, one))
+        if misses:
+            missed, best = min(misses, key=lambda pair: pair[0])
+            banned = curves if missed < thresholds.departure**2 else ()
+            state = _State(*_searched(best.model, sessions, thresholds, banned), best, banned)
     return state if state is given else _settled(state, sessions, thresholds, progress)
 
 
@@ -461,20 +464,15 @@ def _members(
 
 
 def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:
-    """The other laws of a member's family, each fitted in its place, nearest first; a curve's are all curves."""
+    """The other laws of a member's family, each fitted in its place, nearest first."""
     channels = {e.name for e in available(likelihood.sessions)}
-    is_curve = one.effect.is_flexible and one.effect.is_memoryless
     found = []
     for law in catalogue().values():
-        is_one = law.is_memoryless if is_curve else law.family == one.effect.family
-        if not is_one or law.name == one.name or law.name not in channels:
+        if law.family != one.effect.family or law.name == one.name or law.name not in channels:
             continue
-        if is_curve:
-            other = _curved(law, less.model, likelihood)
-        else:
-            starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
-            other = fit(likelihood, min(starts, key=likelihood.cost), FEW_STEPS)
-        found.append(Alternative(law.name, other.cost - extended.cost))
+        starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
+        best = min(starts, key=likelihood.cost)
+        found.append(Alternative(law.name, fit(likelihood, best, FEW_STEPS).cost - extended.cost))
     return tuple(sorted(found, key=lambda a: a.margin))
 
 

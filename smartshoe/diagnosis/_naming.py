@@ -30,7 +30,7 @@ class Name:
 def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
-    A flexible block is named by the law that comes nearest of those that it can follow.
+    A flexible block is named by the law of its family that comes nearest.
     """
     likely = ((one, probability_of_kind(one, left, thresholds)) for one in members if one.size >= thresholds.material)
     return tuple(_named(one, kind, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
@@ -40,9 +40,9 @@ def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents)
+    family = [e for e in catalogue().values() if e.family == one.effect.family]
     margins = {a.effect: a.margin for a in one.laws}
-    nearest = min(catalogue().values(), key=lambda e: (margins.get(e.name, math.inf), e.family != one.effect.family))
-    family = [nearest, *(e for e in catalogue().values() if e.family == one.effect.family and e is not nearest)]
+    nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
     # That none of the family follows better than another speaks for one that the catalogue does not have.
     return Name(one, nearest, kind / 2.0, 1.0 / len(family), others, True)

@@ -251,7 +251,7 @@ def plain_solid_percent(fit: list[Recording], hold: list[Recording]) -> float:
     return 100.0 * (1.0 - float(np.sum((y - a @ gains) ** 2) / np.sum(y**2)))
 
 
-IN_EVERY_RUN = ("microfluidic", "vhb_one_rate")  # a diagnosis takes 5 to 15 s: the others are of the bank
+IN_EVERY_RUN = ("velostat", "vhb_one_rate")  # a diagnosis of the others takes 5 to 15 s: they are of the bank
 
 
 def _few(names: Iterable[str]) -> list[object]:

@@ -118,14 +118,6 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.law == pytest.approx(1.0 / len(family))
 
 
-def test_a_flexible_curve_may_come_nearest_to_a_law_of_another_family() -> None:
-    (block, *_) = blocks()["static_curve"]
-    margins = (("contact_area", 30.0), ("gas_compression", 900.0), ("dead_band", 3.0))
-    name = only(names_of([member(block, laws=margins)], 0.0, STANDARD))
-    assert name.effect.name == "dead_band"
-    assert set(name.equivalents) == {one.name for one in catalogue().values() if one.family == "static_curve"}
-
-
 # -- what each number decides -----------------------------------------------------------------------------------
 def test_material_is_the_size_from_which_on_a_member_is_named() -> None:
     small = [member(size=1e-3)]
