@@ -35,8 +35,6 @@ from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95
 
-BOTH_WAYS = 0.25  # of the larger: a load that runs as far to the other side is no pressing
-
 
 def _silent(_: str) -> None:
     return None
@@ -79,27 +77,22 @@ def diagnose(
     if material is not None:
         decided = replace(decided, material=material)
     everything = [*fitted, *kept_out]
-    integrity = examine(everything)
-    refusals = integrity.refusals or _outside(everything)
+    integrity = examine(everything, decided)
+    refusals = integrity.refusals or _outside(everything, decided)
     if refusals:
         return _refused(everything, integrity, refusals, decided)
     return _diagnosed(everything, len(fitted), integrity, decided, progress)
 
 
-def _outside(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def _outside(recordings: Sequence[Recording], thresholds: Thresholds) -> tuple[str, ...]:
     """Why the recordings are none of a unit that is pressed."""
     for recording in recordings:
         low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
-        if min(abs(low), abs(high)) > BOTH_WAYS * max(abs(low), abs(high)) and low < 0 < high:
+        if min(abs(low), abs(high)) > thresholds.same * max(abs(low), abs(high)) and low < 0 < high:
             return (
                 f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is"
                 " pressed, which bears compression only (turn the sign of the load, or take its mean out, if that is"
                 " what was meant)",
-            )
-        if -low > abs(high):
-            return (
-                f"{recording.label}: the load is negative in compression (it runs from {low:.4g} to {high:.4g} N): turn"
-                " its sign, compression is positive",
             )
     return ()
 

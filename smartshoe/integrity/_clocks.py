@@ -19,28 +19,12 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 
-LEAST_LAG_S = 0.2  # a lag of the sensor itself may look like half of that
-LEAST_LAG_SAMPLES = 5.0  # less is the delay of a logger, which a model holds
-LARGEST_LAG_S = 6.0
-LONG_LAG_S = 0.4  # no pressure sensor is so slow, and a unit that relaxes answers a corner at once
-UNANIMOUS = 4  # windows
-LEAST_CORRELATION = 0.3
-CLEAR = 0.7  # correlation
-MIRRORED = 0.5  # of the best correlation, negative at the opposite lag
-ONE_SINE = 0.9  # of the increments' power within five frequencies
-AS_GOOD = 0.98  # of the best correlation
-SMOOTH_S = (0.1, 0.3, 0.6)
-BINS = 4000
-MOVING = 0.05  # of the largest increment
-CUT = 6.0  # of the median increment
-WINDOWS = 8
-REPEATING = 0.8  # autocorrelation of the load's increments at a lag
-EARNED = 0.8  # of the squared error that is left without the shift
-EARNED_ALONE = 0.6  # the same where zero lag correlates nearly as well, as it does on long even ramps
-TIME_CONSTANTS_S = (0.05, 0.1, 0.2, 0.5, 1.5, 5.0, 15.0, 60.0)
-PLAY_WIDTHS = (0.005, 0.01, 0.02, 0.04, 0.06, 0.08, 0.12, 0.16)  # of the load's span
+SMOOTHING = (1.0, 3.0, 6.0)  # echoes
+WINDOWS = 8  # at most: octants of the load's movement
+OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # what a bank of plays spans about the share that stands still
 
 
 def align(view: View) -> View:
@@ -52,7 +36,7 @@ def align(view: View) -> View:
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
     moved = view.time_s - offset_s - rate * (view.time_s - middle)
     load = np.interp(moved, view.time_s, view.load.values)
-    return replace(view, load=Signal(load), offset_s=offset_s, rate=rate)
+    return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate)
 
 
 def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
@@ -61,7 +45,7 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
         return
     half = 0.5 * float(view.time_s[-1] - view.time_s[0])
     first, last = view.offset_s - view.rate * half, view.offset_s + view.rate * half
-    drift = abs(last - first) > max(LEAST_LAG_S, LEAST_LAG_SAMPLES * view.step_s)
+    drift = abs(last - first) > _least_lag_s(view)
     course = f" (from {first:+.2f} s at the start to {last:+.2f} s at the end)" if drift else ""
     yield Finding(
         "two_clocks",
@@ -72,26 +56,34 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
     )
 
 
+def _least_lag_s(view: View) -> float:
+    """Less may be the sensor's own lag, or the delay of a logger, which a model holds."""
+    return max(view.thresholds.sensor_lag_s, view.thresholds.few * view.step_s)
+
+
 def _lag_line(view: View) -> tuple[float, float] | None:
     """Lag in s in the middle and its growth in s per s, or None where the clocks agree."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
-    if duration_s < 5.0 or np.ptp(view.load.values) == 0.0 or np.ptp(view.reading.values) == 0.0:
+    given = view.thresholds
+    if duration_s < given.hold_s or np.ptp(view.load.values) == 0.0 or np.ptp(view.reading.values) == 0.0:
         return None
-    bins = int(min(BINS, view.time_s.size // 2))
+    bins = int(min(given.bins, view.time_s.size // 2))
     width_s = duration_s / bins
     grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
     load = _binned(view.time_s, five_point_median(view.load.values), grid, width_s)
     reading = _binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
-    if _is_one_sine(load):
+    if _is_one_sine(load, given):
         return None
-    for smooth_s in SMOOTH_S:  # as little as the noise allows, since smoothing blunts the edges
-        places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s)
-        if weights.size and float(np.median(weights)) >= CLEAR:
+    for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
+        smooth_s = echoes * given.echo_s
+        places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s, given)
+        if weights.size and float(np.median(weights)) >= 1.0 - given.same:
             break
-    least = max(LEAST_LAG_S, LEAST_LAG_SAMPLES * view.step_s)
+    least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
-    before, repeating = None, _repeats_itself(load)
-    for lags, earned in ((smallest, EARNED), (best, EARNED_ALONE)):
+    before, repeating = None, _repeats_itself(load, given)
+    # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
+    for lags, earned in ((smallest, 1.0 - given.same), (best, 1.0 / given.clear)):
         if places.size == 0 or np.max(np.abs(lags)) <= least:
             continue
         offered = []
@@ -100,27 +92,27 @@ def _lag_line(view: View) -> tuple[float, float] | None:
             if np.max(np.abs(ends)) <= least:
                 continue
             shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
-            after = _unexplained(grid, shifted, reading, smooth_s)
-            if lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate):
+            after = _unexplained(grid, shifted, reading, smooth_s, given)
+            if lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given):
                 return offset_s, rate
             offered.append((after, offset_s, rate))
         if not offered:
             continue
-        before = _unexplained(grid, load, reading, smooth_s) if before is None else before
+        before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
         after, offset_s, rate = min(offered)
         if after < earned * before:
             return offset_s, rate
     return None
 
 
-def _is_one_sine(load: Array) -> bool:
+def _is_one_sine(load: Array, thresholds: Thresholds) -> bool:
     """Whether the load is little more than one sine: its lag is a phase, which any relaxation has."""
     power = np.abs(np.fft.rfft(np.diff(load))) ** 2
     best = int(np.argmax(power))
-    return bool(power[max(best - 2, 0) : best + 3].sum() > ONE_SINE * power.sum())
+    return bool(power[max(best - 2, 0) : best + 3].sum() > (1.0 - thresholds.faulty_share) * power.sum())
 
 
-def _repeats_itself(load: Array) -> bool:
+def _repeats_itself(load: Array, thresholds: Thresholds) -> bool:
     """Whether the load is periodic: windows then agree on a lag that may be wrong by a period."""
     from scipy.signal import correlate
 
@@ -128,19 +120,20 @@ def _repeats_itself(load: Array) -> bool:
     correlation = correlate(d, d, mode="full", method="fft")[d.size - 1 :]
     correlation = correlation[: d.size // 2] / (correlation[0] * (1.0 - np.arange(d.size // 2) / d.size))
     fallen = int(np.argmax(correlation < 0.0)) or correlation.size
-    return bool(np.max(correlation[fallen:], initial=0.0) > REPEATING)
+    return bool(np.max(correlation[fallen:], initial=0.0) > 1.0 - thresholds.same)
 
 
-def _unanimous(places: Array, lags: Array, offset_s: float, rate: float) -> bool:
+def _unanimous(places: Array, lags: Array, offset_s: float, rate: float, thresholds: Thresholds) -> bool:
     """Whether windows agree on a lag too long for a sensor's own: then edges need not be sharp enough to tell the two.
 
-    Counted are the windows in which the line itself is a long lag; hardly any of them may allow zero.
+    Counted are the windows in which the line itself is clearly longer than a sensor's lag (a unit that relaxes answers
+    a corner at once); hardly any of them may allow zero.
     """
     line = offset_s + rate * places
-    far = np.abs(line) > LONG_LAG_S
-    if far.sum() < UNANIMOUS or np.mean(lags[far] != 0.0) < 0.75:
+    far = np.abs(line) > thresholds.clear * thresholds.sensor_lag_s
+    if far.sum() < WINDOWS // 2 or np.mean(lags[far] != 0.0) < 1.0 - thresholds.same:
         return False
-    return bool(np.median(np.abs(lags - line)) < 0.25 * np.max(np.abs(line)))
+    return bool(np.median(np.abs(lags - line)) < thresholds.same * np.max(np.abs(line)))
 
 
 def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
@@ -154,7 +147,7 @@ def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
 
 
 def _window_lags(
-    grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float
+    grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float, thresholds: Thresholds
 ) -> tuple[Array, Array, Array, Array]:
     """Middle, smallest and best lag in s and correlation, (w,) each, of windows in which load and reading both move."""
     from scipy.ndimage import gaussian_filter1d
@@ -162,11 +155,12 @@ def _window_lags(
     smooth = max(smooth_s / width_s, 1.0)
     d_load = gaussian_filter1d(load, smooth, order=1)
     d_reading = gaussian_filter1d(reading, smooth, order=1)
-    moving = np.abs(d_load) > MOVING * np.max(np.abs(d_load))
-    limit = CUT * float(np.median(np.abs(d_reading[moving]))) + 1e-300
+    moving = np.abs(d_load) > thresholds.faulty_share * np.max(np.abs(d_load))
+    limit = largest_of_noise(grid.size, thresholds) * float(np.median(np.abs(d_reading[moving]))) + 1e-300
     d_reading = np.clip(d_reading, -limit, limit)  # edges of dropouts and jumps
-    most = min(int(np.ceil(LARGEST_LAG_S / width_s)), grid.size // 6)
-    windows = int(max(1, min(WINDOWS, grid.size * width_s / 15.0)))
+    longest_s = thresholds.clear * thresholds.hold_s
+    most = min(int(np.ceil(longest_s / width_s)), grid.size // 6)
+    windows = int(max(1, min(WINDOWS, grid.size * width_s / (thresholds.clear * longest_s))))
     lags_bins = np.arange(-most, most + 1)
     cumulated = np.cumsum(d_load**2)
     cuts = np.searchsorted(cumulated, np.linspace(0.0, cumulated[-1], windows + 1))
@@ -177,9 +171,9 @@ def _window_lags(
             continue
         correlation = _correlation(d_load[low:high], d_reading[low:high], most)
         best = int(np.argmax(correlation))
-        if correlation[best] < LEAST_CORRELATION or correlation[-1 - best] < -MIRRORED * correlation[best]:
+        if correlation[best] < thresholds.follows or -thresholds.clear * correlation[-1 - best] > correlation[best]:
             continue  # as much against it as for it, on both sides of zero: one is the other's rate, as in friction
-        good = np.flatnonzero(correlation >= AS_GOOD * correlation[best])
+        good = np.flatnonzero(correlation >= (1.0 - thresholds.standing) * correlation[best])
         chosen = int(good[np.argmin(np.abs(lags_bins[good]))])
         # Where zero is not as good as the best there is no plateau from zero on: the peak itself is the lag.
         peak = float(lags_bins[best]) * width_s
@@ -214,7 +208,7 @@ def _lines(places: Array, lags: Array, weights: Array) -> list[tuple[float, floa
     found = []
     if places.size >= 4:
         i, j = np.triu_indices(places.size, 1)
-        apart = places[j] - places[i] > 0.2 * np.ptp(places)
+        apart = places[j] - places[i] > np.ptp(places) / places.size
         rate = float(np.median((lags[j] - lags[i])[apart] / (places[j] - places[i])[apart]))
         left = lags - rate * places
         if np.median(np.abs(left - np.median(left))) < 0.5 * np.median(np.abs(lags - np.median(lags))):
@@ -229,7 +223,7 @@ def _middle(values: Array, weights: Array) -> float:
 
 
 @on_one_thread
-def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float) -> float:
+def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thresholds: Thresholds) -> float:
     """Mean square of the reading's increments after all that a unit without a second clock might do to the load.
 
     Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
@@ -240,14 +234,16 @@ def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float) -> f
     step_s = float(grid[1] - grid[0])
     f = (load - load.min()) / np.ptp(load)
     columns = [f, f**2, f**3]
-    for tau_s in TIME_CONSTANTS_S:
+    memory_s = np.geomspace(thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1], 8)
+    for tau_s in memory_s:  # two and a half a decade
         keep = float(np.exp(-step_s / tau_s))
         columns.append(lfilter([1.0 - keep], [1.0, -keep], f, zi=[keep * f[0]])[0])
-    columns += list(_play(f))
+    columns += list(_play(f, thresholds.standing * OCTAVES))
     smooth = max(smooth_s / step_s, 1.0)
     matrix = gaussian_filter1d(np.stack(columns, axis=1), smooth, axis=0, order=1)
     target = gaussian_filter1d(reading, smooth, order=1)
-    limit = CUT * float(np.median(np.abs(target[np.abs(matrix[:, 0]) > MOVING * np.max(np.abs(matrix[:, 0]))])))
+    moving = np.abs(matrix[:, 0]) > thresholds.faulty_share * np.max(np.abs(matrix[:, 0]))
+    limit = largest_of_noise(grid.size, thresholds) * float(np.median(np.abs(target[moving])))
     target = np.clip(target, -limit, limit)
     matrix /= np.linalg.norm(matrix, axis=0) + 1e-300
     normal = matrix.T @ matrix
@@ -256,9 +252,8 @@ def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float) -> f
     return float(np.mean(left**2))
 
 
-def _play(load: Array) -> Array:
+def _play(load: Array, width: Array) -> Array:
     """(widths, n) play operators of the load, each of one width."""
-    width = np.array(PLAY_WIDTHS)
     out = np.empty((load.size, width.size))
     state = np.full(width.size, load[0])
     low, high = load[:, None] - width, load[:, None] + width

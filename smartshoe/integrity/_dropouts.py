@@ -15,20 +15,8 @@ from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._held import held
 from smartshoe.integrity._spikes import isolated_beside
 from smartshoe.integrity._view import View
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.masks import runs_of
-
-GONE = 0.25  # of the expected reading at most is left
-LEAST_EXPECTED = 0.03  # of the span: below, a dropout cannot be distinguished from rest
-EDGE, BESIDE = 0.5, 5
-LET_GO = 0.3  # of the span
-BELOW_REST = 0.05  # of the span
-MOST_PASSES = 10  # two are usual; each finds less, since fewer are left
-LEVEL = 0.01  # of the span: within which dropouts end at one level
-CLEAR = 6.5  # standard deviations of noise, as of spikes
-STANDS = 0.005  # of the span: how far a level may drift within a dropout
-AT_LEVEL = 0.8  # of the samples: edges may be caught halfway
-COMMON, MOST_COMMON = 0.02, 20  # share of the samples, and how many such values
-FEWEST = 3  # falls of two samples at most
 
 
 def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
@@ -41,12 +29,11 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     at = dropped(view)
     if at.any() and not _one_level(view, at):
         at[:] = False
-    known = np.union1d(view.sign * view.dropped_to, common_values(view.reading.values[at]))
-    for _ in range(MOST_PASSES):  # with those known cut out the noise is known better
-        more = _also_gone(view, at, known) & ~at
-        if not more.any():
-            break
+    known = np.union1d(view.sign * view.dropped_to, common_values(view.reading.values[at], view.thresholds))
+    more = _also_gone(view, at, known) & ~at
+    while more.any():  # with those known cut out the noise is known better
         at |= more
+        more = _also_gone(view, at, known) & ~at
     if not at.any():
         return
     starts, stops = runs_of(at)
@@ -64,27 +51,27 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
 
 def dropped(view: View) -> Mask:
     """(m,) samples of runs that are low although the load is on, or below rest, and begin and end abruptly."""
-    y = view.reading.values
+    y, given = view.reading.values, view.thresholds
     above = view.expected - view.rest
-    noise = view.reading.noise
-    loaded = above > np.maximum(LEAST_EXPECTED * view.span, 8.0 * view.reading.quiet_noise)
-    low = loaded & (y < view.rest + GONE * above)
-    below = y < view.rest - np.maximum(BELOW_REST * view.span, 10.0 * noise)
+    least = np.maximum(given.standing * view.span, view.reading.largest * view.reading.noise)
+    loaded = above > given.clear * least
+    low = loaded & (y < view.rest + given.same * above)
+    below = y < view.rest - given.clear * least
     out = np.zeros(y.size, dtype=bool)
-    jump, gap = view.jump, np.diff(view.time_s) > 1.6 * view.step_s
+    jump, gap = given.clear * view.jump, view.gap
     lost = np.where(below, view.rest - y, view.expected - y)
     for first, stop in zip(*runs_of(low | below), strict=True):
         ends_open = stop == y.size or bool(gap[stop - 1])
         # Both edges make up most of what is lost. A spike just before or after is no edge.
-        falls = first > 0 and jump[first - 1] < -EDGE * lost[first]
-        falls = falls and _stood(y[max(first - BESIDE, 0) : first], y[first] + EDGE * lost[first])
-        rises = not ends_open and jump[stop - 1] > EDGE * lost[stop - 1]
-        rises = rises and _stood(y[stop : stop + BESIDE], y[stop - 1] + EDGE * lost[stop - 1])
+        falls = first > 0 and jump[first - 1] < -lost[first]
+        falls = falls and _stood(y[max(first - given.few, 0) : first], y[first] + lost[first] / given.clear)
+        rises = not ends_open and jump[stop - 1] > lost[stop - 1]
+        rises = rises and _stood(y[stop : stop + given.few], y[stop - 1] + lost[stop - 1] / given.clear)
         if falls and rises:
             out[first:stop] = True
         elif falls and (ends_open or not loaded[stop]):
             # The load went while the reading was gone. A contact that lets go at a low load jumps too.
-            out[first:stop] = above[first] > LET_GO * view.span or below[first]
+            out[first:stop] = above[first] > given.same * view.span or below[first]
     return out
 
 
@@ -108,23 +95,25 @@ def _also_gone(view: View, at: Mask, known: Array) -> Mask:
 
 def _fallen(view: View, exact: Mask) -> Mask:
     """(m,) runs of ``exact`` values that stand clear of the noise of what is beside them."""
-    y = view.reading.values
+    y, few = view.reading.values, view.thresholds.few
     out = np.zeros(y.size, dtype=bool)
+    clear = view.reading.largest * view.reading.noise
     for first, stop in zip(*runs_of(exact), strict=True):
-        beside = np.concatenate([y[max(first - BESIDE, 0) : first], y[stop : stop + BESIDE]])
-        out[first:stop] = beside.size > 0 and float(np.min(beside)) > y[first] + CLEAR * view.reading.noise[first]
+        beside = np.concatenate([y[max(first - few, 0) : first], y[stop : stop + few]])
+        out[first:stop] = beside.size > 0 and float(np.min(beside)) > y[first] + clear[first]
     return out
 
 
-def common_values(y: Array) -> Array:
+def common_values(y: Array, thresholds: Thresholds) -> Array:
     """The values that dropouts take exactly, where they do: a rail, a zero, an error code."""
     values, count = np.unique(y, return_counts=True)
-    common: Array = values[count >= max(COMMON * y.size, FEWEST)]
-    return common if common.size <= MOST_COMMON else common[:0]
+    out: Array = values[count > max(thresholds.faulty_share * y.size, 2)]
+    return out
 
 
 def _near(view: View, level: float) -> Mask:
-    out: Mask = np.abs(view.reading.values - level) <= 3.0 * view.reading.quiet_noise + LEVEL * view.span
+    within = view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
+    out: Mask = np.abs(view.reading.values - level) <= within
     return out
 
 
@@ -134,21 +123,22 @@ def _one_level(view: View, at: Mask) -> bool:
     One fall, or several from much the same load, must have taken most of a large reading. Short falls must be several
     and from different loads: a spike may fall anywhere.
     """
-    y = view.reading.values
+    y, given = view.reading.values, view.thresholds
+    most = 1.0 - given.same  # edges may be caught halfway
     starts, stops = runs_of(at)
-    if _near(view, float(np.median(y[at])))[at].mean() < AT_LEVEL:
+    if _near(view, float(np.median(y[at])))[at].mean() < most:
         return False
     still = [_stands(y[a:b], view) for a, b in zip(starts, stops, strict=True)]
-    if float(np.average(still, weights=stops - starts)) < AT_LEVEL:
+    if float(np.average(still, weights=stops - starts)) < most:
         return False
     before = y[np.maximum(starts - 1, 0)]
     after = np.array([float(np.median(y[a:b])) for a, b in zip(starts, stops, strict=True)])
     lost = np.maximum(before, view.expected[starts]) - after
     noise = view.reading.quiet_noise + view.reading.step
-    if lost.max() < LET_GO * view.span or (starts.size > 2 and _scatter(after) > max(_scatter(lost), noise)):
+    if lost.max() < given.same * view.span or (starts.size > 2 and _scatter(after) > max(_scatter(lost), noise)):
         return False
     short = int((stops - starts).max()) <= 2
-    return not short or (starts.size >= FEWEST and float(np.ptp(view.expected[at])) > 0.2 * view.span)
+    return not short or (starts.size > 2 and float(np.ptp(view.expected[at])) > given.same * view.span)
 
 
 def _stands(part: Array, view: View) -> bool:
@@ -157,7 +147,8 @@ def _stands(part: Array, view: View) -> bool:
     if third < 2:
         return True
     moved = abs(float(part[-third:].mean() - part[:third].mean()))
-    return bool(moved <= 5.0 * view.reading.quiet_noise * (2.0 / third) ** 0.5 + STANDS * view.span)
+    noise = view.reading.largest * view.reading.quiet_noise * (2.0 / third) ** 0.5
+    return bool(moved <= noise + view.thresholds.standing * view.span)
 
 
 def _scatter(values: Array) -> float:

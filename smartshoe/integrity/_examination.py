@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,10 +20,10 @@ from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
 from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
-OF_RECORDING: tuple[Callable[[Recording], Iterator[Finding]], ...] = (
-    short_recording,
+OF_RECORDING: tuple[Callable[[Recording, Thresholds], Iterator[Finding]], ...] = (
     missing_samples,
     gaps,
     uneven_sampling,
@@ -41,11 +42,10 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     quantisation,
     hum,
 )
-LEAST_USABLE = 0.5
 NONE: Array = np.zeros(0)
 
 
-def examine(recordings: Sequence[Recording]) -> Integrity:
+def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
     """What is wrong with the data of ``recordings``, before any model; deterministic.
 
     Each recording has one reference load and one reading; where it has not, that is its refusal. Raises `InputError`
@@ -57,15 +57,16 @@ def examine(recordings: Sequence[Recording]) -> Integrity:
     usable: list[Mask] = []
     offsets: list[tuple[float, float]] = []
     refusals: list[str] = []
-    examined = [_examined(recording) for recording in recordings]
+    decided = thresholds or Thresholds()
+    examined = [_examined(recording, decided) for recording in recordings]
     dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
     if dropped_to.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
-        examined = [_examined(recording, dropped_to) for recording in recordings]
+        examined = [_examined(recording, decided, dropped_to) for recording in recordings]
     for number, (recording, (findings, mask, clock)) in enumerate(zip(recordings, examined, strict=True)):
         faults += [_fault(number, recording, finding) for finding in findings]
         refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
-        if not refused and mask.mean() < LEAST_USABLE:
+        if not refused and decided.clear * mask.mean() < 1.0:
             refused = [
                 f"{recording.label}: {100 * (1 - float(mask.mean())):.0f} % of the samples are faulty"
                 f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
@@ -80,10 +81,15 @@ def examine(recordings: Sequence[Recording]) -> Integrity:
     )
 
 
-def _examined(recording: Recording, dropped_to: Array = NONE) -> tuple[list[Finding], Mask, tuple[float, float]]:
+def _examined(
+    recording: Recording, thresholds: Thresholds, dropped_to: Array = NONE
+) -> tuple[list[Finding], Mask, tuple[float, float]]:
     """The findings of one recording, its usable samples, its clock's offset and rate; ``dropped_to`` as in `View`."""
-    findings = [finding for detect in OF_RECORDING for finding in detect(recording)]
     usable = np.ones(len(recording), dtype=bool)
+    findings = list(short_recording(recording, thresholds))
+    if findings:
+        return findings, ~usable, (0.0, 0.0)
+    findings = [finding for detect in OF_RECORDING for finding in detect(recording, thresholds)]
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
@@ -91,8 +97,8 @@ def _examined(recording: Recording, dropped_to: Array = NONE) -> tuple[list[Find
     lacking = _lacking(recording)
     if lacking is not None:
         findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
-    elif not any(finding.refuses for finding in findings):
-        view = _view(recording, dropped_to)
+    else:
+        view = _view(recording, thresholds, dropped_to)
         if view is None:
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
@@ -126,18 +132,19 @@ def _lacking(recording: Recording) -> str | None:
     )
 
 
-def _view(recording: Recording, dropped_to: Array = NONE) -> View | None:
+def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> View | None:
     """The recording where load and reading are both present, on one clock, the reading rising with load."""
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
-    if index.size < 64:
+    if index.size < thresholds.least_samples:
         return None
     time_s, load_n, reading = recording.time_s[index], load.si[index], sensor.values[index]
-    view = View(recording, index, time_s, Signal(load_n), Signal(reading), 1, dropped_to=dropped_to)
-    at, middle, _ = view.curve
+    force = Signal(load_n, thresholds)
+    view = View(recording, index, time_s, force, Signal(reading, thresholds), 1, thresholds, dropped_to=dropped_to)
+    at, middle = view.curve
     turned = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
     if turned:
-        view = View(recording, index, time_s, Signal(load_n), Signal(-reading), -1, dropped_to=dropped_to)
+        view = replace(view, reading=Signal(-reading, thresholds), sign=-1)
     return align(view)
 
 

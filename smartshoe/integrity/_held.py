@@ -8,20 +8,10 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._scales import SECOND_DIFFERENCE
-from smartshoe.integrity._view import DITHERED, View
+from smartshoe.integrity._scales import ROUNDING, SECOND_DIFFERENCE
+from smartshoe.integrity._view import LATTICE_ERROR, View, toggling
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
-
-CERTAIN = 1e-9  # chance that an honest run would repeat so
-LEVELS = tuple(10.0 ** (-0.25 * k) for k in range(24, 5, -1))  # chances at which honest runs are counted
-FLOAT_STEP = 1e-9  # of the span: what a noiseless relaxation comes to rest within
-DOUBT = 0.1  # honest repeats among those that are left out, at most
-WINDOW, LEAST_TURNS = 32, 8
-NEIGHBOURS = 40
-BESIDE, STILL = 14, 3
-CAUGHT = 0.4  # of the slope on either side, that a held run's mean slope up to the next value has at least
-LONG = 8  # repeats; from there on the slopes on both sides say little of what lies between
-SMALLEST_WIDTH = 0.15  # of the grid step: what noise is taken for at least, where motion is judged
 
 
 def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
@@ -50,20 +40,30 @@ def held(view: View, bad: Mask) -> Mask:
     y = reading.values
     at = np.zeros(y.size, dtype=bool)
     # Runs at a dropout's value would pass for a logger that holds, and honest runs for its work.
-    same = (np.diff(y) == 0.0) & (np.diff(view.time_s) <= 1.6 * view.step_s) & ~bad[1:] & ~bad[:-1]
+    same = (np.diff(y) == 0.0) & ~view.gap & ~bad[1:] & ~bad[:-1]
     starts, stops = runs_of(same)  # samples starts..stops, stops included
     if starts.size == 0 or view.span == 0.0:
         return at
     log_chance = _log_chance(view, starts, stops)
-    sure = log_chance < np.log(CERTAIN)
-    for level in LEVELS:  # more runs of small chance than that chance allows: the logger does hold, and how often
-        found, honest = int((log_chance < np.log(level)).sum()), level * y.size
-        if found > honest + 5.0 * np.sqrt(honest) + 5.0:
-            sure |= log_chance < np.log(DOUBT * (found - honest) / y.size)
+    sure = log_chance < _rarely_honest(log_chance, y.size, view.thresholds)
     sure |= _caught_up(view, starts, stops)
     for first, last in zip(starts[sure], stops[sure], strict=True):
         at[first + 1 : last + 1] = True
     return at
+
+
+def _rarely_honest(log_chance: Array, count: int, thresholds: Thresholds) -> float:
+    """Log of the chance below which hardly a run of ``count`` readings is honest.
+
+    One of a false alarm in the whole recording; or, where there are more runs of a small chance than that chance
+    allows (the logger does hold, and so often), one that leaves a ``faulty_share`` of honest ones among them.
+    """
+    increasing = np.sort(log_chance)
+    honest = count * np.exp(increasing)
+    beyond = np.arange(increasing.size) - honest
+    many = beyond > largest_of_noise(count, thresholds) * np.sqrt(honest) + thresholds.few
+    often = float(np.max(beyond, where=many, initial=0.0)) * thresholds.faulty_share
+    return float(np.log(max(thresholds.false_alarm, often) / count))
 
 
 def _log_chance(view: View, starts: Index, stops: Index) -> Array:
@@ -71,28 +71,28 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     from scipy.special import erf
 
     reading = view.reading
-    y = reading.values
+    y, given = reading.values, view.thresholds
     repeats = stops - starts
     # Where no grid is known the smallest gap between readings is an upper bound of its step.
-    step = max(reading.step or reading.least_gap, FLOAT_STEP * view.span)
-    least = np.minimum(_noise_beside(y, starts, stops), view.noise_at_load[starts])
+    step = max(reading.step or reading.least_gap, ROUNDING * view.span)
+    least = np.minimum(_noise_beside(y, starts, stops, given.local // 4), view.noise_at_load[starts])
     # A rail repeats without being held. Between two levels an undithered signal toggles, which looks like half a step
     # of noise and says nothing.
     rail = (y[starts] == y.min()) | (y[starts] == y.max())
-    noisy = (least > DITHERED * step) & ~rail & _alternates(y, starts, stops)
+    noisy = (least > toggling(step, given)) & ~rail & _alternates(y, starts, stops, given)
     within = np.ones(starts.size)
     within[noisy] = erf(step / (np.sqrt(8.0) * least[noisy]))
-    within[noisy] = np.maximum(within[noisy], _common(y, starts[noisy], stops[noisy]))
+    within[noisy] = np.maximum(within[noisy], _common(y, starts[noisy], stops[noisy], given.local // 2))
     motion = _motion(view, starts, stops, step)
     beyond = np.maximum(0.5 * (motion * repeats - step), 0.0)
     many = np.maximum(beyond / (3.0 * np.maximum(motion, 1e-300)), 1.0)
     noise = np.maximum(reading.noise[starts], reading.noise[stops])
-    width = np.hypot(noise, SMALLEST_WIDTH * step)
+    width = np.hypot(noise, LATTICE_ERROR * step)
     out: Array = repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
     return out
 
 
-def _noise_beside(y: Array, starts: Index, stops: Index) -> Array:
+def _noise_beside(y: Array, starts: Index, stops: Index, beside: int) -> Array:
     """(runs,) the lesser noise just before and just after each run; a side that is held itself is left out.
 
     At either end of the recording it is 0: one side does not tell whether noise was there on the other.
@@ -101,18 +101,18 @@ def _noise_beside(y: Array, starts: Index, stops: Index) -> Array:
     power = np.concatenate([[0.0], np.cumsum(second**2)])
     moving = np.concatenate([[0], np.cumsum(second != 0.0)])
     least = np.full(starts.size, np.inf)
-    for low, high in ((starts - BESIDE, starts - 1), (stops, stops + BESIDE - 1)):
+    for low, high in ((starts - beside, starts - 1), (stops, stops + beside - 1)):
         a, b = np.clip(low, 0, second.size), np.clip(high, 0, second.size)
         side = np.sqrt((power[b] - power[a]) / np.maximum(b - a, 1)) / SECOND_DIFFERENCE
-        side = np.where(moving[b] - moving[a] < STILL, np.inf, side)
-        least = np.where(b - a < BESIDE // 2, 0.0, np.minimum(least, side))
+        side = np.where(moving[b] - moving[a] < beside // 4, np.inf, side)
+        least = np.where(b - a < beside // 2, 0.0, np.minimum(least, side))
     out: Array = np.where(np.isfinite(least), least, 0.0)
     return out
 
 
-def _common(y: Array, starts: Index, stops: Index) -> Array:
+def _common(y: Array, starts: Index, stops: Index, beside: int) -> Array:
     """(runs,) share of the readings before and after each run that equal it: some converters favour a value."""
-    away = np.arange(1, NEIGHBOURS + 1)
+    away = np.arange(1, beside + 1)
     before, after = starts[:, None] - away, stops[:, None] + away
     equal = np.zeros(starts.size)
     there = np.zeros(starts.size)
@@ -124,18 +124,21 @@ def _common(y: Array, starts: Index, stops: Index) -> Array:
     return out
 
 
-def _alternates(y: Array, starts: Index, stops: Index) -> Mask:
+def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -> Mask:
     """(runs,) whether second differences change sign more often than not before and after: noise, not curvature."""
+    beside = thresholds.local // 2
     second = np.diff(y, 2)
     product = second[1:] * second[:-1]
     turns = np.concatenate([[0], np.cumsum((product < 0.0).astype(np.int64))])
     stays = np.concatenate([[0], np.cumsum((product > 0.0).astype(np.int64))])
     turned, stayed = np.zeros(starts.size, dtype=np.int64), np.zeros(starts.size, dtype=np.int64)
-    for low, high in ((starts - WINDOW, starts - 2), (stops, stops + WINDOW - 2)):
+    for low, high in ((starts - beside, starts - 2), (stops, stops + beside - 2)):
         a, b = np.clip(low, 0, product.size), np.clip(high, 0, product.size)
         turned += turns[b] - turns[a]
         stayed += stays[b] - stays[a]
-    out: Mask = (turned > 1.5 * stayed) & (turned >= LEAST_TURNS)  # white noise has 2.7 times as many
+    out: Mask = (turned > np.sqrt(thresholds.clear) * stayed) & (
+        turned > thresholds.few
+    )  # white noise: 2.7 times as many
     return out
 
 
@@ -148,7 +151,8 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     y, load = view.reading.values, view.steady_load
     m = y.size
     repeats = stops - starts
-    reach = np.clip(2 * repeats, 6, 60)
+    given = view.thresholds
+    reach = np.clip(2 * repeats, given.few, given.local)
     low, high = np.maximum(starts - reach, 0), np.minimum(stops + 1 + reach, m - 1)
     after_first = np.minimum(stops + 1, m - 1)
     before = (y[starts] - y[low]) / np.maximum(starts - low, 1)
@@ -157,9 +161,10 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     agree = (np.sign(before) == np.sign(caught)) & (np.sign(after) == np.sign(caught))
     least = np.minimum(np.minimum(np.abs(before), np.abs(after)), np.abs(caught))
     # What a friction or a dead band has held back is not caught up with.
-    kept = np.abs(caught) < CAUGHT * np.minimum(np.abs(before), np.abs(after))
+    kept = given.clear * np.abs(caught) < np.minimum(np.abs(before), np.abs(after))
+    long = repeats > given.few  # from there on the slopes on both sides say little of what lies between
     jump, onward = y[after_first] - y[stops], y[np.minimum(stops + 2, m - 1)] - y[after_first]
-    kept |= (repeats >= LONG) & (np.abs(jump) < 2.5 * np.abs(onward))
+    kept |= long & (np.abs(jump) < given.clear * np.abs(onward))
     last = y[starts] - y[np.maximum(starts - 3, 0)]
     agree &= np.sign(last) == np.sign(caught)
     # A quarter is left out at both ends: the reading may follow a step of load a little late.
@@ -167,12 +172,13 @@ def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
     a, b = starts + edge, stops - edge
     half = np.maximum((b - a + 1) // 2, 1)
     steady = np.minimum(np.abs(load[a + half] - load[a]), np.abs(load[b] - load[b - half])) / half
-    steady -= (6.0 * view.load.quiet_noise / np.sqrt(view.near) + view.load.step) / half
+    noise = view.load.largest * view.load.quiet_noise
+    steady -= (noise / np.sqrt(view.near) + view.load.step) / half
     # The mean over ``near`` samples brings a step beside a shorter run into it.
     span = np.maximum(b - a, 1)
-    plain = (np.abs(view.load.values[b] - view.load.values[a]) - 5.0 * view.load.quiet_noise - view.load.step) / span
+    plain = (np.abs(view.load.values[b] - view.load.values[a]) - noise - view.load.step) / span
     moved = np.maximum(np.where(repeats > 2 * view.near, steady, plain), 0.0)
-    least = np.where(repeats >= LONG, np.minimum(least, 2.0 * view.gain * moved), least)
+    least = np.where(long, np.minimum(least, given.clear * view.gain * moved), least)
     # A slope between two grid values is uncertain by a step.
     out: Array = np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
     return out
@@ -185,12 +191,13 @@ def _caught_up(view: View, starts: Index, stops: Index) -> Mask:
     """
     out = np.zeros(starts.size, dtype=bool)
     y, load, jump = view.reading.values, view.load.values, view.jump
+    noise = view.load.largest * view.load.quiet_noise
     rail = (y[starts] == y.min()) | (y[starts] == y.max())  # there a dead band or saturation stands still
     for i in np.flatnonzero((stops - starts >= 3) & (stops < y.size - 1) & ~rail):
         first, last = int(starts[i]), int(stops[i])
         if jump[last] == 0.0:
             continue
         part = load[first : first + max(3 * (last - first) // 4, 1) + 1]
-        moved = float(np.max(np.abs(part - part[0]))) - 6.0 * view.load.quiet_noise
-        out[i] = view.gain * moved > 0.5 * abs(float(jump[last]))
+        moved = float(np.max(np.abs(part - part[0]))) - noise
+        out[i] = view.thresholds.clear * view.gain * moved > abs(float(jump[last]))
     return out

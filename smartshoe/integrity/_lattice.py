@@ -8,28 +8,24 @@ import numpy as np
 
 from smartshoe.arrays import Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._view import View
+from smartshoe.integrity._view import LATTICE_ERROR, View
 from smartshoe.signals.masks import runs_of
-
-# A grid of step q adds an error of q/sqrt(12). It is a fault where that is at least 0.03 % of the reading's span
-# (beside a diagnosis's materiality of 0.02 %) and at least a quarter of the noise that is there without it: below, the
-# noise dithers the grid and hides it.
-MATERIAL_SHARE = 0.0003
-BESIDE_NOISE = 0.25
-LEAST_RUNS = 10
-MOVED = 0.4  # of a step
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``quantisation``; nothing is masked, since every sample has it."""
+    """Kind ``quantisation``; nothing is masked, since every sample has it.
+
+    A grid adds an error. It is a fault where that is material, and more than the share of the noise by which two
+    noises count as the same: more noise dithers the grid and hides it.
+    """
     step = view.reading.step
     if step == 0.0 or view.span == 0.0:
         return
     if not _stands_while_load_moves(view, step):
         return
-    error = step / np.sqrt(12.0)
+    error = LATTICE_ERROR * step
     noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
-    if error < MATERIAL_SHARE * view.span or error < BESIDE_NOISE * noise:
+    if error < view.thresholds.material * view.span or error < view.thresholds.same * noise:
         return
     yield Finding(
         "quantisation",
@@ -44,4 +40,4 @@ def _stands_while_load_moves(view: View, step: float) -> bool:
     """Whether a reading stays on a level while the load goes on; a noiseless reading of a load in steps does not."""
     starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
     moved = view.gain * np.abs(view.steady_load[stops] - view.steady_load[starts])
-    return int((moved > MOVED * step).sum()) >= LEAST_RUNS
+    return int((moved > view.thresholds.same * step).sum()) >= view.thresholds.clear * view.thresholds.few

@@ -9,26 +9,13 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._view import View
+from smartshoe.integrity._view import View, toggling
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
+from smartshoe.signals.noise import robust_sd
 
-BLOCK_S = 0.25
-LEAST_STRETCH_S = 1.0
-LEAST_HZ = 3.0  # below, a line is drift or physics
-QUIET_MOVE = 0.003  # of the load's span, from one block to the next
-NEIGHBOURHOOD_HZ = 3.0
-SURE = 14.0  # beyond ln(frequencies) in units of the local mean power: a chance of 1e-6
-LEAST_SHARE = 0.0001  # of the span
-BESIDE_LATTICE = 0.6  # of the step, where noise does not dither it
-STEADY = 2.5  # first halves of the stretches against second ones: a ringing dies, a hum does not
-MAINS_COHERENT = 0.3  # of the parts' amplitude: mains drift by some hundredths of a hertz
-COHERENT, DOUBTS = 0.7, 3.0  # the same of any other line; standard deviations
-AS_STEADY = 1.5  # in power; 3 Hz with 1 % of damping loses more from half to half of a stretch of four seconds
-CLEAR, FEWEST_PARTS = 0.25, 4  # noise over the line in a part that must show it
-UNEVEN = 2.5  # times; that much noise makes it 1.7
 MAINS_HZ = (50.0, 60.0)
 HARMONICS = 3
-MOST_LINES = 5
 
 
 def hum(view: View, bad: Mask) -> Iterator[Finding]:
@@ -74,7 +61,7 @@ def lines(view: View, bad: Mask) -> list[tuple[float, float]]:
         return []
     residual, weight = _residual(view, bad, stretches)
     found: list[tuple[float, float]] = []
-    for _ in range(MOST_LINES):
+    for _ in range(view.thresholds.few):
         line = _strongest(view, residual, weight, stretches)
         if line is None:
             break
@@ -84,46 +71,46 @@ def lines(view: View, bad: Mask) -> list[tuple[float, float]]:
 
 
 def _quiet_stretches(view: View) -> list[tuple[int, int]]:
-    """Stretches (first, past last) of at least a second in which the block means of the load stand still."""
-    n = view.load.values.size
-    block = max(4, round(BLOCK_S / view.step_s))
+    """Stretches (first, past last) of a few blocks and more in which the block means of the load stand still."""
+    n, given = view.load.values.size, view.thresholds
+    block = max(given.few, round(given.clear * given.echo_s / view.step_s))
     count = n // block
     if count < 4:
         return []
     blocks = view.load.values[: count * block].reshape(count, block)
     mean = blocks.mean(axis=1)
     noise = view.load.quiet_noise
-    still = np.abs(np.diff(mean)) <= max(QUIET_MOVE * view.load_span, 4.0 * noise / np.sqrt(block))
-    calm = blocks.std(axis=1) <= QUIET_MOVE * view.load_span + 1.5 * noise  # a sine of four cycles a second is not
+    moves = given.still_per_s * view.load_span * block * view.step_s
+    still = np.abs(np.diff(mean)) <= max(moves, largest_of_noise(1, given) * np.sqrt(2.0 / block) * noise)
+    calm = blocks.std(axis=1) <= moves + given.clear * noise  # a sine of four cycles a second is not
     still &= calm[1:] & calm[:-1]
-    gap = np.flatnonzero((np.diff(view.time_s) > 1.6 * view.step_s) | (view.jump != 0.0)) // block
+    gap = np.flatnonzero(view.gap | (view.jump != 0.0)) // block
     still[np.minimum(gap, still.size - 1)] = False
     quiet = np.zeros(count, dtype=bool)
     quiet[1:-1] = still[1:] & still[:-1]
     starts, stops = runs_of(quiet)
-    least = max(4, round(LEAST_STRETCH_S / (block * view.step_s)))
-    return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a - 1 >= least]
+    return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a > given.few]
 
 
 def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[Array, Array]:
     """Reading less a cubic in each stretch under a Hann window, 0 elsewhere; and the window (m,)."""
     y = view.reading.values
-    limit = 8.0 * view.reading.noise + 3.0 * view.reading.step
+    limit = view.reading.largest * view.reading.noise + view.thresholds.clear * view.reading.step
     residual, weight = np.zeros(y.size), np.zeros(y.size)
     for first, last in stretches:
         x = np.linspace(-1.0, 1.0, last - first)
         basis = np.polynomial.legendre.legvander(x, 5)
         part, good = y[first:last], ~bad[first:last]
-        if good.sum() < 32:
+        if good.sum() < view.thresholds.local // 2:
             continue
         left = part - basis @ np.linalg.lstsq(basis[good], part[good], rcond=None)[0]
         window = np.hanning(last - first) * good
-        window *= np.abs(left) <= np.maximum(limit[first:last], 6.0 * np.median(np.abs(left)) * 1.4826)
+        window *= np.abs(left) <= np.maximum(limit[first:last], view.reading.largest * robust_sd(left))
         residual[first:last], weight[first:last] = left * window, window
     return residual, weight
 
 
-def _lasts(whole: float, own: Array, weight: Array, noise_power: Array) -> bool:
+def _lasts(whole: float, own: Array, weight: Array, noise_power: Array, thresholds: Thresholds) -> bool:
     """Whether one phase and one power hold in all parts.
 
     A ringing begins anew with each move of the load, larger or smaller, and dies.
@@ -132,12 +119,12 @@ def _lasts(whole: float, own: Array, weight: Array, noise_power: Array) -> bool:
     """
     share = weight**2
     power = share * (own**2 - noise_power)
-    doubt = DOUBTS * float(np.sqrt(share**2 @ (noise_power**2 + 2.0 * whole**2 * noise_power)))
-    coherent = whole**2 * float(share.sum()) > COHERENT**2 * (float(power.sum()) - doubt)
-    clear = own[noise_power < (CLEAR * max(whole, float(np.median(own)))) ** 2]
-    if clear.size >= FEWEST_PARTS and np.quantile(clear, 0.9) > UNEVEN * np.quantile(clear, 0.1):
+    doubt = largest_of_noise(1, thresholds) * float(np.sqrt(share**2 @ (noise_power**2 + 2.0 * whole**2 * noise_power)))
+    coherent = thresholds.clear * whole**2 * float(share.sum()) > float(power.sum()) - doubt
+    seen = own[noise_power < (thresholds.same * max(whole, float(np.median(own)))) ** 2]
+    if seen.size >= thresholds.few and np.quantile(seen, 0.9) > thresholds.clear * np.quantile(seen, 0.1):
         return False
-    return coherent and float(power[0::2].sum()) < AS_STEADY * float(power[1::2].sum()) + doubt
+    return coherent and float(power[0::2].sum()) < thresholds.clear * float(power[1::2].sum()) + doubt
 
 
 def _strongest(
@@ -151,17 +138,20 @@ def _strongest(
     size = 2 * int(next_fast_len((n + 1) // 2, real=True))
     power = np.abs(rfft(residual, size)) ** 2
     frequency = np.fft.rfftfreq(size, view.step_s)
-    first = int(np.searchsorted(frequency, LEAST_HZ))
+    given = view.thresholds
+    lowest_hz = given.few / given.hold_s  # below, a line is drift or physics
+    first = int(np.searchsorted(frequency, lowest_hz))
     if power.size - first < 64 or not power[first:].any():
         return None
-    width = max(1, round(NEIGHBOURHOOD_HZ / float(frequency[1])) // 64)
+    width = max(1, round(lowest_hz / float(frequency[1])) // 64)
     coarse = power[: power.size // width * width].reshape(-1, width)
     smooth = median_filter(np.median(coarse, axis=1), 65, mode="mirror") / np.log(2.0)
     local = smooth[np.minimum(np.arange(power.size) // width, smooth.size - 1)]
     ratio = power / np.maximum(local, 1e-300)
     ratio[:first] = 0.0
-    best = int(np.argmax(np.where(np.isfinite(ratio), power * (ratio > SURE + np.log(n)), 0.0)))
-    if ratio[best] <= SURE + np.log(n):
+    sure = np.log(n / given.false_alarm)  # noise has an exponential law of power
+    best = int(np.argmax(np.where(np.isfinite(ratio), power * (ratio > sure), 0.0)))
+    if ratio[best] <= sure:
         return None
     carrier = np.exp(-2j * np.pi * float(frequency[best]) * view.step_s * np.arange(n))
     folded = 2.0 if 0 < best < size // 2 else 1.0
@@ -181,12 +171,13 @@ def _strongest(
                 noise_power.append(level * float(np.dot(weight[a:b], weight[a:b])) / total**2)
     amplitude = max(abs(whole), float(np.median(own)))
     step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
-    least = max(LEAST_SHARE * view.span, BESIDE_LATTICE * step if noise < 0.5 * step else 0.0)
-    steady = halves[0] < STEADY**2 * halves[1]
-    if amplitude < least or not steady or abs(whole) < MAINS_COHERENT * amplitude:
+    # From peak to peak it must be material; the first line of a toggling between two levels has 2/pi of a step.
+    least = max(0.5 * given.material * view.span, 2.0 / np.pi * step if noise < toggling(step, given) else 0.0)
+    steady = halves[0] < given.clear**2 * halves[1]  # first halves of the stretches against second ones: ringing dies
+    if amplitude < least or not steady or given.clear**2 * abs(whole) < amplitude:  # mains wander a little
         return None
     from_mains = aliases(float(frequency[best]), 1.0 / view.step_s, float(n * view.step_s))
-    if not from_mains and not _lasts(abs(whole), *map(np.array, (own, weights, noise_power))):
+    if not from_mains and not _lasts(abs(whole), np.array(own), np.array(weights), np.array(noise_power), given):
         return None
     course: Array = np.real(whole * np.conj(carrier))
     return float(frequency[best]), float(amplitude), course

@@ -11,19 +11,6 @@ from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
 
-LEAST_TIES = 5
-MOST_TIES = 10  # times as many: levels of a grid at a peak differ by a few times
-LEAST_RUN = 3
-NOISY_RUN = 8  # ties in a row at which noise does not come to rest by chance
-FEW_BEYOND = 0.01  # of all samples: spikes may lie beyond the rail
-FEW_JUST_BEYOND = 0.1  # of those at the rail: the converter's own noise
-BAND = 0.1  # of the span: the stretch of the static curve beside the rail that gives its slope there
-STEPS = 3.0
-NOISES = 7.0
-LEAST_RISE = 0.005  # of the span
-AS_NOISY = 0.4  # of the noise in the upper half, that noise beside the rail must have for ties to be a wonder
-LEAST_RUNS = 2  # a single run may be one held sample
-
 
 def saturation(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``saturation``; masked: ties at the largest reading while the load goes on rising, or noise stands still."""
@@ -31,7 +18,7 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
     if top is None:
         return
     tied = (view.reading.values == top) & ~bad
-    least = STEPS * view.reading.step + NOISES * view.reading.quiet_noise + LEAST_RISE * view.span
+    least = _least_hidden(view)
     hidden = _hidden(view, tied, top, -1.0)
     stands = _noise_stands_still(view, tied, top, -1.0)
     if hidden <= least and not stands:
@@ -55,10 +42,9 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     if bottom is None:
         return
     tied = (view.reading.values == bottom) & ~bad
-    least = STEPS * view.reading.step + 2.0 * view.reading.quiet_noise + 2.0 * LEAST_RISE * view.span
-    if not _noise_stands_still(view, tied, bottom, 1.0) or _hidden(view, tied, bottom, 1.0) <= least:
+    if not _noise_stands_still(view, tied, bottom, 1.0) or _hidden(view, tied, bottom, 1.0) <= _least_hidden(view):
         return
-    on = tied & (view.load.values > view.curve[0][0] + 0.005 * view.load_span)
+    on = tied & (view.load.values > view.curve[0][0] + view.thresholds.standing * view.load_span)
     yield Finding(
         "low_rail",
         view.whole(on),
@@ -68,6 +54,12 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     )
 
 
+def _least_hidden(view: View) -> float:
+    """How much of the reading must be cut off for a rail to be told from a peak that stands on one level."""
+    reading, given = view.reading, view.thresholds
+    return given.clear * reading.step + reading.largest * reading.quiet_noise + given.material * view.span
+
+
 def _rail(view: View, bad: Mask, inward: float) -> float | None:
     """The outermost value at which readings tie, hardly any lying beyond; None where there is none."""
     if view.span == 0.0 or bad.all():
@@ -75,36 +67,40 @@ def _rail(view: View, bad: Mask, inward: float) -> float | None:
     levels, count = view.reading.levels if not bad.any() else np.unique(view.reading.values[~bad], return_counts=True)
     if inward < 0.0:
         levels, count = levels[::-1], count[::-1]
-    tied = np.flatnonzero(count >= LEAST_TIES)
-    if tied.size == 0 or count[: tied[0]].sum() > FEW_BEYOND * count.sum():
+    given = view.thresholds
+    most_beyond = given.faulty_share * count.sum()  # spikes may lie beyond the rail
+    tied = np.flatnonzero(count >= given.few)
+    if tied.size == 0 or count[: tied[0]].sum() > most_beyond:
         return None
     # On a grid the converter's noise ties beyond the rail too, but nowhere as often as at it.
-    outer = count[: 1 + int(np.searchsorted(np.cumsum(count), FEW_BEYOND * count.sum()))]
+    outer = count[: 1 + int(np.searchsorted(np.cumsum(count), most_beyond))]
     most = int(np.argmax(outer))
-    at = most if outer[most] > MOST_TIES * count[tied[0]] else int(tied[0])
+    at = most if outer[most] > given.few * count[tied[0]] else int(tied[0])
     # A rail cuts noise off: where readings lie just beyond, those that tie are held or lie on a grid.
-    beyond = np.abs(levels[:at] - levels[at]) <= NOISES * view.reading.quiet_noise
-    return float(levels[at]) if count[:at][beyond].sum() <= FEW_JUST_BEYOND * count[at] else None
+    beyond = np.abs(levels[:at] - levels[at]) <= view.reading.largest * view.reading.quiet_noise
+    return float(levels[at]) if count[:at][beyond].sum() <= given.faulty_share * count[at] else None
 
 
 def _noise_stands_still(view: View, tied: Mask, rail: float, inward: float) -> bool:
     """Whether readings tie for long although there is noise, and as much of it beside the rail as elsewhere."""
+    given = view.thresholds
+    noisy_run = round(given.clear * given.few)  # ties in a row at which noise does not come to rest by chance
     starts, stops = runs_of(tied)
     size = stops - starts
     # A soft knee ties beside its rail too.
-    far = np.abs(view.reading.values - rail) > NOISES * view.reading.quiet_noise
+    far = np.abs(view.reading.values - rail) > view.reading.largest * view.reading.quiet_noise
     elsewhere = runs_of((np.diff(view.reading.values, prepend=np.nan) == 0.0) & far)
-    if int(((elsewhere[1] - elsewhere[0]) >= NOISY_RUN - 1).sum()) >= int((size >= NOISY_RUN).sum()):
+    if int(((elsewhere[1] - elsewhere[0]) >= noisy_run - 1).sum()) >= int((size >= noisy_run).sum()):
         return False  # the logger holds, at the rail as elsewhere
-    if not view.reading.is_noisy or (size >= LEAST_RUN).sum() < LEAST_RUNS or int(size.max()) < NOISY_RUN:
-        return False
+    if not view.reading.is_noisy or (size >= given.few).sum() < 2 or int(size.max()) < noisy_run:
+        return False  # a single run may be one held sample
     inside = inward * (view.reading.values - rail)
-    beside = (inside > 0.02 * view.span) & (inside < 0.2 * view.span)
+    beside = (inside > given.standing * view.span) & (inside < given.same * view.span)
     noise = view.noise_at_load
     upper = (view.expected > view.rest + 0.5 * view.span) & ~tied
-    if beside.sum() < NOISY_RUN or upper.sum() < NOISY_RUN:
+    if min(beside.sum(), upper.sum()) < given.local // 4:
         return False
-    return bool(np.median(noise[beside]) > AS_NOISY * np.median(noise[upper]))
+    return bool(given.clear * np.median(noise[beside]) > np.median(noise[upper]))
 
 
 def _hidden(view: View, tied: Mask, rail: float, inward: float) -> float:
@@ -112,24 +108,23 @@ def _hidden(view: View, tied: Mask, rail: float, inward: float) -> float:
 
     Only load that rises within a run counts: friction holds the reading at its peak while load falls.
     """
-    if int(tied.sum()) < LEAST_TIES:
-        return 0.0
+    late, band = view.thresholds.few, view.thresholds.same
     starts, stops = runs_of(tied)
-    long = stops - starts >= LEAST_RUN
+    long = stops - starts >= late
     starts, stops = starts[long], stops[long]
     if starts.size == 0:
         return 0.0
     load = view.load.values
     # The echo of a corner may come a little late: so many samples are left out at both ends of a run.
-    later = np.minimum(starts + LEAST_RUN, stops - 1)
-    pairs = np.stack([later, np.maximum(stops - LEAST_RUN, later + 1)], axis=1).ravel()
+    later = np.minimum(starts + late, stops - 1)
+    pairs = np.stack([later, np.maximum(stops - late, later + 1)], axis=1).ravel()
     peaks = np.maximum.reduceat(np.append(load, load[-1]), pairs)[::2]
-    rise = peaks - load[later] - 6.0 * view.load.quiet_noise
-    at, middle, _ = view.curve
-    beyond = inward * (middle - rail) > BAND * view.span
+    rise = peaks - load[later] - view.load.largest * view.load.quiet_noise
+    at, middle = view.curve
+    beyond = inward * (middle - rail) > band * view.span
     if not beyond.any():
         return 0.0
     inner = at[np.flatnonzero(beyond)[-1 if inward < 0 else 0]]
     edge = float(np.median(load[starts])) if inward < 0 else float(np.median(load[stops - 1]))
-    slope = BAND * view.span / max(abs(edge - inner), BAND * view.load_span)
+    slope = band * view.span / max(abs(edge - inner), band * view.load_span)
     return float(slope * rise.max())

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.signals.noise import NORMAL_QUARTILE
 
-BLOCK = 32
-CUT = 3.0  # medians of the absolute value
-CUT_SHORT = 0.93  # what is left of a normal deviate's root mean square
-SAME_GAP = 0.01  # of the logarithm
-COMMON = 0.2  # of the commonest gap's number
-OFTEN, CANDIDATES, SAMPLE = 3, 40, 2000
-FEW, FEW_FIT, MANY_FIT = 50, 0.98, 0.75  # three gaps of ten fit any step
-SECOND_DIFFERENCE = 6.0**0.5  # standard deviation of white noise's, over the noise's own
+SECOND_DIFFERENCE = math.sqrt(6.0)  # standard deviation of white noise's, over the noise's own
+ROUNDING = float(np.sqrt(np.finfo(float).eps))  # of a number: what differs by less differs by rounding
 
 
 def five_point_median(values: Array) -> Array:
@@ -28,20 +26,20 @@ def five_point_median(values: Array) -> Array:
     return out
 
 
-def local_scale(deviation: Array, step: float = 0.0, block: int = BLOCK) -> Array:
+def local_scale(deviation: Array, thresholds: Thresholds, step: float = 0.0) -> Array:
     """(n,) root mean square of ``deviation`` near each sample, large ones cut short: largest of three blocks.
 
-    The largest, so that the sample at the foot of a noisy stretch is judged by that stretch. What is beyond three
-    medians and one grid ``step`` counts as that much.
+    The largest, so that the sample at the foot of a noisy stretch is judged by that stretch. What is beyond ``clear``
+    standard deviations, by the median, and one grid ``step`` counts as that much.
     """
-    n = deviation.size
+    n, block = deviation.size, thresholds.local // 2
     if n == 0:
         return np.zeros(0)
     blocks = max(1, n // block)
     size = np.abs(deviation[: blocks * block]) if n >= block else np.abs(deviation)
     size = size.reshape(blocks, -1)
-    limit = CUT * np.median(size, axis=1, keepdims=True) + step
-    body = np.sqrt(np.mean(np.minimum(size, limit) ** 2, axis=1)) / CUT_SHORT
+    limit = thresholds.clear / NORMAL_QUARTILE * np.median(size, axis=1, keepdims=True) + step
+    body = np.sqrt(np.mean(np.minimum(size, limit) ** 2, axis=1)) / _cut_short(thresholds.clear)
     wide = body.copy()
     wide[1:] = np.maximum(wide[1:], body[:-1])
     wide[:-1] = np.maximum(wide[:-1], body[1:])
@@ -49,16 +47,23 @@ def local_scale(deviation: Array, step: float = 0.0, block: int = BLOCK) -> Arra
     return out
 
 
-def white_noise(values: Array, step: float) -> Array:
+def _cut_short(deviations: float) -> float:
+    """Root mean square of a standard normal deviate that counts as ``deviations`` at most."""
+    beyond = math.erfc(deviations / math.sqrt(2.0))
+    density = math.exp(-0.5 * deviations**2) / math.sqrt(2.0 * math.pi)
+    return math.sqrt(1.0 - beyond - 2.0 * deviations * density + deviations**2 * beyond)
+
+
+def white_noise(values: Array, thresholds: Thresholds, step: float) -> Array:
     """(n,) local standard deviation of white noise, from second differences."""
     second = np.zeros(values.size)
     if values.size > 2:
         second[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / SECOND_DIFFERENCE
-    return local_scale(second, step)
+    return local_scale(second, thresholds, step)
 
 
-def slope_change(values: Array, noise: Array, near: int) -> Array:
-    """(n,) the largest change of increment (per sample) within ``near`` samples, noise left out.
+def slope_change(values: Array, noise: Array, near: int, largest: float) -> Array:
+    """(n,) the largest change of increment (per sample) within ``near`` samples, less ``largest`` times the noise.
 
     A corner between straight lines counts in full, a sharp step by its own second difference.
     """
@@ -67,10 +72,10 @@ def slope_change(values: Array, noise: Array, near: int) -> Array:
     n = values.size
     padded = np.concatenate([np.full(near, values[0]), values, np.full(near, values[-1])])
     wide = np.abs(padded[2 * near :] - 2.0 * values + padded[:n]) / near
-    wide = np.maximum(wide - 6.0 * SECOND_DIFFERENCE * noise / near, 0.0)
+    wide = np.maximum(wide - largest * SECOND_DIFFERENCE * noise / near, 0.0)
     sharp = np.zeros(n)
     sharp[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-    sharp = np.maximum(sharp - 6.0 * SECOND_DIFFERENCE * noise, 0.0)
+    sharp = np.maximum(sharp - largest * SECOND_DIFFERENCE * noise, 0.0)
     out: Array = maximum_filter1d(np.maximum(wide, sharp), 2 * near + 1, mode="nearest")
     return out
 
@@ -80,54 +85,58 @@ def own_corner(values: Array, near: int) -> Array:
 
     So a spike is judged by its neighbours' lines, and the tip of a triangle by its own two flanks.
     """
-    reach = max(near, 4)
     n = values.size
-    padded = np.concatenate([np.full(reach, values[0]), values, np.full(reach, values[-1])])
-    after = padded[2 * reach : 2 * reach + n] - padded[reach + 2 : reach + 2 + n]
-    before = padded[reach - 2 : reach - 2 + n] - padded[:n]
-    out: Array = np.abs(after - before) / (reach - 2)
+    padded = np.concatenate([np.full(near, values[0]), values, np.full(near, values[-1])])
+    after = padded[2 * near : 2 * near + n] - padded[near + 2 : near + 2 + n]
+    before = padded[near - 2 : near - 2 + n] - padded[:n]
+    out: Array = np.abs(after - before) / (near - 2)
     return out
 
 
-def lattice_step(levels: Array, count: Index) -> float:
+def lattice_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
     """The step of the grid on which values lie; 0 where there is none that can be found.
 
     ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left
     out where most occur often: a spike need not lie on the grid.
     """
     often = count > 1
-    if often.sum() >= 3 and count[often].sum() > 0.7 * count.sum():
+    if often.sum() >= 3 and count[often].sum() > (1.0 - thresholds.same) * count.sum():
         levels = levels[often]
     if levels.size < 3:
         return 0.0
     gaps = np.diff(levels)
-    gaps = gaps[gaps > 1e-9 * np.max(np.abs(levels))]  # two readings of one level that differ by rounding
+    gaps = gaps[gaps > ROUNDING * np.max(np.abs(levels))]  # two readings of one level that differ by rounding
     if gaps.size < 2:
         return 0.0
     # One step is a gap that occurs often, and the largest of which the others are multiples; values off the grid
     # have made some gaps what they are.
-    place, number = np.unique(np.rint(np.log(gaps) / SAME_GAP).astype(np.int64), return_counts=True)
-    often_enough = number >= min(OFTEN, int(number.max()))
-    offered = np.concatenate([place[often_enough][:CANDIDATES], place[number >= COMMON * number.max()][:CANDIDATES]])
-    some = gaps[:: max(1, gaps.size // SAMPLE)]
-    steps = [_refined(some, float(np.exp(SAME_GAP * candidate))) for candidate in np.unique(offered)[::-1]]
+    place, number = np.unique(np.rint(np.log(gaps) / thresholds.standing).astype(np.int64), return_counts=True)
+    often_enough = number >= min(thresholds.few, int(number.max()))
+    common = number >= thresholds.same * number.max()
+    offered = np.concatenate([place[often_enough][: thresholds.local], place[common][: thresholds.local]])
+    some = gaps[:: max(1, gaps.size // thresholds.bins)]
+    within = 0.5 * thresholds.same
+    steps = [_refined(some, float(np.exp(thresholds.standing * one)), within) for one in np.unique(offered)[::-1]]
     # A ramp without noise takes every tenth step, say: what fits all gaps comes before what fits most.
-    shares = [float(_fits(some, step).mean()) if step > 0.0 else 0.0 for step in steps]
-    for least in (FEW_FIT,) if gaps.size < FEW else (FEW_FIT, MANY_FIT):
+    shares = [float(_fits(some, step, within).mean()) if step > 0.0 else 0.0 for step in steps]
+    nearly_all, most = 1.0 - thresholds.standing, 1.0 - thresholds.same
+    for least in (
+        (nearly_all,) if gaps.size < thresholds.local else (nearly_all, most)
+    ):  # three gaps of ten fit any step
         for step, share in zip(steps, shares, strict=True):
             if share > least:
                 return step
     return 0.0
 
 
-def _fits(gaps: Array, step: float) -> Mask:
-    """(g,) which gaps are multiples of ``step``, one at least."""
+def _fits(gaps: Array, step: float, within: float) -> Mask:
+    """(g,) which gaps are multiples of ``step``, one at least, ``within`` a share of it."""
     multiple = np.rint(gaps / step)
-    out: Mask = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < 0.15)
+    out: Mask = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < within)
     return out
 
 
-def _refined(gaps: Array, step: float) -> float:
+def _refined(gaps: Array, step: float, within: float) -> float:
     """The step by the gaps that are its multiples, 0 where none is."""
-    near = gaps[_fits(gaps, step)]
+    near = gaps[_fits(gaps, step, within)]
     return float(np.median(near / np.rint(near / step))) if near.size else 0.0

@@ -15,17 +15,8 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._scales import local_scale, own_corner
 from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.masks import runs_of
-
-NOISES = 6.5  # the largest of 1e6 normal deviates reaches 5.1 of this scale
-STEPS = 2.0  # of a grid
-CORNERS = 4.0  # of what the other channel's corner explains
-LEAST_SHARE = 0.0005  # of the span
-BESIDE = 6  # samples on either side, that a line is laid through: as many as a corner's echo leaves straight
-LEAST_BESIDE = 3  # two points make a line of any noise
-COMES_BACK = 0.5  # of the spike: closer to its foot than to its tip
-LASTING = 2  # jumps: one alone may be a unit that was moved
-AS_LARGE = 0.5  # of the spikes' usual size
 
 
 def isolated(signal: Signal, corner: Array, scale: float, span: float, near: int, jitter: Array | float = 0.0) -> Mask:
@@ -36,34 +27,36 @@ def isolated(signal: Signal, corner: Array, scale: float, span: float, near: int
     triangle has its corner in both; a jump against a ramp, which the median does not follow, stays.
     """
     # Noise that a filter has smoothed has small second differences: then the residual's own scale is the larger.
-    noise = np.maximum(signal.noise, local_scale(signal.outlying, signal.step))
-    allowed = NOISES * noise + STEPS * signal.step + CORNERS * scale * corner + LEAST_SHARE * span + jitter
-    allowed += own_corner(signal.values, near)
+    given = signal.thresholds
+    noise = np.maximum(signal.noise, local_scale(signal.outlying, given, signal.step))
+    allowed = signal.largest * noise + given.clear * (signal.step + given.clear * scale * corner) + jitter
+    allowed += given.material * span + own_corner(signal.values, near)
     found: Mask = np.abs(signal.outlying) > allowed
-    return comes_back(signal.values, found)
+    return comes_back(signal.values, found, given)
 
 
-def comes_back(values: Array, found: Mask) -> Mask:
+def comes_back(values: Array, found: Mask, thresholds: Thresholds) -> Mask:
     """(m,) those ``found`` samples whose neighbours before and after lie on one level, and they do not."""
     out = np.zeros(found.size, dtype=bool)
     starts, stops = runs_of(found)
     if starts.size == 0:
         return out
+    few = thresholds.few
     at = np.flatnonzero(found)
     run = np.repeat(np.arange(starts.size), stops - starts)
-    before = _line(values, found, starts[run, None] - np.arange(1, BESIDE + 1), at)
-    after = _line(values, found, stops[run, None] + np.arange(BESIDE), at)
+    before = _line(values, found, starts[run, None] - np.arange(1, few + 1), at)
+    after = _line(values, found, stops[run, None] + np.arange(few), at)
     # At either end of a recording one side must do.
     before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)
     up, down = values[at] - before, values[at] - after
-    out[at] = (up * down > 0.0) & (np.abs(before - after) < COMES_BACK * np.minimum(np.abs(up), np.abs(down)))
+    out[at] = (up * down > 0.0) & (thresholds.clear * np.abs(before - after) < np.minimum(np.abs(up), np.abs(down)))
     return out
 
 
 def _line(values: Array, found: Mask, index: Index, at: Array | Index) -> Array:
-    """(runs,) least-squares lines through samples ``index`` (runs, BESIDE), found ones left out, at ``at`` (runs,).
+    """(runs,) least-squares lines through samples ``index`` (runs, k), found ones left out, at ``at`` (runs,).
 
-    NaN where fewer than three are left.
+    NaN where no more than half are left.
     """
     place = np.clip(index, 0, values.size - 1)
     weight = ((index >= 0) & (index < values.size) & ~found[place]).astype(float)
@@ -73,12 +66,13 @@ def _line(values: Array, found: Mask, index: Index, at: Array | Index) -> Array:
     x0, y0 = (weight * away).sum(axis=1) / total, (weight * values[place]).sum(axis=1) / total
     x, y = away - x0[:, None], values[place] - y0[:, None]
     slope = (weight * x * y).sum(axis=1) / np.maximum((weight * x * x).sum(axis=1), 1e-300)
-    out: Array = np.where(count >= LEAST_BESIDE, y0 - slope * x0, np.nan)
+    out: Array = np.where(count > 0.5 * index.shape[1], y0 - slope * x0, np.nan)
     return out
 
 
 def lasting_jumps(view: View, found: Mask) -> Array:
     """(jumps,) sizes of jumps of the reading that load does not explain and that stay; ``found`` ones are left out."""
+    given = view.thresholds
     good = np.flatnonzero(~found)
     jump = np.flatnonzero(view.jump != 0.0)
     # Between the good samples on either side.
@@ -86,18 +80,18 @@ def lasting_jumps(view: View, found: Mask) -> Array:
     values = view.reading.values[good]
     nothing = np.zeros(values.size, dtype=bool)
     middle = np.asarray(left + 0.5, dtype=float)
-    before = _line(values, nothing, left[:, None] - np.arange(BESIDE), middle)
-    after = _line(values, nothing, left[:, None] + 1 + np.arange(BESIDE), middle)
+    before = _line(values, nothing, left[:, None] - np.arange(given.few), middle)
+    after = _line(values, nothing, left[:, None] + 1 + np.arange(given.few), middle)
     size = after - before
     step = values[left + 1] - values[left]
-    out: Array = np.abs(size[(size * step > 0.0) & (np.abs(size) > COMES_BACK * np.abs(step))])
+    out: Array = np.abs(size[(size * step > 0.0) & (given.clear * np.abs(size) > np.abs(step))])
     return out
 
 
 def isolated_beside(view: View, bad: Mask) -> Mask:
     """(m,) isolated readings of what is left when ``bad`` ones are cut out: a good one between two of them is none."""
     good = ~bad
-    reading = Signal(view.reading.values[good]) if bad.any() else view.reading
+    reading = Signal(view.reading.values[good], view.thresholds) if bad.any() else view.reading
     found = np.zeros(bad.size, dtype=bool)
     if good.any():
         jitter = view.jitter_reach[good]
@@ -115,11 +109,11 @@ def spikes(view: View, bad: Mask) -> Iterator[Finding]:
     found = isolated_beside(view, bad)
     if found.any():
         usual = float(np.median(np.abs(view.reading.outlying[found])))
-        lasting = int((lasting_jumps(view, found | bad) > AS_LARGE * usual).sum())
-        if lasting < max(LASTING, runs_of(found)[0].size):
+        lasting = int((view.thresholds.clear * lasting_jumps(view, found | bad) > usual).sum())
+        if lasting <= runs_of(found)[0].size:
             yield _finding(view, found, view.reading, view.span, "reading")
     load_gain = view.load_span / view.span
-    on_load = isolated(view.load, view.reading_corner, 2.0 * load_gain, view.load_span, view.near)
+    on_load = isolated(view.load, view.reading_corner, view.thresholds.clear * load_gain, view.load_span, view.near)
     if on_load.any():
         yield _finding(view, on_load, view.load, view.load_span, "reference load")
 

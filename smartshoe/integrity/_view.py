@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,17 +17,15 @@ from smartshoe.integrity._scales import (
     slope_change,
     white_noise,
 )
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
 
-CURVE_BINS = 40
-NEAR_S = 0.1  # corners of load and reading this near to each other are taken for one
-NEAR_SAMPLES = 3
-UPPER_QUARTILE = 1.15  # of a normal deviate's absolute value
-LEAST_NOISE = 1e-4  # of the range: less is arithmetic
-STEEP, FLAT, FEWEST = 0.5, 0.05, 50  # of a steep slope; samples
-JITTERY = 3.0  # times: a second difference holds a ramp's corners too, which do not treble a median
-JITTERS = 5.0  # standard deviations
-DITHERED = 0.7  # of a grid step: less noise than this may be the toggling between two levels
+LATTICE_ERROR = 1.0 / math.sqrt(12.0)  # of a step: root mean square of what rounding to a grid adds
+
+
+def toggling(step: float, thresholds: Thresholds) -> float:
+    """No clear noise: half a grid ``step`` is what the toggling of a silent signal between two levels looks like."""
+    return 0.5 * step * math.sqrt(thresholds.clear)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +33,12 @@ class Signal:
     """A channel at the samples where load and reading are both present: ``values`` (m,) with their scales."""
 
     values: Array
+    thresholds: Thresholds
+
+    @cached_property
+    def largest(self) -> float:
+        """What noise reaches in the whole recording, in standard deviations."""
+        return largest_of_noise(self.values.size, self.thresholds)
 
     @cached_property
     def levels(self) -> tuple[Array, Index]:
@@ -44,7 +49,7 @@ class Signal:
     @cached_property
     def step(self) -> float:
         """The grid's step, 0 where there is none."""
-        return lattice_step(*self.levels)
+        return lattice_step(*self.levels, self.thresholds)
 
     @cached_property
     def least_gap(self) -> float:
@@ -57,7 +62,7 @@ class Signal:
         """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
         second = np.diff(self.values, 2)
         product = second[1:] * second[:-1]
-        least = max(DITHERED * self.step, LEAST_NOISE * float(np.ptp(self.values)))
+        least = max(toggling(self.step, self.thresholds), self.thresholds.material * float(np.ptp(self.values)))
         return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > least
 
     @cached_property
@@ -70,7 +75,7 @@ class Signal:
     @cached_property
     def noise(self) -> Array:
         """(m,) local standard deviation of white noise."""
-        return white_noise(self.values, self.step)
+        return white_noise(self.values, self.thresholds, self.step)
 
     @cached_property
     def quiet_noise(self) -> float:
@@ -93,6 +98,7 @@ class View:
     load: Signal
     reading: Signal
     sign: int
+    thresholds: Thresholds
     offset_s: float = 0.0
     rate: float = 0.0
     dropped_to: Array = field(default_factory=lambda: np.zeros(0))
@@ -105,29 +111,36 @@ class View:
     @cached_property
     def near(self) -> int:
         """Samples within which a corner of the load and its echo in the reading may lie."""
-        return max(NEAR_SAMPLES, round(NEAR_S / self.step_s))
+        return max(self.thresholds.few, round(self.thresholds.echo_s / self.step_s))
 
     @cached_property
-    def curve(self) -> tuple[Array, Array, Array]:
-        """Loads (bins,), median reading and robust spread at each: the static curve, whatever its shape."""
+    def gap(self) -> Mask:
+        """(m - 1,) increments of time in which a sample is missing."""
+        out: Mask = np.diff(self.time_s) > 1.5 * self.step_s
+        return out
+
+    @cached_property
+    def curve(self) -> tuple[Array, Array]:
+        """Loads (bins,) and median reading at each: the static curve, whatever its shape."""
         load, reading = self.load.values, self.reading.values
-        low, high = np.quantile(load, [0.001, 0.999])
-        edges = np.linspace(low, high, CURVE_BINS + 1)[1:-1]
+        steady = five_point_median(load)  # without spikes
+        bins = round(1.0 / self.thresholds.standing)
+        edges = np.linspace(steady.min(), steady.max(), bins + 1)[1:-1]
         place = np.searchsorted(edges, load)
         order = np.lexsort((reading, place))
-        counts = np.bincount(place, minlength=CURVE_BINS)
+        counts = np.bincount(place, minlength=bins)
         starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
         filled = counts > 0
         first, size = starts[filled], counts[filled]
-        sorted_reading = reading[order]
-        middle = sorted_reading[first + size // 2]
-        spread = 0.5 * (sorted_reading[first + (size * 4) // 5] - sorted_reading[first + size // 5])
-        at = np.bincount(place, weights=load, minlength=CURVE_BINS)[filled] / size
-        return at, middle, spread
+        middle = reading[order][first + size // 2]
+        at = np.bincount(place, weights=load, minlength=bins)[filled] / size
+        return at, middle
 
     @cached_property
     def noise_at_load(self) -> Array:
         """(m,) the usual noise at each sample's load, by the upper quartile: also that of a rest beside a ramp."""
+        from scipy.special import ndtri
+
         edges = self.curve[0][:-1] + 0.5 * np.diff(self.curve[0])
         place = np.searchsorted(edges, self.load.values)
         second = np.zeros(place.size)
@@ -139,13 +152,13 @@ class View:
             if cuts[i + 1] > cuts[i]:
                 part, rank = second[order[cuts[i] : cuts[i + 1]]], 3 * (cuts[i + 1] - cuts[i]) // 4
                 usual[i] = np.partition(part, rank)[rank]
-        out: Array = usual[place] / (UPPER_QUARTILE * SECOND_DIFFERENCE)
+        out: Array = usual[place] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
         return out
 
     @cached_property
     def expected(self) -> Array:
         """(m,) the static curve at each sample's load."""
-        at, middle, _ = self.curve
+        at, middle = self.curve
         out: Array = np.interp(self.load.values, at, middle)
         return out
 
@@ -166,23 +179,24 @@ class View:
 
     @cached_property
     def gain(self) -> float:
-        """Reading per load that no stretch of the static curve exceeds much: the steepest of its quarters."""
-        at, middle, _ = self.curve
+        """Reading per load that no stretch of the static curve exceeds much: the steepest of its stretches."""
+        at, middle = self.curve
         if at.size < 2 or self.load_span == 0.0:
             return 0.0
-        low = np.linspace(at[0], at[-1] - 0.25 * self.load_span, 16)
-        rise = np.interp(low + 0.25 * self.load_span, at, middle) - np.interp(low, at, middle)
-        return float(np.max(np.abs(rise)) / (0.25 * self.load_span))
+        stretch = self.thresholds.same * self.load_span
+        low = at[at <= at[-1] - stretch]
+        rise = np.interp(low + stretch, at, middle) - np.interp(low, at, middle)
+        return float(np.max(np.abs(rise)) / stretch)
 
     @cached_property
     def load_corner(self) -> Array:
         """(m,) change of the load's increment nearby: what a corner of the load may do to the reading, in load."""
-        return slope_change(self.load.values, self.load.noise, self.near)
+        return slope_change(self.load.values, self.load.noise, self.near, self.load.largest)
 
     @cached_property
     def reading_corner(self) -> Array:
         """(m,) the same of the reading."""
-        return slope_change(self.reading.values, self.reading.noise, self.near)
+        return slope_change(self.reading.values, self.reading.noise, self.near, self.reading.largest)
 
     @cached_property
     def steady_load(self) -> Array:
@@ -198,14 +212,15 @@ class View:
         from scipy.ndimage import maximum_filter1d
 
         step = np.abs(np.diff(self.steady_load))
-        sharp = np.maximum(np.abs(np.diff(self.load.values)) - 8.0 * self.load.quiet_noise - self.load.step, 0.0)
+        noise = np.sqrt(2.0) * self.load.largest * self.load.quiet_noise
+        sharp = np.maximum(np.abs(np.diff(self.load.values)) - noise - self.load.step, 0.0)
         out: Array = maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
         return out
 
     @cached_property
     def reading_move(self) -> Array:
         """(m - 1,) usual increment of the reading nearby."""
-        return local_scale(np.diff(self.reading.values), block=16)
+        return local_scale(np.diff(self.reading.values), self.thresholds)
 
     @cached_property
     def jump(self) -> Array:
@@ -215,10 +230,13 @@ class View:
         """
         step = np.diff(self.reading.values)
         noise = np.maximum(self.reading.noise[1:], self.reading.noise[:-1])
-        allowed = 2.0 * self.gain * self.load_move + 4.0 * self.reading_move + 7.0 * noise + 3.0 * self.reading.step
-        allowed = np.maximum(allowed, 0.005 * self.span)
+        clear = self.thresholds.clear
+        allowed = clear * (self.gain * self.load_move + clear * self.reading_move + self.reading.step)
+        allowed = np.maximum(
+            allowed + np.sqrt(2.0) * self.reading.largest * noise, self.thresholds.material * self.span
+        )
         excess = np.where(np.abs(step) > allowed, step, 0.0)
-        excess[np.diff(self.time_s) > 1.6 * self.step_s] = 0.0
+        excess[self.gap] = 0.0
         out: Array = excess
         return out
 
@@ -233,14 +251,15 @@ class View:
 
         nothing = np.zeros(self.time_s.size)
         slope = np.abs(np.gradient(self.expected_steadily, self.step_s))
-        usual = float(np.quantile(slope, 0.99))  # not the one corner that a step of load makes
-        steep, flat = slope > STEEP * usual, slope < FLAT * usual
-        if steep.sum() < FEWEST or flat.sum() < FEWEST:
+        given = self.thresholds
+        usual = float(np.quantile(slope, 1.0 - given.standing))  # not the one corner that a step of load makes
+        steep, flat = given.clear * slope > usual, slope < given.faulty_share * usual
+        if min(steep.sum(), flat.sum()) < given.least_samples:
             return nothing
-        if np.median(self.reading.noise[steep]) < JITTERY * np.median(self.reading.noise[flat]):
+        if np.median(self.reading.noise[steep]) < given.clear * np.median(self.reading.noise[flat]):
             return nothing
         jitter_s = float(np.median(self.reading.noise[steep] / slope[steep]))
-        size = 2 * int(np.ceil(JITTERS * jitter_s / self.step_s)) + 1
+        size = 2 * int(np.ceil(self.reading.largest * jitter_s / self.step_s)) + 1
         high = maximum_filter1d(self.expected_steadily, size, mode="nearest")
         out: Array = high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
         return out
@@ -248,7 +267,7 @@ class View:
     @cached_property
     def expected_steadily(self) -> Array:
         """(m,) the static curve at each sample's load, the load's noise averaged."""
-        out: Array = np.interp(self.steady_load, *self.curve[:2])
+        out: Array = np.interp(self.steady_load, *self.curve)
         return out
 
     def whole(self, at: Mask) -> Mask:

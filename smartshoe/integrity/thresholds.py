@@ -116,6 +116,11 @@ class Thresholds:
     hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
     idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
 
+    @property
+    def few(self) -> int:
+        """How many samples or runs are no chance: a ``faulty_share`` of the fewest samples."""
+        return max(round(self.faulty_share * self.least_samples), 1)
+
 
 def described(given: Thresholds) -> list[dict[str, Any]]:
     """Name, value, unit, meaning and origin of each."""

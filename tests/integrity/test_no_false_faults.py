@@ -12,6 +12,7 @@ from test_integrity_faults import kinds, on_lattice, recorded, with_reading
 
 from smartshoe.integrity import examine
 from smartshoe.integrity._spikes import comes_back
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.protocol import dynamic_protocol, static_protocol
 from smartshoe.recording import Recording
 
@@ -124,5 +125,5 @@ def test_only_what_comes_back_is_a_spike(seed, size, length):
     spiked, stepped = values.copy(), values.copy()
     spiked[30 : 30 + length] += size
     stepped[30:] += size
-    assert comes_back(spiked, found)[found].all()
-    assert not comes_back(stepped, found).any()
+    assert comes_back(spiked, found, Thresholds())[found].all()
+    assert not comes_back(stepped, found, Thresholds()).any()

@@ -1,0 +1,120 @@
+"""Numbers of the record by which faults of the data are told: what each decides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from smartshoe.integrity import Integrity, examine
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+TIME_S = np.arange(0.0, 60.0, 0.01)
+TRIANGLE = np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0)
+# Levels of no period, each reached within half a second.
+WANDERING = np.interp(TIME_S, *np.array([(3.0 * k + 0.5 * j, (k * 0.618) % 1.0) for k in range(20) for j in (1, 6)]).T)
+NOISE = np.random.default_rng(4).standard_normal(TIME_S.size)
+
+
+def _pressed(reading: Array, load: Array = TRIANGLE, time_s: Array = TIME_S) -> Recording:
+    return Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=100.0 * reading)
+
+
+def _found(recording: Recording, **numbers: object) -> Integrity:
+    return examine([recording], replace(STANDARD, **numbers))
+
+
+def _kinds(recording: Recording, **numbers: object) -> set[str]:
+    return {fault.kind for fault in _found(recording, **numbers).faults}
+
+
+def test_least_samples_are_those_that_a_recording_must_have() -> None:
+    brief = _pressed(TRIANGLE + 1e-3 * NOISE).taken(slice(0, 150))
+    assert "short_recording" in _kinds(brief, least_samples=200)
+    assert "short_recording" not in _kinds(brief, least_samples=100)
+
+
+def test_faulty_share_is_how_many_gaps_are_the_loggers_way() -> None:
+    kept = np.ones(TIME_S.size, dtype=bool)
+    kept[50::33] = False
+    gappy = _pressed(TRIANGLE + 1e-3 * NOISE).taken(kept)
+    assert "gaps" in _kinds(gappy, faulty_share=0.05)
+    assert "gaps" not in _kinds(gappy, faulty_share=0.02)
+
+
+def test_follows_is_the_share_of_a_reading_that_its_load_must_explain() -> None:
+    noisy = _pressed(TRIANGLE + 0.3 * NOISE)
+    assert _found(noisy, follows=0.3).refusals == ()
+    assert "does not follow" in _found(noisy, follows=0.7).refusals[0]
+
+
+def test_clear_is_how_much_of_a_recording_must_be_sound() -> None:
+    holed = _pressed(np.where(np.random.default_rng(1).random(TIME_S.size) < 0.4, np.nan, TRIANGLE + 1e-3 * NOISE))
+    assert _found(holed, clear=2.0).refusals == ()
+    assert "record it again" in _found(holed, clear=1.5).refusals[0]
+
+
+def test_same_is_how_far_steps_of_time_may_differ() -> None:
+    shaken_s = TIME_S + 0.002 * np.random.default_rng(2).uniform(-1.0, 1.0, TIME_S.size)
+    recording = _pressed(np.interp(shaken_s, TIME_S, TRIANGLE), np.interp(shaken_s, TIME_S, TRIANGLE), shaken_s)
+    assert "uneven_sampling" in _kinds(recording, same=0.2)
+    assert "uneven_sampling" not in _kinds(recording, same=0.5)
+
+
+def test_material_is_how_much_a_rail_must_cut_off() -> None:
+    cut = _pressed(np.minimum(TRIANGLE, 0.93))
+    assert "saturation" in _kinds(cut, material=2e-4)
+    assert "saturation" not in _kinds(cut, material=0.1)
+
+
+def test_echo_is_how_late_a_reading_may_answer_a_knock() -> None:
+    knock = 0.2 * (np.arange(TIME_S.size) % 401 == 200)
+    late = _pressed(TRIANGLE + np.roll(knock, 20) + 1e-3 * NOISE, TRIANGLE + knock)
+    assert "reading has" in " ".join(fault.says for fault in _found(late, echo_s=0.1).faults)
+    assert "reading has" not in " ".join(fault.says for fault in _found(late, echo_s=0.4).faults)
+
+
+def test_sensor_lag_is_the_longest_that_is_not_of_two_clocks() -> None:
+    late = _pressed(np.interp(TIME_S - 0.35, TIME_S, WANDERING) + 1e-3 * NOISE, WANDERING)
+    assert "two_clocks" in _kinds(late, sensor_lag_s=0.2)
+    assert "two_clocks" not in _kinds(late, sensor_lag_s=0.5)
+
+
+def test_bins_are_how_finely_a_lag_is_looked_for() -> None:
+    late = _pressed(np.interp(TIME_S - 0.35, TIME_S, WANDERING) + 1e-3 * NOISE, WANDERING)
+    assert "two_clocks" in _kinds(late, bins=4000)
+    assert "two_clocks" not in _kinds(late, bins=60)
+
+
+def test_local_is_the_stretch_whose_own_noise_counts() -> None:
+    burst = 1e-3 * NOISE * np.where(TIME_S % 7.3 < 0.3, 12.0, 1.0)
+    assert "spikes" not in _kinds(_pressed(TRIANGLE + burst), local=32)
+    assert "spikes" in _kinds(_pressed(TRIANGLE + burst), local=2048)
+
+
+def test_memory_is_the_relaxation_that_still_follows() -> None:
+    keep = float(np.exp(-0.01 / 30.0))
+    fast = 0.5 + 0.5 * np.sin(np.cumsum(1.0 + np.sin(0.3 * TIME_S)) * 0.01 * 2.0)
+    slow = _pressed(lfilter([1.0 - keep], [1.0, -keep], fast - fast.mean()) + 1e-4 * NOISE, fast)
+    assert _found(slow, memory_s=(0.3, 3.0, 30.0)).refusals == ()
+    assert "does not follow" in _found(slow, memory_s=(0.3,)).refusals[0]
+
+
+def test_false_alarm_is_how_far_noise_may_reach() -> None:
+    slow = np.interp(TIME_S, [0.0, 30.0, 60.0], [0.0, 1.0, 0.0])
+    spiked = slow + 1e-3 * NOISE
+    spiked[1111] += 0.009
+    assert "spikes" in _kinds(_pressed(spiked, slow), false_alarm=0.01)
+    assert "spikes" not in _kinds(_pressed(spiked, slow), false_alarm=1e-12)
+
+
+def test_material_is_the_error_from_which_on_a_lattice_is_a_fault() -> None:
+    coarse = _pressed(np.rint(TRIANGLE / 0.02) * 0.02)
+    assert "quantisation" in _kinds(coarse, material=2e-4)
+    assert "quantisation" not in _kinds(coarse, material=1e-2)
