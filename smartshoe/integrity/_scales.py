@@ -85,11 +85,12 @@ def own_corner(values: Array, near: int) -> Array:
 
     So a spike is judged by its neighbours' lines, and the tip of a triangle by its own two flanks.
     """
+    reach = max(near, 4)  # two increments on either side
     n = values.size
-    padded = np.concatenate([np.full(near, values[0]), values, np.full(near, values[-1])])
-    after = padded[2 * near : 2 * near + n] - padded[near + 2 : near + 2 + n]
-    before = padded[near - 2 : near - 2 + n] - padded[:n]
-    out: Array = np.abs(after - before) / (near - 2)
+    padded = np.concatenate([np.full(reach, values[0]), values, np.full(reach, values[-1])])
+    after = padded[2 * reach : 2 * reach + n] - padded[reach + 2 : reach + 2 + n]
+    before = padded[reach - 2 : reach - 2 + n] - padded[:n]
+    out: Array = np.abs(after - before) / (reach - 2)
     return out
 
 

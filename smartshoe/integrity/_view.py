@@ -111,7 +111,7 @@ class View:
     @cached_property
     def near(self) -> int:
         """Samples within which a corner of the load and its echo in the reading may lie."""
-        return max(self.thresholds.few, round(self.thresholds.echo_s / self.step_s))
+        return max((self.thresholds.few + 1) // 2, round(self.thresholds.echo_s / self.step_s))
 
     @cached_property
     def gap(self) -> Mask:
