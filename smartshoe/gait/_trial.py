@@ -184,7 +184,7 @@ def _foot(
         # Forces and readings cannot be added: loads of the units without a calibration count as readings of none.
         bare = [unit.name for unit in units if not unit.is_force]
         raise InputError(
-            f"{recording.label}: {', '.join(bare)} has no calibration and is not in N, the other units' loads are in N:"
+            f"{recording.label}: no calibration of {', '.join(bare)}, whose columns are not in N, as other units are:"
             " give its --calibration, or leave out its column"
         )
     turned = kinds == {True} and _is_upside_down(np.sum([unit.load for unit in units], axis=0), rate_hz)
