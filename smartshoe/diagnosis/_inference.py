@@ -167,6 +167,11 @@ class _State:
         return tuple(self.given.candidates[m] for m in self.best.members)
 
 
+def _state_at(found: Fit, sessions: Sequence[Session], thresholds: Thresholds, banned: tuple[str, ...] = ()) -> _State:
+    """The linearisation about a fit, and the best set in it without what is ``banned``."""
+    return _State(*_searched(found.model, sessions, thresholds, banned), found, banned)
+
+
 def _is_simpler(other: Fit, state: _State, sessions: Sequence[Session]) -> bool:
     """Whether ``other`` is likelier than the fit of ``state``, odds against effects counted; or has fewer of them.
 
@@ -204,12 +209,12 @@ def _settled(state: _State, sessions: Sequence[Session], thresholds: Thresholds,
             ),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
-        state = _State(*_searched(found.model, sessions, thresholds, state.banned), found, state.banned)
+        state = _state_at(found, sessions, thresholds, state.banned)
     for name, arm in _arms(state.fit.model):
         likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
         found = fit(likelihood, _with_arm(state.fit.model.without(name), arm))
         if _is_simpler(found, state, sessions):
-            state = _State(*_searched(found.model, sessions, thresholds, state.banned), found, state.banned)
+            state = _state_at(found, sessions, thresholds, state.banned)
     return state
 
 
@@ -276,7 +281,7 @@ def _with_laws(given: _State, sessions: Sequence[Session], thresholds: Threshold
         if misses:
             missed, best = min(misses, key=lambda pair: pair[0])
             banned = curves if missed < thresholds.departure**2 else ()
-            state = _State(*_searched(best.model, sessions, thresholds, banned), best, banned)
+            state = _state_at(best, sessions, thresholds, banned)
     return state if state is given else _settled(state, sessions, thresholds, progress)
 
 
@@ -308,7 +313,7 @@ def _with_another_pole(state: _State, sessions: Sequence[Session], thresholds: T
     share = USUAL.relaxing_share
     starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in thresholds.memory_s]
     best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
-    return _State(*_searched(best.model, sessions, thresholds), best)
+    return _state_at(best, sessions, thresholds)
 
 
 def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresholds: Thresholds) -> _State:
@@ -325,7 +330,7 @@ def _with_an_arm_that_creeps(state: _State, sessions: Sequence[Session], thresho
         given, _, best = _searched(start, sessions, thresholds)
         found.append(fit(likelihood, _with(given, best, start, likelihood), FEW_STEPS))
     nearest = min(found, key=lambda one: one.cost + state.evidence.odds * _effects(one.model))
-    return _State(*_searched(nearest.model, sessions, thresholds), nearest)
+    return _state_at(nearest, sessions, thresholds)
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:
@@ -433,8 +438,7 @@ def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds:
 
 def _error(sessions: Sequence[Session], model: ExtendedModel) -> float:
     """Rms of what is left of what is fitted."""
-    left = np.concatenate([residual_of(session, model)[session.fitted] for session in sessions])
-    return float(np.sqrt(np.mean(left**2)))
+    return _fitted_rms(sessions, lambda session: residual_of(session, model))
 
 
 def _spread(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
@@ -478,11 +482,15 @@ def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit
 
 def apart(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
     """Rms of the difference of two models' readings over what is fitted, each recording's own offset aside."""
+    return _fitted_rms(sessions, lambda session: residual_of(session, first) - residual_of(session, second))
+
+
+def _fitted_rms(sessions: Sequence[Session], signal_of: Callable[[Session], Array]) -> float:
     square, count = 0.0, 0
     for session in sessions:
-        difference = (residual_of(session, first) - residual_of(session, second))[session.fitted]
-        square += float(difference @ difference)
-        count += difference.size
+        signal = signal_of(session)[session.fitted]
+        square += float(signal @ signal)
+        count += signal.size
     return float(np.sqrt(square / max(count, 1)))
 
 

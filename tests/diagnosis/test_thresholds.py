@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
+from deciding import STANDARD, decides
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, described
@@ -19,7 +19,6 @@ from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
 
-STANDARD = Thresholds()
 TIME_S = np.arange(0.0, 60.0, 0.01)
 TRIANGLE = np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0)
 MBAR = 100.0
@@ -44,11 +43,6 @@ def _held_load(hold_s: float, rest_s: float) -> Array:
     return np.interp(np.arange(0.0, corners[-1], 0.02), corners, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
 
 
-def _decides(field: str, low: object, high: object, of: Callable[[Thresholds], object]) -> tuple[object, object]:
-    """What ``of`` answers with the number ``field`` at ``low`` and at ``high``."""
-    return of(replace(STANDARD, **{field: low})), of(replace(STANDARD, **{field: high}))
-
-
 def test_each_number_has_a_unit_a_meaning_and_an_origin() -> None:
     assert all(entry["unit"] and entry["meaning"] and entry["origin"] for entry in described(STANDARD))
     assert [entry["name"] for entry in described(STANDARD)] == [field.name for field in fields(Thresholds)]
@@ -56,7 +50,7 @@ def test_each_number_has_a_unit_a_meaning_and_an_origin() -> None:
 
 def test_clear_is_what_parts_a_straight_line_from_a_bent_one() -> None:
     bent = _pressed(np.tanh(3.0 * (TRIANGLE - 0.5)))
-    near, far = _decides("clear", 2.0, 50.0, lambda t: characteristic_of(bent, t))
+    near, far = decides("clear", 2.0, 50.0, lambda t: characteristic_of(bent, t))
     assert "flattens" in str(near)
     assert "nearly straight" in str(far)
 
@@ -66,7 +60,7 @@ def test_same_is_how_far_rates_of_one_kind_differ() -> None:
     load = np.interp(
         np.arange(0.0, corners[-1], 0.02), corners, [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0]
     )
-    apart, alike = _decides("same", 0.2, 0.6, lambda t: "rates" in _session_traits(load, t))
+    apart, alike = decides("same", 0.2, 0.6, lambda t: "rates" in _session_traits(load, t))
     assert (apart, alike) == (True, False)
 
 
@@ -74,24 +68,24 @@ def test_standing_is_how_far_a_load_at_rest_may_move() -> None:
     load = 500.0 * (1.0 + 0.03 * np.sin(TIME_S))
     falling = 100.0 * np.exp(-TIME_S / 20.0)
     recording = Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=falling)
-    moves, stands = _decides("standing", 0.02, 0.1, lambda t: decay_of(recording, t) is not None)
+    moves, stands = decides("standing", 0.02, 0.1, lambda t: decay_of(recording, t) is not None)
     assert (moves, stands) == (False, True)
 
 
 @pytest.mark.parametrize(("field", "word"), [("hold_s", "holds"), ("idle_s", "idle")])
 def test_holds_and_idle_times_are_as_long_as_said(field: str, word: str) -> None:
     load = _held_load(5.0, 20.0)
-    shorter, longer = _decides(field, 2.0, 90.0, lambda t: word in _session_traits(load, t))
+    shorter, longer = decides(field, 2.0, 90.0, lambda t: word in _session_traits(load, t))
     assert (shorter, longer) == (True, False)
 
 
 def test_still_is_the_slowest_ramp() -> None:
     load = _held_load(20.0, 5.0)
     creeping = load - 0.0005 * 0.02 * np.cumsum(load > 0.9)
-    fast, slow = _decides("still_per_s", 1e-5, 0.004, lambda t: "holds" in _session_traits(creeping, t))
+    fast, slow = decides("still_per_s", 1e-5, 0.004, lambda t: "holds" in _session_traits(creeping, t))
     assert (fast, slow) == (False, True)
 
 
 def test_false_alarm_sets_the_largest_deviate_that_noise_makes() -> None:
-    rare, common = _decides("false_alarm", 1e-6, 1e-2, lambda t: largest_of_noise(10_000, t))
+    rare, common = decides("false_alarm", 1e-6, 1e-2, lambda t: largest_of_noise(10_000, t))
     assert rare > 6.0 > 5.0 > common

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from deciding import STANDARD, decides
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
@@ -26,7 +26,6 @@ from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]
 
-STANDARD = Thresholds()
 STEP_S = 0.04
 MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 CURVED = MODEL.with_part(effect("gas_compression"), np.array([0.05]))
@@ -47,11 +46,6 @@ def _sessions(runs: list[Recording], held: list[bool]) -> tuple[list[Session], S
     return prepare(runs, usable, held, scale, 1), scale
 
 
-def _decides(field: str, low: object, high: object, of: Callable[[Thresholds], object]) -> tuple[object, object]:
-    """What ``of`` answers with the number ``field`` at ``low`` and at ``high``."""
-    return of(replace(STANDARD, **{field: low})), of(replace(STANDARD, **{field: high}))
-
-
 @pytest.fixture(scope="module")
 def curved() -> Linearised:
     sessions, scale = _sessions([_recording(CURVED, seed) for seed in range(3)], [False] * 3)
@@ -67,7 +61,7 @@ def test_strength_sd_is_how_large_an_effect_may_be(curved: Linearised) -> None:
         evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
         return float(np.abs(evidence.exact((_curve(curved),)).strengths[0]).max())
 
-    small, usual = _decides("strength_sd", 1e-5, 0.03, strength)
+    small, usual = decides("strength_sd", 1e-5, 0.03, strength)
     assert small < 0.1 * usual
 
 
@@ -76,12 +70,12 @@ def test_validated_is_how_sure_a_gain_over_what_is_left_out_must_be(curved: Line
         evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
         return _worse(evidence, evidence.posterior((_curve(curved),))) is not None
 
-    assert _decides("validated", 0.8, 1e6, refused) == (False, True)
+    assert decides("validated", 0.8, 1e6, refused) == (False, True)
 
 
 def test_unknown_past_is_what_an_arm_may_remember_of_before(curved: Linearised) -> None:
     session = curved.sessions[0]
-    little, much = _decides("unknown_past", 0.01, 0.1, lambda t: nuisance_precision(session, MODEL, t)[1, 1])
+    little, much = decides("unknown_past", 0.01, 0.1, lambda t: nuisance_precision(session, MODEL, t)[1, 1])
     assert little == pytest.approx(100.0 * much)
 
 
@@ -101,7 +95,7 @@ def test_a_zero_is_named_by_its_size_and_how_well_it_is_known(
     def is_named(thresholds: Thresholds) -> bool:
         return bool(zeros_of(sessions, MODEL, scale, 0.0, 0.0, thresholds))
 
-    assert _decides(field, low, high, is_named) == named
+    assert decides(field, low, high, is_named) == named
 
 
 def test_seen_confidence_is_that_of_an_offset_at_rest() -> None:
@@ -114,17 +108,17 @@ def test_timing_resolution_is_how_short_a_delay_a_time_stamp_shows() -> None:
     model = MODEL.with_part(effect("delay"), np.array([0.2 * STEP_S]))
     member: Any = SimpleNamespace(name="delay")
     name = Name(member, effect("delay"), 0.9, 1.0, ())
-    within = _decides("timing_resolution", 0.1, 0.25, lambda t: _is_within_a_sample(name, model, [_recording()], t))
+    within = decides("timing_resolution", 0.1, 0.25, lambda t: _is_within_a_sample(name, model, [_recording()], t))
     assert within == (False, True)
 
 
 def test_tolerable_is_the_structure_that_a_good_unit_may_leave() -> None:
     left: Any = SimpleNamespace(rms=1e-3, significant=True)
-    assert _decides("tolerable", 5e-4, 2e-3, lambda t: _verdict([], left, left, t)) == ("unexplained", "adequate")
+    assert decides("tolerable", 5e-4, 2e-3, lambda t: _verdict([], left, left, t)) == ("unexplained", "adequate")
 
 
 def test_extrapolates_is_how_far_beyond_what_was_fitted_an_effect_is_believed() -> None:
     rated = MODEL.with_part(effect("rate_gain"), np.array([0.02, 0.4]))  # a tenth of the load, and of the rate
     sessions, _ = _sessions([_recording(rated, 0, peak=0.1), _recording(rated, 1)], [False, True])
-    strict, lax = _decides("extrapolates", 2.0, 1e4, lambda t: _extrapolates(sessions, rated, t))
+    strict, lax = decides("extrapolates", 2.0, 1e4, lambda t: _extrapolates(sessions, rated, t))
     assert (strict, lax) == ("rate_gain", None)
