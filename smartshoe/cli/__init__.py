@@ -178,4 +178,6 @@ def main() -> None:
     """Entry point of the ``smartshoe`` command."""
     # Most of what a command makes stays to its end: to look through it every 700 objects takes 7 % of a run.
     gc.set_threshold(SELDOM)
+    # Workers are started by `python -m`, which would import a numpy.py that lies where the command is called.
+    os.environ["PYTHONSAFEPATH"] = "1"
     sys.exit(run_command(sys.argv[1:]))

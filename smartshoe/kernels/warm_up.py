@@ -22,9 +22,11 @@ def begin() -> None:
     """Start the compilation in a process of its own, unless its results are there; never fails, never waits."""
     if all(any(CACHE.glob(f"{name}.*.nbi")) for name in KERNELS):
         return
-    process = subprocess.Popen(
-        [sys.executable, "-m", __spec__.name], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
-    )
+    # Where the package lies, so that neither is a module of the caller's folder taken for one of ours, nor is that
+    # folder missed when it goes. What fails there the fit meets again, and tells.
+    quiet = subprocess.DEVNULL
+    command = [sys.executable, "-m", __spec__.name]
+    process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, cwd=Path(__file__).parents[2])
     atexit.register(process.wait)
 
 
