@@ -187,22 +187,32 @@ class Evidence:
         covariance = cho_solve(factor, np.eye(index.size), check_finite=False) * np.outer(sds, sds)
         narrow, wide = self.thresholds.material**2, self.thresholds.strength_sd**2
         found = []
-        for k, one in enumerate(self.given.candidates):
-            if k in best.members:
-                continue
-            at = [c - 1 for c in one.columns]
-            S = (narrow * np.eye(len(at)) - covariance[np.ix_(at, at)]) / narrow**2
+        for numbers, columns in self._alike:
+            at, unit = columns - 1, np.eye(columns.shape[1])
+            S = (narrow * unit - covariance[at[:, :, None], at[:, None, :]]) / narrow**2
             q = mean[at] / narrow
-            inner = np.eye(len(at)) + (wide - narrow) * S
-            solved = np.linalg.solve(inner, q)
-            fall = (wide - narrow) * float(q @ solved) - float(np.linalg.slogdet(inner)[1])
-            found.append((best.score - fall + self.odds_of((k,)), k, np.asarray(wide * solved)))
+            inner = unit + (wide - narrow) * S
+            solved = np.linalg.solve(inner, q[:, :, None])[:, :, 0]
+            fall = (wide - narrow) * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
+            found += [
+                (best.score - float(fell) + self.odds_of((k,)), k, wide * strengths)
+                for k, fell, strengths in zip(numbers, fall, solved, strict=True)
+                if k not in best.members
+            ]
         return found
+
+    @cached_property
+    def _alike(self) -> list[tuple[list[int], Index]]:
+        """Candidates with equally many columns (g,), and these columns (g, k)."""
+        groups: dict[int, list[int]] = {}
+        for k, one in enumerate(self.given.candidates):
+            groups.setdefault(len(one.columns), []).append(k)
+        return [(ks, np.array([self.given.candidates[k].columns for k in ks], dtype=np.intp)) for ks in groups.values()]
 
     def odds_of(self, members: Members) -> float:
         """-2 log prior odds against the members of a set: of one effect among all, at one of its shapes."""
-        shapes = [len(self.given.place(self.given.candidates[m].name)) for m in members]
-        return sum(self.odds + 2.0 * math.log(count) for count in shapes)
+        shapes = self.given.shapes
+        return sum(self.odds + 2.0 * math.log(shapes[self.given.candidates[m].name]) for m in members)
 
     def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[Index, Array]:
         """Columns that take part, and the standard deviations (p,) of their coefficients."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,22 +12,12 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import EffectParameter
-from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.extended import ExtendedModel, Trace
 
 MOST_STEPS = 25
 SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 SHAPE_SD = 1.0  # of a shape's logarithm, or in sizes, about where it was begun
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """``cost`` is -2 log likelihood but for a constant, prior included; ``covariance`` (p, p) of theta."""
-
-    model: ExtendedModel
-    cost: float
-    covariance: Array
 
 
 class Likelihood:
@@ -37,6 +28,7 @@ class Likelihood:
     ) -> None:
         self.sessions = tuple(session for session in sessions if session.fitted.any())
         self.noise_sd = noise_sd
+        self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._past: list[Array] = []
         self._inverse: list[Array] = []
         for session in self.sessions:
@@ -53,18 +45,39 @@ class Likelihood:
 
     def cost(self, model: ExtendedModel) -> float:
         """Sum of squares over what is fitted, in units of the noise's variance."""
+        traces = [model.trace(session.conditions) for session in self.sessions]
+        self._last = model, traces  # the slopes of a step that is taken begin with them
         total = 0.0
-        for k, session in enumerate(self.sessions):
-            total += float(self._gram(k, (session.reading - model.simulate(session.conditions))[:, None])[0, 0])
+        for k, (session, (reading, _)) in enumerate(zip(self.sessions, traces, strict=True)):
+            total += float(self._gram(k, (session.reading - reading)[:, None])[0, 0])
         return total
 
     def normal(self, model: ExtendedModel) -> tuple[float, Array, Array]:
         """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p)."""
         total = np.zeros((1, 1))
+        known = self._last[1] if self._last is not None and self._last[0] is model else None
         for k, session in enumerate(self.sessions):
-            reading, slopes = model.sensitivities(session.conditions)
+            reading, slopes = model.sensitivities(session.conditions, None if known is None else known[k])
             total = total + self._gram(k, np.column_stack([session.reading - reading, slopes]))
         return float(total[0, 0]), total[1:, 0], total[1:, 1:]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """``cost`` is -2 log ``likelihood`` but for a constant, prior included."""
+
+    model: ExtendedModel
+    cost: float
+    likelihood: Likelihood
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(p, p) of theta; most fits are only compared, and never asked for it."""
+        logarithmic = _are_logarithmic(self.model)
+        scale = np.where(logarithmic, self.model.theta, 1.0)
+        precision = _precision(self.model, logarithmic)
+        inner = self.likelihood.normal(self.model)[2] * np.outer(scale, scale) + np.diag(precision)
+        return np.asarray(_inverse(inner) * np.outer(scale, scale))
 
 
 def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -> Fit:
@@ -73,10 +86,10 @@ def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -
     Shapes have a wide prior about their start, weights of flexible blocks theirs about null.
     """
     owners = start.parameters
-    logarithmic = np.array([_is_logarithmic(p) for _, p in owners])
+    logarithmic = _are_logarithmic(start)
     low, high = np.array([p.lower for _, p in owners]), np.array([p.upper for _, p in owners])
     model = start.at(np.clip(start.theta, low, high))
-    about, precision = _prior(owners, model.theta, logarithmic)
+    about, precision = _about(model, logarithmic), _precision(model, logarithmic)
 
     def penalty(theta: Array) -> float:
         return float(np.sum(precision * (_stepped(theta, logarithmic) - about) ** 2))
@@ -84,8 +97,10 @@ def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -
     cost, right, normal = likelihood.normal(model)
     cost += penalty(model.theta)
     damping = 1e-4
-    for _ in range(steps):
+    for taken in range(steps):
         theta = model.theta
+        if taken:
+            _, right, normal = likelihood.normal(model)
         scale = np.where(logarithmic, theta, 1.0)
         inner = normal * np.outer(scale, scale) + np.diag(precision)
         pull = right * scale - precision * (_stepped(theta, logarithmic) - about)
@@ -103,33 +118,41 @@ def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -
         if best is None:
             break
         fell = cost - best[0]
-        model = best[1]
-        cost, right, normal = likelihood.normal(model)
-        cost += penalty(model.theta)
+        cost, model = best
         if fell < SETTLED:
             break
-    scale = np.where(logarithmic, model.theta, 1.0)
-    inner = normal * np.outer(scale, scale) + np.diag(precision)
-    return Fit(model, cost, _inverse(inner) * np.outer(scale, scale))
+    return Fit(model, cost, likelihood)
 
 
-def _prior(owners: Sequence[tuple[str, EffectParameter]], theta: Array, logarithmic: Mask) -> tuple[Array, Array]:
-    about, precision = _stepped(theta, logarithmic).copy(), np.zeros(theta.size)
-    for k, (owner, parameter) in enumerate(owners):
-        weight_sd = getattr(parameter, "prior_sd", None)
-        if weight_sd is not None:
-            about[k], precision[k] = parameter.null or 0.0, 1.0 / weight_sd**2
+def _about(model: ExtendedModel, logarithmic: Mask) -> Array:
+    """(p,) what the steps' prior is about: where a shape begins, where a flexible block's weight is null."""
+    about = _stepped(model.theta, logarithmic).copy()
+    for k, (_, parameter) in enumerate(model.parameters):
+        if parameter.prior_sd is not None:
+            about[k] = parameter.null or 0.0
+    return about
+
+
+def _precision(model: ExtendedModel, logarithmic: Mask) -> Array:
+    """(p,) of the steps' prior."""
+    precision = np.zeros(logarithmic.size)
+    for k, (owner, parameter) in enumerate(model.parameters):
+        if parameter.prior_sd is not None:
+            precision[k] = 1.0 / parameter.prior_sd**2
         elif parameter.null is None and owner != "baseline":
             precision[k] = 1.0 / (SHAPE_SD if logarithmic[k] else SHAPE_SD * parameter.size) ** 2
-    return about, precision
+    return precision
 
 
 def _stepped(theta: Array, logarithmic: Mask) -> Array:
     return np.where(logarithmic, np.log(np.where(logarithmic, np.abs(theta) + 1e-300, 1.0)), theta)
 
 
-def _is_logarithmic(parameter: EffectParameter) -> bool:
-    return parameter.null is None and parameter.lower > 0 and parameter.upper / parameter.lower >= LOG_RANGE
+def _are_logarithmic(model: ExtendedModel) -> Mask:
+    """(p,) which parameters are stepped in their logarithm."""
+    return np.array(
+        [p.null is None and p.lower > 0 and p.upper / p.lower >= LOG_RANGE for _, p in model.parameters], dtype=bool
+    )
 
 
 def _bounded_step(

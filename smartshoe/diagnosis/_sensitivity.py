@@ -8,6 +8,7 @@ has nuisances of its own, an offset and what an earlier load left in the relaxin
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -124,9 +125,10 @@ class Linearised:
     candidates: tuple[Candidate, ...]
     thresholds: Thresholds
 
-    def place(self, name: str) -> tuple[int, ...]:
-        """Candidates (their numbers) of an effect."""
-        return tuple(k for k, one in enumerate(self.candidates) if one.name == name)
+    @cached_property
+    def shapes(self) -> Mapping[str, int]:
+        """At how many points of its shapes each effect stands."""
+        return Counter(one.name for one in self.candidates)
 
     @cached_property
     def gram(self) -> Gram:
@@ -178,8 +180,8 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     less = [model.without(part.name) for part in model.parts]
     rows = []
     for session in fitted:
-        reading, slopes = model.sensitivities(session.conditions)
         trace = model.trace(session.conditions)
+        reading, slopes = model.sensitivities(session.conditions, trace)
         within = [reading - one.simulate(session.conditions) for one in less]
         beside = [model.column_of(by, session.conditions, trace) for by in beyond]
         target = session.reading - reading + sum(within, np.zeros(reading.size))

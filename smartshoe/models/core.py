@@ -15,6 +15,7 @@ All of it is springs and dampers, so that the poles are real and it runs as a su
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -70,19 +71,22 @@ class Core:
             self._known_modes[step_s] = self._modes_at(step_s)
         return self._known_modes[step_s]
 
+    @cached_property
+    def _vectors(self) -> tuple[Array, Array, Array]:
+        """Poles (p,), the matrix from modes to states and that from states to modes."""
+        if self.drive.size == 1:
+            return self.matrix[0], np.ones((1, 1)), np.ones((1, 1))
+        # Two modes that fall together have no vectors of their own: a millionth apart they have.
+        apart = 1e-6 * np.diag(np.diag(self.matrix) * np.arange(self.drive.size))
+        for shift in (0.0, 1.0, 10.0):
+            values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
+            if np.linalg.cond(vectors) < MOST_SKEWED:
+                break
+        return values, vectors, np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
+
     def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
         """decay, before, after (p,), the matrix from modes to states and that from states to modes."""
-        if self.drive.size == 1:
-            values: Array = self.matrix[0]
-            vectors: Array = np.ones((1, 1))
-        else:
-            # Two modes that fall together have no vectors of their own: a millionth apart they have.
-            apart = 1e-6 * np.diag(np.diag(self.matrix) * np.arange(self.drive.size))
-            for shift in (0.0, 1.0, 10.0):
-                values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
-                if np.linalg.cond(vectors) < MOST_SKEWED:
-                    break
-        inverse: Array = np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
+        values, vectors, inverse = self._vectors
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4

@@ -179,20 +179,20 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, self.core if alike else None))
         return tuple(made)
 
-    def sensitivities(self, conditions: Conditions) -> tuple[Array, Array]:
+    def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
         The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
+        ``trace``: this model's own under the same conditions, where it is known.
         """
-        inputs: list[Array] = []
-        reading = self._run(conditions.load, conditions, 0, inputs)
+        reading, inputs = trace or self.trace(conditions)
         out = np.empty((reading.size, 1 + len(self._varied)), order="F")
         out[:, 0] = reading / self.gain
         for j, by in enumerate(self._varied, start=1):
             out[:, j] = by.slope(reading, inputs, conditions)
         return reading, out
 
-    def trace(self, conditions: Conditions) -> tuple[Array, list[Array]]:
+    def trace(self, conditions: Conditions) -> Trace:
         """The reading (n,), and what goes into each block of the chain, the chain's end last."""
         inputs: list[Array] = []
         reading = self._run(conditions.load, conditions, 0, inputs)
@@ -213,7 +213,7 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, None if in_core else self.core))
         return tuple(made)
 
-    def column_of(self, by: Extensions, conditions: Conditions, trace: tuple[Array, list[Array]]) -> Array:
+    def column_of(self, by: Extensions, conditions: Conditions, trace: Trace) -> Array:
         """Derivatives (n, k) of the reading with respect to the k strengths of ``by``; ``trace`` is the model's own."""
         reading, inputs = trace
         out = np.empty((reading.size, len(by)), order="F")
@@ -274,3 +274,4 @@ class Extension:
 
 
 Extensions = tuple[Extension, ...]
+Trace = tuple[Array, list[Array]]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._inference import Alternative, Member
-from smartshoe.diagnosis._likelihood import Fit
+from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
 MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
-NOWHERE = Fit(MODEL, 0.0, np.zeros((3, 3)))
+NOWHERE = Fit(MODEL, 0.0, Likelihood((), 1.0, MODEL, Thresholds()))
 
 
 def member(
