@@ -64,6 +64,14 @@ class _LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(list(_COMMANDS.items()))
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_epilog(ctx, formatter)
+        from smartshoe.files.shipped import shipped
+
+        pages = shipped("docs")
+        if pages is not None:  # in one piece, so that it can be copied
+            formatter.write(f"\n  The documentation, as plain text, begins with tour.md in\n  {pages}\n")
+
 
 def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted and not ctx.resilient_parsing:

@@ -44,7 +44,8 @@ def fit_coefficients(
     offset, no delay, steady before the first sample; `identify` does that. Gauss-Newton from SRIVC, compiled;
     ``workers`` threads (-1: one a core). Raises `InputError` for samples that are missing or shapes that differ.
     """
-    u, y = (np.atleast_2d(np.ascontiguousarray(values, dtype=float)) for values in (inputs, outputs))
+    # A recording's signals cannot be written to: for those numba would compile every pass of the fit anew.
+    u, y = (np.atleast_2d(np.require(values, float, ["C", "W"])) for values in (inputs, outputs))
     if not (np.isfinite(sample_time_s) and sample_time_s > 0 and np.isfinite(prefilter_rad_s) and prefilter_rad_s > 0):
         raise UsageError(
             f"sample_time_s is {sample_time_s:g}, prefilter_rad_s {prefilter_rad_s:g}: give positive numbers"

@@ -35,6 +35,7 @@ from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
 RATE_HZ = 200.0
+SENT = 210  # readings of a stream, 3.5 s at 60 Hz: more than the smoother waits for
 LINEAR = tuple(name for name in estimator_names() if name != "inverse")
 
 
@@ -55,9 +56,9 @@ def plain(**changes: Any) -> Calibration:
     return Calibration(**given)
 
 
-def reading_of(load_n: np.ndarray, c: Calibration) -> np.ndarray:
+def reading_of(load_n: np.ndarray, c: Calibration, rate_hz: float = RATE_HZ) -> np.ndarray:
     """The inverse of eq. (13) by another way than the estimators': the bilinear filter turned round."""
-    numerator, denominator = smartshoe.models.discretise(c.a1, c.b0, c.b1, RATE_HZ, "bilinear")
+    numerator, denominator = smartshoe.models.discretise(c.a1, c.b0, c.b1, rate_hz, "bilinear")
     start = (denominator.sum() / numerator.sum() - denominator[0] / numerator[0]) * load_n[0]
     out, _ = lfilter(denominator, numerator, load_n, zi=np.array([start]))
     return np.asarray(out) + c.offset
@@ -223,15 +224,16 @@ def test_what_cannot_be_estimated_is_refused(call: Any, error: type[Exception], 
 
 @pytest.mark.parametrize("name", LINEAR)
 @settings(max_examples=6)
-@given(cuts=st.lists(st.integers(0, 700), max_size=4), seed=st.integers(0, 99))
+@given(cuts=st.lists(st.integers(0, SENT), max_size=4), seed=st.integers(0, 99))
 def test_a_stream_gives_the_forces_of_the_whole_whatever_its_blocks(name: str, cuts: list[int], seed: int) -> None:
     c, rng = plain(), np.random.default_rng(seed)
-    readings = reading_of(200.0 * np.sin(np.linspace(0.0, 25.0, 700)) ** 2, c) + 0.1 * rng.standard_normal(700)
-    missing = np.zeros(700, dtype=bool)
-    missing[300:305] = True
-    chosen = estimator(name, c, RATE_HZ, noise_sd=0.1)
+    load_n = 200.0 * np.sin(np.linspace(0.0, 25.0, SENT)) ** 2
+    readings = reading_of(load_n, c, 60.0) + 0.1 * rng.standard_normal(SENT)
+    missing = np.zeros(SENT, dtype=bool)
+    missing[90:95] = True
+    chosen = estimator(name, c, 60.0, noise_sd=0.1)
     whole, run = chosen.estimate(readings, missing), chosen.begin(readings, missing)
-    blocks = [slice(a, b) for a, b in pairwise([0, *sorted(cuts), 700])]
+    blocks = [slice(a, b) for a, b in pairwise([0, *sorted(cuts), SENT])]
     found = np.concatenate([*(run.push(readings[k], missing[k]).force_n for k in blocks), run.finish().force_n])
     # A smoother's stream waits two seconds for what comes after a reading; the others are the same to the bit.
     assert found == pytest.approx(whole.force_n, abs=1e-4 if name == "smoother" else 0.0)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from c_code import needs_compiler, run_filters
 from chains import EXACT, INVERTIBLE, chain_of, some_conditions
+from export_page import require_stated
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_export import _run_c, _self_test
@@ -105,6 +106,10 @@ def test_20_000_samples_of_every_block_in_single_precision(tmp_path: Path) -> No
         assert worst_n[name] <= FilterModel.of(calibrations[name]).tolerance_n("float"), name
     print({name: f"{value:.2g} N" for name, value in worst_n.items()})
     assert max(worst_n.values()) <= 3e-4
+    in_integers = {name for name in worst_n if "int64_t" in (tmp_path / f"{name}.c").read_text()}
+    assert in_integers == {"rate_gain", "bouc_wen_hysteresis", "dead_band", "flexible_loop", "load_unload_asymmetry"}
+    require_stated("chains with rate gain", 1, max(worst_n[name] for name in in_integers))
+    require_stated("network, offsets", 1, max(value for name, value in worst_n.items() if name not in in_integers))
 
 
 @needs_compiler

@@ -77,3 +77,11 @@ def test_diagnose_tells_the_steps_that_are_usually_left() -> None:
         tell(text)
     assert len(shown) == 3
     assert left == [6, 2]
+
+
+def test_the_help_says_where_the_documentation_lies(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["--help"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    (at,) = (k for k, line in enumerate(shown) if "The documentation" in line)
+    assert "tour.md" in shown[at]
+    assert (Path(shown[at + 1].strip()) / "tour.md").is_file()

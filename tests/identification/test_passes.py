@@ -111,12 +111,21 @@ def test_scipys_optimum_of_the_papers_problem_is_ours() -> None:
 
 
 def test_a_bank_of_fits_is_identify_many_times() -> None:
+    from smartshoe.kernels.coefficients import fit_coefficients as compiled
+
     clean = press()
     rng = np.random.default_rng(7)
     loads = clean.force_n + 2.0 * rng.standard_normal((5, len(clean)))
     many = fit_coefficients(clean.sensor.values, loads, sample_time_s=0.01)
     threads = fit_coefficients(clean.sensor.values, loads, sample_time_s=0.01, workers=2)
     assert (many.coefficients == threads.coefficients).all()
+    assert not clean.force_n.flags.writeable
+    frozen, own = (
+        fit_coefficients(clean.sensor.values, load, sample_time_s=0.01) for load in (clean.force_n, loads[0])
+    )
+    assert frozen.converged.all()
+    assert own.coefficients[0] == pytest.approx(many.coefficients[0], rel=1e-12)
+    assert len(compiled.signatures) == 1  # what cannot be written to is not compiled anew
     for row, load in enumerate(loads):
         single = identify(
             Recording.from_arrays(time_s=clean.time_s, force_n=load, pressure_mbar=clean.sensor.values),

@@ -125,11 +125,12 @@ def drift(store: CalibrationStore, serial_number: str) -> Drift:
         )
     calibrations = [entry.calibration() for entry in entries]
     require_one_reading_unit(calibrations)
-    days = np.array([days_between(entries[0].date, entry.date) for entry in entries])
+    dates = [entry.date for entry in entries]
+    days = np.array([days_between(dates[0], date) for date in dates])
     repairs = [event for event in events if event.kind == "repaired"]
     lives = np.array([sum(event.date <= entry.date for event in repairs) for entry in entries], dtype=np.intp)
     trends = {
-        name: _trend(name, unit, days, values, sds, lives, entries, repairs)
+        name: _trend(name, unit, days, values, sds, lives, dates, repairs)
         for name, unit, values, sds in _followed(calibrations)
     }
     top_n = top_load_n(calibrations)
@@ -159,13 +160,13 @@ class _TrendFit:
 
     def parameter(self, contrast: Array, unit: str) -> Parameter:
         """contrast @ theta with its interval (Student's t: the scatter between calibrations is itself estimated)."""
-        from scipy.stats import t
+        from scipy.special import stdtrit
 
         value = float(contrast @ self.theta)
         sd = math.sqrt(max(float(contrast @ self.covariance @ contrast), 0.0))
         if self.freedom < 1:
             return Parameter(value, math.nan, (math.nan, math.nan), unit)
-        return Parameter.from_sd(value, sd, unit, float(t.ppf(0.975, self.freedom)))
+        return Parameter.from_sd(value, sd, unit, float(stdtrit(self.freedom, 0.975)))
 
 
 def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
@@ -197,7 +198,7 @@ def _trend(
     values: Array,
     sds: Array,
     lives: Index,
-    entries: Sequence[Entry],
+    dates: Sequence[datetime],
     repairs: Sequence[HistoryEvent],
 ) -> Trend:
     # Numbered without gaps: of two repairs with no calibration between, the last one counts.
@@ -218,9 +219,9 @@ def _trend(
         contrast[[pieces[k] - 1, pieces[k]]] = -1.0, 1.0
         change = found.parameter(contrast, unit)
         if k in jumped:
-            between = f"between {iso(entries[k - 1].date)} and {iso(entries[k].date)}"
+            between = f"between {iso(dates[k - 1])} and {iso(dates[k])}"
             said = f"{_amount(name, change)} {between}, which no repair explains"
-            jumps.append(DriftStep(entries[k].date, change, said))
+            jumps.append(DriftStep(dates[k], change, said))
         else:
             when = repairs[int(lives[k]) - 1].date
             at_repairs.append(DriftStep(when, change, f"{_amount(name, change)} at the repair of {iso(when)}"))
@@ -255,7 +256,7 @@ def _jump(days: Array, values: Array, sds: Array, pieces: Index) -> int | None:
 
     Every gap between two calibrations is tried, and the chance is multiplied by their number (Bonferroni).
     """
-    from scipy.stats import t
+    from scipy.special import stdtr  # Student's t: scipy.stats takes a second to come
 
     gaps = [k for k in range(1, values.size) if pieces[k] == pieces[k - 1] and days[k] > days[k - 1]]
     best: tuple[float, int] | None = None
@@ -266,9 +267,8 @@ def _jump(days: Array, values: Array, sds: Array, pieces: Index) -> int | None:
             continue
         contrast = np.zeros(found.theta.size)
         contrast[[split[k] - 1, split[k]]] = -1.0, 1.0
-        change = found.parameter(contrast, "")
-        sd = math.sqrt(float(contrast @ found.covariance @ contrast))
-        chance = 2.0 * float(t.sf(abs(change.value) / sd, found.freedom)) * len(gaps) if sd > 0.0 else 1.0
+        change, sd = float(contrast @ found.theta), math.sqrt(float(contrast @ found.covariance @ contrast))
+        chance = 2.0 * float(stdtr(found.freedom, -abs(change) / sd)) * len(gaps) if sd > 0.0 else 1.0
         if chance < JUMP_CHANCE and (best is None or chance < best[0]):
             best = chance, k
     return None if best is None else best[1]

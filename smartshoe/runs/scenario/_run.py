@@ -14,7 +14,7 @@ import numpy as np
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.validation import Validation, validate
 from smartshoe.devices import TestMachine, open_machine
-from smartshoe.errors import LimitError, OptionError, SmartShoeError
+from smartshoe.errors import InputError, LimitError, OptionError, SmartShoeError
 from smartshoe.files.logs import read
 from smartshoe.identification import Identification, identify
 from smartshoe.protocol import Protocol
@@ -120,6 +120,11 @@ def _record(
         found: dict[str, Recording] = {}
         for name in unit.recordings:
             path = Path(name) if Path(name).is_absolute() else source.path.parent / name
+            if not path.exists():
+                raise InputError(
+                    f"{path} does not exist: copy the scenario beside your recordings and name them in it, or make"
+                    " these there with smartshoe simulate scenarios/calibration.toml --out FOLDER"
+                )
             progress(f"{unit.name}: reading {path.name}")
             found[path.stem] = read(
                 path,

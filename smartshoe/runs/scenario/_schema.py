@@ -22,6 +22,7 @@ from pydantic import (
 
 from smartshoe.errors import InputError, OptionError, ScenarioError
 from smartshoe.files.gate import read_text, require_file_name
+from smartshoe.files.shipped import shipped
 from smartshoe.protocol import (
     DYNAMIC_RATES_N_PER_S,
     STATIC_LOADS_N,
@@ -31,7 +32,6 @@ from smartshoe.protocol import (
     static_protocol,
 )
 from smartshoe.runs.scenario._keys import Tables, with_values
-from smartshoe.runs.scenario._shipped import or_shipped
 from smartshoe.runs.scenario.lines import line_of
 
 
@@ -273,7 +273,9 @@ def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, Sce
 
     ``what`` says what the file should be. ``scenarios/NAME.toml`` is found wherever smartshoe is installed.
     """
-    file = or_shipped(Path(path))
+    file = Path(path)
+    if file.parent == Path("scenarios") and not file.exists():
+        file = shipped(file.as_posix()) or file
     try:
         text = read_text(file, what)
     except InputError as error:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lives import LEFT_TOE, SDS, aged, calibration, day
+from lives import FIRST_DAY, LEFT_TOE, SDS, aged, calibration, day
 from scipy.stats import chi2, linregress
 from scipy.stats import t as student
 
 from smartshoe.calibration.store import CalibrationStore
 from smartshoe.calibration.store.compare import Comparison, compare
-from smartshoe.calibration.store.drift import drift
+from smartshoe.calibration.store.drift import Trend, _trend, drift
 from smartshoe.calibration.store.quantities import quantities
 from smartshoe.errors import UsageError
 from smartshoe.units import VOLT
@@ -173,12 +174,30 @@ def test_the_drift_of_a_unit_that_is_not_there_says_which_are(tmp_path: Path) ->
         drift(store, "S1")
 
 
+def gain_of_a_life(rng: np.random.Generator, count: int, placed: float) -> Trend:
+    """What `drift` follows of the static gain of a life that stays as it is: laws over many need no files."""
+    found = [
+        quantities(calibration(aged(0.0, 0.0, 1.0 + placed * rng.standard_normal()), rng=rng))["static_gain"]
+        for _ in range(count)
+    ]
+    days = 30.0 * np.arange(count)
+    values, sds = np.array([one.value for one in found]), np.array([one.sd for one in found])
+    dates = [FIRST_DAY + timedelta(days=float(at)) for at in days]
+    return _trend("static_gain", found[0].unit, days, values, sds, np.zeros(count, dtype=np.intp), dates, [])
+
+
+def test_a_life_without_files_is_what_drift_follows(tmp_path: Path) -> None:
+    of_files = drift(life(tmp_path, np.random.default_rng(6), placed=0.002), "S1").trends["static_gain"]
+    bare = gain_of_a_life(np.random.default_rng(6), 10, 0.002)
+    assert bare.to_dict() == of_files.to_dict()
+
+
 @pytest.mark.parametrize("placed", [0.0, 0.002])
-def test_the_interval_of_the_slope_holds(tmp_path: Path, placed: float) -> None:
+def test_the_interval_of_the_slope_holds(placed: float) -> None:
     rng = np.random.default_rng(6)
     inside, count = 0, 120
-    for k in range(count):
-        trend = drift(life(tmp_path / str(k), rng, count=6, placed=placed), "S1").trends["static_gain"]
+    for _ in range(count):
+        trend = gain_of_a_life(rng, 6, placed)
         assert trend.per_year is not None
         inside += trend.per_year.ci95[0] < 0.0 < trend.per_year.ci95[1]
     # 95 %: of 120, 114 with an sd of 2.4; errors that the sds explain are covered more often, by Birge's rule.
@@ -207,9 +226,9 @@ def test_a_jump_that_no_repair_explains_is_told_with_its_place(tmp_path: Path) -
     assert gain.per_year.value == pytest.approx(-0.02 * LEFT_TOE[2] / LEFT_TOE[0], rel=0.2)
 
 
-def test_a_quiet_life_has_no_jumps(tmp_path: Path) -> None:
+def test_a_quiet_life_has_no_jumps() -> None:
     rng = np.random.default_rng(9)
-    found = [drift(life(tmp_path / str(k), rng, placed=0.002), "S1").trends["static_gain"].jumps for k in range(60)]
+    found = [gain_of_a_life(rng, 10, 0.002).jumps for _ in range(60)]
     # One in a hundred by construction; 60 lives with four or more has a chance of 1 in 300.
     assert sum(map(len, found)) < 4
 

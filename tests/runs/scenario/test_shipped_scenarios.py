@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from smartshoe.errors import ScenarioError
-from smartshoe.runs.scenario import load
+import smartshoe
+from smartshoe.errors import InputError, ScenarioError
+from smartshoe.files.shipped import shipped
+from smartshoe.runs.scenario import load, run, simulate
 
 
 def test_a_shipped_scenario_is_found_from_an_empty_folder(
@@ -29,3 +31,21 @@ def test_ones_own_file_of_that_name_comes_first_and_no_other_is_guessed(
     Path("scenarios/calibration.toml").write_text("title =", encoding="utf-8")
     with pytest.raises(ScenarioError, match="not valid TOML"):
         load("scenarios/calibration.toml")
+
+
+def test_the_template_for_measured_files_says_what_it_lacks_and_runs_beside_simulated_ones(tmp_path: Path) -> None:
+    template = shipped("scenarios/replay.toml")
+    assert template is not None
+    copied = tmp_path / "replay.toml"
+    copied.write_bytes(template.read_bytes())
+    scenario, source = load(copied)
+    with pytest.raises(
+        InputError, match=r"left_toe_static.csv does not exist: copy .* smartshoe simulate"
+    ):
+        run(scenario, source)
+    four, text = load("scenarios/calibration.toml")
+    one = four.model_copy(update={"unit": tuple(unit for unit in four.unit if unit.name == "left_toe")})
+    for name, recording in simulate(one, text)["left_toe"].items():
+        smartshoe.write(recording, tmp_path / f"left_toe_{name}.csv")
+    (unit,) = run(scenario, source).units
+    assert (unit.fitted, unit.judged) == (("left_toe_static", "left_toe_dynamic"), ("left_toe_check",))
