@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from chains import BASELINE, STEP_S
 from export_page import stated
 
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.identification import identify
 from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Recording
 
+STEP_S = 0.01
+BASELINE = ExtendedModel(1.0, 0.15, 0.3, 800.0, 170.0, "mbar")  # the page's own example
 STRENGTHS = {"play_hysteresis": 0.02, "linear_leak": 0.005, "gas_compression": 0.2, "sensor_lag": 0.02}
 
 

@@ -39,9 +39,7 @@ def test_the_template_for_measured_files_says_what_it_lacks_and_runs_beside_simu
     copied = tmp_path / "replay.toml"
     copied.write_bytes(template.read_bytes())
     scenario, source = load(copied)
-    with pytest.raises(
-        InputError, match=r"left_toe_static.csv does not exist: copy .* smartshoe simulate"
-    ):
+    with pytest.raises(InputError, match=r"left_toe_static.csv does not exist: copy .* smartshoe simulate"):
         run(scenario, source)
     four, text = load("scenarios/calibration.toml")
     one = four.model_copy(update={"unit": tuple(unit for unit in four.unit if unit.name == "left_toe")})
