@@ -95,10 +95,9 @@ def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array], fal
     count = sum(int(one.good.sum()) for one in blocks)
     if count < FEWEST or not any(one.residual.any() for one in blocks):
         return None
-    tau_s, theta, power = min(
-        ((float(t), float(m), _power(blocks, float(t), float(m))) for t in MEMORIES_S for m in MOVING_AVERAGES),
-        key=lambda one: one[2],
-    )
+    powers = np.stack([_powers(blocks, float(theta)) for theta in MOVING_AVERAGES], axis=1)
+    t, m = np.unravel_index(int(np.argmin(powers)), powers.shape)
+    tau_s, theta, power = float(MEMORIES_S[t]), float(MOVING_AVERAGES[m]), float(powers[t, m])
     variance = power / count
     step_s = float(np.median([one.step_s for one in blocks]))
     phi = float(np.exp(-step_s / tau_s))
@@ -145,8 +144,15 @@ def _innovations(blocks: _Blocks, tau_s: float, theta: float) -> Array:
     return np.where(blocks.good, lfilter([1.0, -phi], [1.0, theta], blocks.residual), 0.0)
 
 
-def _power(blocks: Sequence[_Blocks], tau_s: float, theta: float) -> float:
-    return sum(float(np.sum(_innovations(one, tau_s, theta) ** 2)) for one in blocks)
+def _powers(blocks: Sequence[_Blocks], theta: float) -> Array:
+    """(memories,) power of the `_innovations`, a parabola in phi: e = v - phi w, w being v a block later."""
+    power = np.zeros(MEMORIES_S.size)
+    for one in blocks:
+        v = lfilter([1.0], [1.0, theta], one.residual)
+        now, before = v[one.good], np.concatenate([[0.0], v[:-1]])[one.good]
+        phi = np.exp(-one.step_s / MEMORIES_S)
+        power += now @ now - 2.0 * phi * (now @ before) + phi**2 * (before @ before)
+    return power
 
 
 def _kolmogorov(innovations: Array) -> float:

@@ -55,12 +55,22 @@ class Scale:
 
 
 @dataclass(frozen=True, eq=False)
+class Quiet:
+    """The load (n,) without its noise, whose standard deviation was ``raw``, and what is ``left`` of that."""
+
+    load: Array
+    raw: float
+    left: float
+
+
+@dataclass(frozen=True, eq=False)
 class Session:
     """One recording on an even grid, in shares of full scale (`smartshoe.models.effects.Conditions`).
 
     ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
     left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
+    ``quiet`` is the load at the full rate.
     """
 
     recording: Recording
@@ -72,6 +82,7 @@ class Session:
     cycle: Index
     resting: Mask
     thinned: int
+    quiet: Quiet
     displacement: Array | None = None
 
     @property
@@ -203,18 +214,16 @@ def _session(
         time_s = even
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
     weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
-    raw = load_n / scale.load_n
-    raw_noise = noise_sd(raw)
-    load, noise = without_noise(raw, step_s, raw_noise)
-    load = as_sampled(load, scale.share(reading), step_s)
+    quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s)
+    load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, REST_SHARE)
     beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
     conditions = Conditions(
         time_s[::factor],
-        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, raw_noise), weights, factor),
+        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, quiet.raw), weights, factor),
         step_s * factor,
-        noise * float(np.sqrt(np.sum(weights**2))),
+        quiet.left * float(np.sqrt(np.sum(weights**2))),
         temperature_k=beside.get("temperature_k"),
         neighbour=beside.get("neighbour"),
         before=before,
@@ -236,8 +245,15 @@ def _session(
         cycle,
         np.abs(load - base) < REST_SHARE,
         factor,
+        quiet,
         smoothed(displacement, weights, factor) if displacement is not None else None,
     )
+
+
+def _quiet(load: Array, reading: Array, step_s: float) -> Quiet:
+    raw = noise_sd(load)
+    quiet, left = without_noise(load, step_s, raw)
+    return Quiet(as_sampled(quiet, reading, step_s), raw, left)
 
 
 def _rests_levelled(load: Array, level: float, noise: float) -> Array:

@@ -41,11 +41,11 @@ def linear_filter(
     ``state`` (order,) is what came before, nothing (zeros) where it is not given: `scipy.signal.lfilter`'s ``zi``.
     The numbers are lfilter's, bit for bit.
     """
-    top, bottom = np.asarray(numerator, dtype=float), np.asarray(denominator, dtype=float)
-    size = max(top.size, bottom.size)
-    b, a = np.zeros(size), np.zeros(size)
-    b[: top.size], a[: bottom.size] = top / bottom[0], bottom / bottom[0]
-    left = np.zeros(size - 1) if state is None else np.array(state, dtype=float)
+    b, a = np.array(numerator, dtype=float), np.array(denominator, dtype=float)
+    if b.size != a.size or a[0] != 1.0:
+        size = max(b.size, a.size)
+        b, a = np.append(b, np.zeros(size - b.size)) / a[0], np.append(a, np.zeros(size - a.size)) / a[0]
+    left = np.zeros(b.size - 1) if state is None else np.array(state, dtype=float)
     given = np.array(values, dtype=float)  # a writeable copy: numba compiles anew for read-only arrays
     out = np.empty(given.size)
     run(b, a, given, left, out)
