@@ -194,7 +194,7 @@ def _errors_in_variables(
             variance = factor * _mean_square(level, theta)
             output = output_sd**2 if output_sd else output_variance(problem, theta, variance, input_sd)
             ratio = min(input_sd**2 / output, MOST_RATIO) if output > 0 else MOST_RATIO
-            level = level.with_noise_ratio(ratio)
+            level, before = level.with_noise_ratio(ratio), theta
             if number == 0:
                 # The likelihood may have several optima along the delay: every method sets out from the same one.
                 if level.settings.delay_s is None and iterations == 0:
@@ -203,7 +203,7 @@ def _errors_in_variables(
                     theta = minimise(level, theta, "trf", tolerance=1e-6, max_iterations=100).theta
             found = _minimise(level, theta, method, limits)
             iterations, converged = iterations + found.iterations, found.converged
-            moved = float(np.max(np.abs(found.theta - theta) / (np.sqrt(np.diag(fit.covariance)) + 1e-300)))
+            moved = float(np.max(np.abs(found.theta - before) / (np.sqrt(np.diag(fit.covariance)) + 1e-300)))
             theta = found.theta
             if moved < 1e-3:
                 break

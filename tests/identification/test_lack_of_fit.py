@@ -100,3 +100,13 @@ def test_nothing_repeated_is_refused() -> None:
         lack_of_fit(identify(recording), recording)
     with pytest.raises(UsageError, match="in order"):
         lack_of_fit_of({"r": np.zeros(3)}, [loads()], unknowns=0)
+
+
+def test_of_two_repeats_the_mean_has_as_many_degrees_as_their_difference() -> None:
+    """Fewer of both where the noise depends on itself: a block that follows the last one tells less."""
+    recording = loads(repeats=2)
+    white = np.random.default_rng(3).standard_normal(len(recording) + 200)
+    slow = signal.lfilter([1.0], [1.0, -0.97], white)[200:]
+    told = [lack_of_fit_of({"r": noise}, [recording], unknowns=0).degrees for noise in (white[200:], slow)]
+    assert all(mean == difference for mean, difference in told)
+    assert told[1][0] < 0.8 * told[0][0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from presses import press, pressed
@@ -99,3 +101,15 @@ def test_a_fold_that_is_refused_says_so_and_leaves_the_others_standing() -> None
 def test_one_rate_is_refused() -> None:
     with pytest.raises(NotIdentifiableError, match="second loading rate"):
         leave_one_rate_out(press(load_noise=1.0, rates=(400.0,), repeats=3))
+
+
+def test_what_json_holds_is_what_was_found() -> None:
+    result = leave_one_rate_out(one_each(load_noise=1.0))
+    told = result.to_dict()
+    for fold, item in zip(result.folds, told["folds"], strict=True):
+        assert item == {name: getattr(fold, name) for name in item}
+        assert set(item) == {each.name for each in fields(fold)} - {"found"}
+    assert {name: moved["moved_sd"] for name, moved in told["movements"].items()} == {
+        name: moved.moved_sd for name, moved in result.movements.items()
+    }
+    assert told["says"] == result.says

@@ -74,6 +74,13 @@ def test_several_experiments_have_offsets_and_starts_of_their_own(direction: str
 
 
 @pytest.mark.parametrize("direction", ["inverse", "forward"])
+def test_an_experiment_of_a_second_counts_beside_a_long_one(direction: str) -> None:
+    noise = {"load_noise": 1.0} if direction == "inverse" else {"reading_noise": 1.0}
+    long = press(offset=4.0, start_s=5.0, **noise)
+    require_same([long.between(8.0, 9.0), long], direction=direction)
+
+
+@pytest.mark.parametrize("direction", ["inverse", "forward"])
 def test_what_is_fixed_stays_fixed(direction: str) -> None:
     noise = {"load_noise": 1.0} if direction == "inverse" else {"reading_noise": 1.0}
     require_same([press(offset=4.0, **noise)], direction=direction, offset=4.0, initial_state="steady")
