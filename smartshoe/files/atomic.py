@@ -68,7 +68,7 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
         raise _unwritable(path, error) from error
     finally:
         with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            temporary.unlink()  # it is not there where it has taken its place
 
 
 def _unwritable(path: Path | str, error: Exception) -> UsageError:

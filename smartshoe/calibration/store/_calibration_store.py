@@ -122,7 +122,6 @@ class CalibrationStore:
         return self._happened("retired", serial_number, date, "", note)
 
     def _happened(self, kind: EventKind, serial_number: str, at: When, position: str, note: str) -> HistoryEvent:
-        files.folder_name(serial_number)
         before = [event for event in self.events(serial_number) if event.kind == kind]
         event = HistoryEvent(kind, serial_number, moment(at), position.strip(), note)
         for other in before:
@@ -142,20 +141,15 @@ class CalibrationStore:
         entries: list[Entry] = []
         events: list[HistoryEvent] = []
         for relative, state in now.items():
-            cached = known.get(relative)
-            fresh = isinstance(cached, dict) and cached.get("state") == list(state)
             try:
-                item = cached["item"] if fresh and cached is not None else files.read_item(self.folder, relative)
-                if relative.startswith(f"{files.EVENTS}/"):
-                    events.append(files.event_of(item))
-                else:
-                    entries.append(files.entry_of(self.folder, relative, item))
+                item, made = files.made_of(self.folder, relative, state, known.get(relative))
             except InputError as error:
                 faults.append(str(error))
                 continue
-            except (KeyError, TypeError, ValueError) as error:
-                faults.append(f"{self.folder / relative} is no file of a store ({error!r}): take it out of the folder")
-                continue
+            if isinstance(made, Entry):
+                entries.append(made)
+            else:
+                events.append(made)
             items[relative] = {"state": list(state), "item": item}
         if items != known and now:
             faults += filter(None, [files.write_index(self.folder, items)])

@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -111,18 +112,42 @@ def read_item(root: Path, relative: str) -> dict[str, Any]:
         raise InputError(f"{path} is no file of a store ({error!r}): take it out of the folder") from error
 
 
+def made_of(
+    root: Path, relative: str, state: tuple[int, int], cached: object
+) -> tuple[dict[str, Any], Entry | HistoryEvent]:
+    """A file's item and what it is: by the index where what is ``cached`` there is of this very ``state``.
+
+    An index that is damaged costs time and no calibration: the file itself is read. Raises `InputError` where that is
+    no file of a store.
+    """
+    if isinstance(cached, dict) and cached.get("state") == list(state):
+        with suppress(InputError, KeyError):
+            return cached["item"], _made(root, relative, cached["item"])
+    item = read_item(root, relative)
+    return item, _made(root, relative, item)
+
+
+def _made(root: Path, relative: str, item: Mapping[str, Any]) -> Entry | HistoryEvent:
+    try:
+        return event_of(item) if relative.startswith(f"{EVENTS}/") else entry_of(root, relative, item)
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{root / relative} is no file of a store ({error!r}): take it out of the folder") from error
+
+
 def entry_of(root: Path, relative: str, item: Mapping[str, Any]) -> Entry:
     """The calibration that the index's ``item`` describes."""
     path = root / relative
     return Entry(
         path.stem,
-        item["serial_number"],
-        moment(item["date"]),
-        item["position"],
-        item["valid_for_days"],
-        item["note"],
+        _text(item, "serial_number"),
+        moment(_text(item, "date")),
+        _text(item, "position"),
+        None if item["valid_for_days"] is None else float(item["valid_for_days"]),
+        _text(item, "note"),
         int(item["order"]),
-        item["fingerprint"],
+        _text(item, "fingerprint"),
         path,
     )
 
@@ -133,12 +158,19 @@ def event_of(item: Mapping[str, Any]) -> HistoryEvent:
         raise InputError(f"event {item['kind']!r} is not known: use a newer smartshoe")
     return HistoryEvent(
         item["kind"],
-        item["serial_number"],
-        moment(item["date"]),
-        item["position"],
-        item["note"],
+        _text(item, "serial_number"),
+        moment(_text(item, "date")),
+        _text(item, "position"),
+        _text(item, "note"),
         int(item["order"]),
     )
+
+
+def _text(item: Mapping[str, Any], key: str) -> str:
+    found = item[key]
+    if not isinstance(found, str):
+        raise TypeError(f"{key} is {found!r}, no text")
+    return found
 
 
 def read_index(root: Path) -> dict[str, Any]:

@@ -84,7 +84,7 @@ class Ordering:
     def _steps(self, before: _Frame, frame: _Frame) -> int | None:
         """Samples from ``before`` to ``frame`` where clock and count agree on them, whatever was lost; else None."""
         ahead, later = (frame[0] - before[0]) & COUNT, (frame[1] - before[1]) & CLOCK
-        if self._period_us is None or later == 0 or later >= LONGEST_GAP_US:
+        if self._period_us is None or later >= LONGEST_GAP_US:
             return None
         turns = max(round((later / self._period_us - ahead) / (COUNT + 1)), 0)
         steps = ahead + turns * (COUNT + 1)

@@ -150,5 +150,5 @@ def _tables(shape: Array, edges: Array, smoothing: float, middle: float, spread:
     shares = np.convolve(np.diff(cumulative), kernel / kernel.sum(), "valid")
     strays = STRAY / shares.size
     shares = (1.0 - STRAY) * shares + strays
-    below = np.cumsum(shares) - shares / 2.0 + (1.0 - STRAY) * float(cumulative[0])
+    below = np.cumsum(shares) - shares / 2.0 + (1.0 - STRAY) * float(cumulative[reach])
     return np.log(np.maximum(shares, LEAST_PROBABILITY)) - math.log(width), np.log(np.maximum(below, LEAST_PROBABILITY))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -192,7 +193,7 @@ def _experiment(
     """Press until it is good, at most ``largest_repeats`` times more."""
     plan = folder.plan
     before = sum(attempt.experiment == protocol.name for attempt in folder.attempts())
-    for again in range(plan.largest_repeats + 1):
+    for again in count():
         operator.confirm(
             f"{protocol.name}: put {plan.unit} under the anvil, unloaded; nothing else may touch the shoe"
             if again == 0
@@ -234,14 +235,14 @@ def _press(
         machine.fresh_only = stream.is_live
         operator.tell(f"start the test {protocol.name} on the machine now, then export its log to {machine}")
     machine.start(protocol)
-    pressing = _Pressing(folder, protocol, machine, stream, operator)
-    while not pressing.is_over(number):
+    pressing = _Pressing(folder, protocol, number, machine, stream, operator)
+    while not pressing.is_over():
         fault = pressing.look()
         if fault is not None:
             operator.tell(fault.says)
             operator.tell("stop the test on the machine")
             return fault
-    evidence = _evidence(folder, protocol, stream.blocks, folder.attempts()[-1].load())
+    evidence = _evidence(folder, protocol, number, stream.blocks, folder.attempts()[-1].load())
     return first_fault(AT_THE_END, evidence)
 
 
@@ -249,19 +250,26 @@ class _Pressing:
     """The loop's state between a test's start and its end: stream on, log awaited, silence and waiting bounded."""
 
     def __init__(
-        self, folder: SessionFolder, protocol: Protocol, machine: MachineSide, stream: _Stream, operator: Operator
+        self,
+        folder: SessionFolder,
+        protocol: Protocol,
+        number: int,
+        machine: MachineSide,
+        stream: _Stream,
+        operator: Operator,
     ) -> None:
         self._folder, self._protocol, self._machine, self._stream = folder, protocol, machine, stream
+        self._number = number
         self._start_s = self._looked_s = stream.last_s
         self._operator = operator
         self._done_s: float | None = None
         self._began = self._heard = self._reported = time.monotonic()
 
-    def is_over(self, number: int) -> bool:
+    def is_over(self) -> bool:
         """Record the next block; True once the log is there and the stream covers the test."""
         plan, stream = self._folder.plan, self._stream
         if self._done_s is None:
-            self._await_log(number)
+            self._await_log()
         if self._done_s is not None:
             # A log that came by hand came long after the test; a machine that ran is followed a little longer.
             tail_s = 0.0 if self._machine.by_hand else plan.tail_s
@@ -279,10 +287,10 @@ class _Pressing:
             )
         return False
 
-    def _await_log(self, number: int) -> None:
+    def _await_log(self) -> None:
         log = self._machine.log()
         if log is not None:
-            self._folder.keep_log(log, f"{self._protocol.name}_{number}", self._machine.columns)
+            self._folder.keep_log(log, f"{self._protocol.name}_{self._number}", self._machine.columns)
             self._done_s = self._stream.last_s
             return
         waited_s = time.monotonic() - self._began
@@ -301,11 +309,11 @@ class _Pressing:
         if not (self._machine.by_hand and stream.is_live) or stream.last_s - self._looked_s < LOOK_AT_EVERY_S:
             return None
         self._looked_s = stream.last_s
-        return first_fault(AS_IT_GOES, _evidence(self._folder, self._protocol, stream.blocks))
+        return first_fault(AS_IT_GOES, _evidence(self._folder, self._protocol, self._number, stream.blocks))
 
 
 def _evidence(
-    folder: SessionFolder, protocol: Protocol, blocks: list[Block], load: Recording | None = None
+    folder: SessionFolder, protocol: Protocol, number: int, blocks: list[Block], load: Recording | None = None
 ) -> Pressing:
-    so_far = Attempt(protocol.name, 0, folder.channels, blocks)
+    so_far = Attempt(protocol.name, number, folder.channels, blocks)
     return Pressing(folder.plan.unit, protocol, so_far.stream(), load)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import multiprocessing
 from dataclasses import replace
@@ -18,6 +19,7 @@ from smartshoe.calibration.store import CalibrationStore, HistoryEvent, default_
 from smartshoe.calibration.store._calibration_store import segment
 from smartshoe.calibration.store.dates import iso, moment
 from smartshoe.errors import InputError, RefusedError, UsageError
+from smartshoe.files.atomic import json_text
 
 
 @pytest.fixture
@@ -56,6 +58,7 @@ def test_serial_number_and_date_may_be_given_beside_the_file(store: CalibrationS
     ("changes", "more", "says"),
     [
         ({"serial_number": ""}, {}, "serial number"),
+        ({"serial_number": "", "created": ""}, {}, "serial number"),
         ({"created": ""}, {}, "--date"),
         ({}, {"serial_number": "S2"}, "S2"),
         ({}, {"valid_for_days": 0.0}, "above 0"),
@@ -125,9 +128,14 @@ def test_the_index_is_rebuilt_from_the_files(store: CalibrationStore) -> None:
         b"{",
         b"[]",
         b'{"schema": "smartshoe.store.index/1", "files": {"units/x.json": 3}}',
+        # The files are as the index has them, and what it says of them is nothing that was ever added.
+        *(index.read_bytes().replace(*change) for change in ((b'"order"', b'"ordre"'), (b'"left_toe"', b"12"))),
+        index.read_bytes().replace(b'"item": {', b'"item": 0, "was": {'),
+        index.read_bytes().replace(b'"item"', b'"was"'),
     ):
         index.write_bytes(damage)
         assert (store.entries(), store.events()) == (entries, events)
+        assert store.faults == ()
     index.unlink()
     assert (store.entries(), store.events()) == (entries, events)
     assert len(json.loads(index.read_text())["files"]) == 3
@@ -143,6 +151,21 @@ def test_a_file_put_there_or_taken_away_by_hand_is_noticed(store: CalibrationSto
     assert store.serial_numbers == ("S1", "S9")
     target.unlink()
     assert store.serial_numbers == ("S1",)
+
+
+@pytest.mark.parametrize("change", [{"order": None}, {"serial_number": 7}, {"date": "in spring"}, {"date": None}])
+def test_a_file_that_says_what_no_calibration_does_is_left_out_and_told(
+    store: CalibrationStore, change: dict[str, object]
+) -> None:
+    good, bad = put(store, 0), put(store, 30)
+    content = json.loads(bad.path.read_text())
+    text = json_text({**content, "store": {**content["store"], **change}})
+    bad.path.unlink()
+    named = f"2025-02-05_{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"  # whole by its name
+    (bad.path.parent / named).write_text(text)
+    assert store.history("S1") == (good,)
+    (fault,) = store.faults
+    assert f"{named} is no file of a store" in fault
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "foreign"])
@@ -235,6 +258,22 @@ def test_units_that_swap_are_found_by_place_and_date(store: CalibrationStore) ->
     store.place("B", "right_toe", day(200))
     with pytest.raises(RefusedError, match="left left_toe for right_toe"):
         find(store, "left_toe", day(201))
+
+
+def test_of_two_events_of_one_moment_the_one_entered_last_counts(store: CalibrationStore) -> None:
+    for serial in ("A", "B", "C"):
+        store.place(serial, "left_toe", day(10))
+    assert [event.serial_number for event in store.events()] == ["A", "B", "C"]
+    assert [event.order for event in store.events()] == [1, 2, 3]
+    assert store.unit_at("left_toe", day(10)) == "C"
+    assert store.position_of("A", day(10)) == store.position_of("B", day(10)) == ""
+
+
+def test_an_event_of_no_unit_is_refused(store: CalibrationStore) -> None:
+    with pytest.raises(UsageError, match="serial number"):
+        store.repair(" ", day(10))
+    assert store.events() == ()
+    assert not store.folder.exists()
 
 
 def test_two_units_that_claim_one_place_are_not_guessed_between(store: CalibrationStore) -> None:

@@ -159,6 +159,9 @@ def test_a_slope_and_its_error_are_those_of_linear_regression(tmp_path: Path, co
     line = linregress(trend.days, trend.values)
     assert trend.jumps == ()
     assert trend.per_year is not None
+    later = trend.days + 10.0
+    expected = line.intercept + line.slope * later
+    assert trend.fitted(later, 0) == pytest.approx(expected, rel=1e-4 if has_errors else 1e-12)
     # Errors that go with the values weight them a little differently.
     assert trend.per_year.value == pytest.approx(365.25 * line.slope, rel=0.02 if has_errors else 1e-9)
     assert trend.per_year.sd == pytest.approx(365.25 * line.stderr, rel=0.02 if has_errors else 1e-9)
@@ -190,6 +193,18 @@ def test_a_life_without_files_is_what_drift_follows(tmp_path: Path) -> None:
     of_files = drift(life(tmp_path, np.random.default_rng(6), placed=0.002), "S1").trends["static_gain"]
     bare = gain_of_a_life(np.random.default_rng(6), 10, 0.002)
     assert bare.to_dict() == of_files.to_dict()
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_what_scatters_less_than_its_errors_has_the_slope_error_of_those(tmp_path: Path, count: int) -> None:
+    store = CalibrationStore(tmp_path)
+    for k in range(count):  # three have one degree of freedom left
+        store.add(calibration(created=day(30.0 * k)))
+    trend = drift(store, "S1").trends["static_gain"]
+    assert trend.per_year is not None
+    lever = np.linalg.norm(trend.days - trend.days.mean())
+    assert trend.per_year.sd == pytest.approx(365.25 * quantities(calibration())["static_gain"].sd / lever)
+    assert trend.scatter == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("placed", [0.0, 0.002])
@@ -226,6 +241,14 @@ def test_a_jump_that_no_repair_explains_is_told_with_its_place(tmp_path: Path) -
     assert gain.per_year.value == pytest.approx(-0.02 * LEFT_TOE[2] / LEFT_TOE[0], rel=0.2)
 
 
+def test_no_jump_lies_between_two_calibrations_of_one_moment(tmp_path: Path) -> None:
+    rng, store = np.random.default_rng(13), CalibrationStore(tmp_path)
+    for k, at in enumerate((0, 30, 60, 90, 90, 120, 150, 180)):  # pressed twice on one day, and it jumped there
+        store.add(calibration(aged(0, 0, 1.0 if k < 4 else 1.1), rng=rng, created=day(at)))
+    for trend in drift(store, "S1").trends.values():
+        assert all("between 2025-04-06 and 2025-04-06" not in jump.says for jump in trend.jumps)
+
+
 def test_a_quiet_life_has_no_jumps() -> None:
     rng = np.random.default_rng(9)
     found = [gain_of_a_life(rng, 10, 0.002).jumps for _ in range(60)]
@@ -248,6 +271,15 @@ def test_a_repair_between_two_calibrations_leaves_no_trend(tmp_path: Path) -> No
     found = drift(store, "S1")
     assert found.trends["static_gain"].per_year is None
     assert found.to_dict()["trends"]["static_gain"]["per_year"] is None
+
+
+def test_calibrations_of_one_moment_have_a_level_and_no_trend(tmp_path: Path) -> None:
+    store = CalibrationStore(tmp_path)
+    for factor in (1.0, 1.01, 1.03):
+        store.add(calibration(aged(0, 0, factor), created=day(0), has_errors=False))
+    gain = drift(store, "S1").trends["static_gain"]
+    assert gain.per_year is None
+    assert gain.levels == pytest.approx([np.mean(gain.values)])
 
 
 def test_calibrations_without_errors_are_weighted_alike(tmp_path: Path) -> None:

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.stats import pearson3
 
 from smartshoe.devices.wire.clock import KEPT_BINS, DeviceClock
-from smartshoe.devices.wire.delay_law import DelayLaw
+from smartshoe.devices.wire.delay_law import STRAY, DelayLaw, _tables
 from smartshoe.devices.wire.delay_line import robust_line
 from smartshoe.errors import UsageError
 
@@ -195,6 +196,40 @@ def test_a_law_is_told_from_what_is_only_known_to_be_no_longer() -> None:
             assert found is not None
             slopes[is_said].append(found.slope)
     assert np.square(slopes[True]).mean() < 0.5 * np.square(slopes[False]).mean()
+
+
+@pytest.mark.parametrize("skewness", [0.1, 1.0, 1.9])
+@pytest.mark.parametrize("from_sd", [-0.5, -3.0])
+def test_the_tables_are_density_and_probability_of_pearsons_third_law(skewness: float, from_sd: float) -> None:
+    mean_s, sd_s = 0.03, 0.02
+    edges = mean_s + sd_s * np.linspace(from_sd, 4.0, 601)
+    middles, width = (edges[1:] + edges[:-1]) / 2.0, edges[1] - edges[0]
+    shape = np.array([0.5, np.log(2.0), -np.log(2.0 / skewness - 1.0)])  # of middle and spread
+    log_density, log_probability = _tables(shape, edges, 1.5 * width, mean_s - 0.5 * sd_s / 2.0, sd_s / 2.0)
+    law = pearson3(skewness, loc=mean_s, scale=sd_s)
+    stray = (middles - edges[0]) / (edges[-1] - edges[0])
+    away = (
+        np.abs(middles - (mean_s - 2.0 * sd_s / skewness)) > 8.0 * width
+    )  # from the floor, where a law begins at once
+    density = (1.0 - STRAY) * law.pdf(middles) + STRAY / (edges[-1] - edges[0])
+    assert np.exp(log_density[away]) == pytest.approx(density[away], abs=2e-3 * density.max())
+    probability = (1.0 - STRAY) * law.cdf(middles) + STRAY * stray
+    assert np.exp(log_probability[away]) == pytest.approx(probability[away], abs=1e-4)
+
+
+def test_a_line_and_its_errors_take_no_notice_of_delays_of_seconds() -> None:
+    time_s, in_sd = 0.25 * np.arange(200), []
+    spread_s = np.linalg.norm(time_s - time_s.mean())
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        delay_s = 0.02 + 1e-5 * time_s + rng.normal(0.0, 1e-3, 200)
+        delay_s[rng.permutation(200)[:20]] += rng.uniform(1.0, 3.0, 20)
+        line = robust_line(time_s, delay_s)
+        assert line.offset_sd_s == pytest.approx(1e-3 / np.sqrt(180.0), rel=0.4)
+        assert line.slope_sd == pytest.approx(1e-3 / (spread_s * np.sqrt(0.9)), rel=0.4)
+        in_sd += [(line.slope - 1e-5) / line.slope_sd, (line.delay_s(40.0) - 0.0204) / line.sd_s(40.0)]
+    # The root mean square of sixty is known to a tenth.
+    assert 0.6 < np.sqrt(np.mean(np.square(in_sd))) < 1.3
 
 
 def test_work_that_is_done_apart_is_taken_up_when_it_is_done() -> None:

@@ -226,6 +226,16 @@ def test_a_frame_whose_clock_is_periods_off_is_dropped(periods: float) -> None:
     assert (counters.implausible, counters.lost) == (1, 1)
 
 
+def test_times_that_are_given_out_rise() -> None:
+    sent = _regular(200)
+    sent[100] = (sent[100][0], sent[101][1])  # stamped with the time of the one behind it
+    counters = Counters()
+    given_out = _place(Ordering(counters), sent, [])
+    assert [count for _, count, _ in given_out] == [*range(1000, 1100), *range(1101, 1200)]
+    assert min(np.diff([time for _, _, time in given_out])) > 0
+    assert counters.implausible == 1
+
+
 @pytest.mark.parametrize("periods", [-0.4, 0.4])
 def test_a_frame_whose_clock_is_less_than_half_a_period_off_is_given_out(periods: float) -> None:
     sent = _regular(200)

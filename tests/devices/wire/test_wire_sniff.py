@@ -27,6 +27,8 @@ LINES = encode_lines(np.arange(60) * 5, READINGS)
         (FRAMES[7:], "frames", "frames, 59 whole and 1 damaged"),
         (LINES[3:], "lines", "text lines of 5 numbers"),
         (encode_lines(np.arange(60) * 5, READINGS[:, :3]), "lines", "text lines of 4 numbers, not 5"),
+        (encode_lines(np.arange(60) * 5, READINGS[:, :1]), "lines", "text lines of 2 numbers, not 5"),
+        (b"".join(b"%d\n" % k for k in range(60)), None, "text lines of 1 number, not 5"),
         (encode_samples(np.arange(9), np.arange(9), READINGS[:9, :2]), "frames", "frames of 2 readings, not 4"),
         (framed(b"\x55hello, it is me") * 5, "frames", "type 0x55"),
         (b"rst:0x1 (POWERON_RESET),boot:0x13\r\nets Jun  8 2016\r\nload\r\n", None, "without numbers"),

@@ -193,6 +193,12 @@ def test_records_are_of_the_longest_length_and_kind_and_none_beyond(
     assert read_journal(tmp_path / "journal").notes == ()
 
 
+def test_a_record_holds_256_mebibytes_and_no_byte_more(tmp_path: Path) -> None:
+    with Journal(tmp_path / "journal") as journal, pytest.raises(UsageError, match="268435457 bytes cannot be written"):
+        journal.append(1, bytes(256 * 2**20 + 1))
+    assert _content(tmp_path / "journal") == []
+
+
 def test_a_journal_that_cannot_be_read_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         read_journal(tmp_path / "none")

@@ -19,6 +19,7 @@ from smartshoe.files.journal import Journal, read_journal
 from smartshoe.protocol import static_protocol
 from smartshoe.runs.session import SessionFolder, SessionPlan, Unattended, analyse, conduct, protocols_named
 from smartshoe.runs.session._folder import SAMPLES
+from smartshoe.runs.session._publish import _write
 from smartshoe.units import MILLIBAR
 
 BENCH = ["--shoe", "sim:stand?seed=5", "--machine", "sim:instron?seed=6", "--unit", "left_toe", "--no-diagnose"]
@@ -52,7 +53,9 @@ def test_a_session_by_the_command_line_is_stored_and_replays_bit_for_bit(tmp_pat
     assert (out / "left_toe.json").read_bytes() == (again / "left_toe.json").read_bytes()
     assert {path.name for path in out.iterdir()} >= {"report.html", "raw", "recordings", "journal.smj", "session.json"}
     entry = CalibrationStore(store).latest("T7")
-    card = (out / "report.html").read_text(encoding="utf-8").split('id="session"')[1].split("</section>")[0]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "not given" not in page
+    card = page.split('id="session"')[1].split("</section>")[0]
     assert "serial number T7" in card
     assert "no fault found" in card
     assert str(entry.path) in card
@@ -71,6 +74,10 @@ class _Interrupting(Unattended):
 
     def __init__(self, after: int) -> None:
         self.shown, self._after = 0, after
+        self.told: list[str] = []
+
+    def tell(self, sentence: str) -> None:
+        self.told.append(sentence)
 
     def show(self, block: Block, experiment: str, elapsed_s: float) -> None:
         self.shown += len(block)
@@ -88,6 +95,8 @@ def test_an_interrupted_session_keeps_what_was_shown_and_goes_on(tmp_path: Path)
     kept = sum(len(r.payload) > 0 for r in read_journal(tmp_path / "journal.smj").records if r.kind == SAMPLES)
     assert kept * 20 >= operator.shown
     assert [(a.experiment, a.state) for a in first] == [("short", "accepted"), ("static", "open")]
+    # What the unit remembers of a pressing is in no model: the next one waits for it.
+    assert [text.split(":")[0] for text in operator.told if "come to rest" in text] == ["static"]
     with pytest.raises(InputError, match="static is not recorded yet"):
         analyse(SessionFolder.open(tmp_path))
     with SessionFolder.resume(tmp_path) as folder:
@@ -101,6 +110,11 @@ def test_an_interrupted_session_keeps_what_was_shown_and_goes_on(tmp_path: Path)
     ]
     assert attempts[1].samples > 0
     assert list(result.recordings) == ["short", "static"]
+    # What looks wrong may be looked into: the recordings lie where the page says.
+    unit, _ = _write(result, tmp_path / "out")
+    program, verb, *files = unit.diagnose.split()
+    assert (program, verb) == ("smartshoe", "diagnose")
+    assert [(tmp_path / "out" / file).is_file() for file in files] == [True, True]
 
 
 def test_a_damaged_journal_says_so_also_where_it_is_only_read(tmp_path: Path) -> None:
@@ -226,6 +240,10 @@ def test_a_command_that_recorded_nothing_can_be_given_again(tmp_path: Path, shor
     words = ["calibrate", *BENCH, "--protocol", str(short_file), "--out", str(tmp_path / "session")]
     assert run_command([*words, "--unit", "nose"]) == 2
     assert run_command(words) == 0
+    page = (tmp_path / "session" / "report.html").read_text(encoding="utf-8")
+    # What was left out is said, and how it is done.
+    assert "serial number not given" in page
+    assert "only in this folder: with --serial-number it goes into the store" in page
     assert run_command(words) == 2
 
 
@@ -243,9 +261,12 @@ def test_a_second_session_in_the_same_folder_is_refused_and_loses_the_first_one_
 def test_samples_without_a_plan_are_not_thrown_away(tmp_path: Path) -> None:
     with Journal(tmp_path / "journal.smj") as journal:
         journal.append(SAMPLES, b"anything")
-    with pytest.raises(UsageError, match="holds a session already"):
+    with pytest.raises(UsageError, match="holds a session already") as refused:
         SessionFolder.begin(tmp_path, bench_plan())
-    assert len(read_journal(tmp_path / "journal.smj").records) == 1
+    # Who was refused lets go of the journal, though the refusal is still being told.
+    with Journal(tmp_path / "journal.smj") as journal:
+        assert len(journal.recovered.records) == 1
+    assert refused.type is UsageError
 
 
 def test_a_session_in_which_nothing_was_recorded_is_begun_anew(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, conduct
 from smartshoe.runs.session import _machine_run as machine_run
 from smartshoe.runs.session._checks import AT_THE_END, Pressing, contact, first_fault, other_test
+from smartshoe.runs.session._procedure import _Stream
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,17 @@ def test_a_zero_that_moves_is_told_and_may_be_accepted(pressed: Pressing) -> Non
     found = first_fault(AT_THE_END, _changed(pressed, lambda c: c.values + np.linspace(0.0, 5.0, c.values.size)))
     assert found is not None
     assert (found.kind, found.grave) == ("zero_drift", False)
+
+
+def test_a_streams_time_is_that_of_its_last_sample(tmp_path: Path) -> None:
+    with SessionFolder.begin(tmp_path, bench_plan()) as folder, open_shoe("sim:stand?seed=5") as shoe:
+        folder.note_stream(shoe)
+        stream = _Stream(shoe, folder, Unattended())
+        assert stream.last_s == 0.0
+        for _ in range(3):
+            block = stream.next("", 0.0)
+            assert block is not None
+            assert stream.last_s == block.time_s[-1]
 
 
 class _Counting(Unattended):
