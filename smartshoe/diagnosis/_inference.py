@@ -55,14 +55,12 @@ class Member:
     """An effect that was found.
 
     ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
-    ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
     ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
     place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
     """
 
     effect: Effect
     size: float
-    departed: float
     alternatives: tuple[Alternative, ...]
     without: Fit
     laws: tuple[Alternative, ...]
@@ -111,7 +109,20 @@ def infer(
         again = _settled(_with_an_arm_that_creeps(state, sessions, thresholds), sessions, thresholds, progress)
         state = again if _is_simpler(again.fit, state, sessions) else state
     state = _with_laws(state, sessions, thresholds, progress)
+    progress("weighing alternatives")
+    found = _judged(state, plain, sessions, screening)
+    while (law := _likelier_law(found, state.banned)) is not None:
+        state = _with_law(state, *law, sessions)
+        found = _judged(state, plain, sessions, screening)
+    return found
+
+
+def _judged(
+    state: _State, plain: Fit, sessions: Sequence[Session], screening: tuple[tuple[str, float], ...]
+) -> Inference:
+    """What of a state's effects predicts what is left out, fitted at last, each weighed against its alternatives."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
+    thresholds = given.thresholds
     refused: list[str] = []
     while (worst := _worse(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
@@ -122,11 +133,35 @@ def infer(
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
-    if not extended.model.parts or _error(sessions, extended.model) >= _error(sessions, plain.model):
-        extended, best = plain, evidence.posterior(())  # a fit that went astray extends nothing
-    progress("weighing alternatives")
+    went_astray = _error(sessions, extended.model) >= _error(sessions, plain.model)
+    if not extended.model.parts or went_astray or _foreseen(evidence, best) < thresholds.foreseen:
+        extended, best = plain, evidence.posterior(())
     members = _members(evidence, best, refused, likelihood, extended)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused))
+
+
+def _likelier_law(found: Inference, banned: Sequence[str]) -> tuple[str, str] | None:
+    """A member, and the law of its family that follows better in its place, if one does: fits of the whole model tell.
+
+    The linearised search prefers what comes nearest to all equations of the family.
+    """
+    for member in found.members:
+        nearest = next(iter(member.laws), None)
+        if nearest is None or nearest.margin >= 0.0 or nearest.effect in banned or member.effect.is_flexible:
+            continue
+        return member.name, str(nearest.effect)
+    return None
+
+
+def _with_law(state: _State, name: str, law: str, sessions: Sequence[Session]) -> _State:
+    """``state`` with ``law`` in the place of its member ``name``, and not the other way round again."""
+    thresholds = state.given.thresholds
+    effect = catalogue()[law]
+    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    bare = state.fit.model.without(name)
+    starts = [bare.with_part(effect, effect.begun(shape)) for shape in effect.shapes]
+    found = fit(likelihood, min(starts, key=likelihood.cost))
+    return _state_at(found, sessions, thresholds, (*state.banned, name))
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
@@ -424,6 +459,12 @@ def _worse(evidence: Evidence, best: Posterior) -> int | None:
     return worst if worst is not None and gains[worst] < evidence.thresholds.validated else None
 
 
+def _foreseen(evidence: Evidence, best: Posterior) -> float:
+    """The share of the baseline's squared error over what is left out in turn that the set does away with."""
+    nothing = float(evidence.left_out_errors(()).sum())
+    return 1.0 - float(evidence.left_out_errors(best.members).sum()) / nothing if nothing > 0.0 else 0.0
+
+
 def _extrapolates(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
     """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide."""
     whole = [model.simulate(one.conditions) for one in sessions]
@@ -457,13 +498,13 @@ def _members(
     evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
 ) -> tuple[Member, ...]:
     made = []
-    for member, departed in zip(best.members, best.departed, strict=True):
+    for member in best.members:
         one = evidence.given.candidates[member]
         less = fit(likelihood, extended.model.without(one.name), FEW_STEPS)
         size = apart(likelihood.sessions, less.model, extended.model)
         others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
         near = alternatives(evidence, best, member, refused)
-        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
+        made.append(Member(one.effect, size, near, less, others, less.cost - extended.cost))
     return tuple(sorted(made, key=lambda one: -one.size))
 
 

@@ -24,6 +24,12 @@ class Thresholds:
         "standard deviation by which a real law departs from an equation of its kind",
         "second laboratory and own truths: 0.05 to 0.4",
     )
+    least_departure: float = threshold(
+        0.075, "share of an effect's size", "by which real laws depart in most ways", "trials on both worlds"
+    )
+    departure_tails: float = threshold(
+        1.0, "degrees of freedom", "of Student's t by which they depart in some ways much more", "Cauchy's law"
+    )
     strength_sd: float = threshold(
         0.03, "share of full scale", "prior standard deviation of an effect that is there", "effects.md: 0.1 to 10 %"
     )
@@ -62,6 +68,12 @@ class Thresholds:
     validated: float = threshold(
         0.8, "standard errors", "by which an effect must better what is left out", "four to one, one-sided"
     )
+    foreseen: float = threshold(
+        0.25,
+        "share of squared error",
+        "of the baseline's, where recordings are left out in turn, that an extension must do away with",
+        "a law of the usual departure",
+    )
     alike: float = threshold(
         3.0, "times material", "two models whose readings differ by less are one, and the simpler is taken", "judgement"
     )
@@ -72,16 +84,16 @@ class Thresholds:
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (1.92, -1.04, -0.9),
+        (1.31, -0.91),
         "log odds",
-        "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure",
-        "logistic regression on 306 cases of two worlds",
+        "of a kind: intercept; per log of what is left over its size",
+        "logistic regression on 260 cases of two worlds",
     )
     least_confidence: float = threshold(
-        0.667,
+        0.75,
         "probability",
         "of the kind; below it no cause is named; of a zero that is never seen",
-        "two to one for being right",
+        "three to one for being right",
     )
     seen_confidence: float = threshold(0.97, "probability", "of a zero or tare seen at rest", "bank")
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")

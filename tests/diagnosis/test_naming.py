@@ -36,11 +36,10 @@ def member(
     of: str | Effect = "linear_leak",
     size: float = 0.01,
     fall: float = 1000.0,
-    departed: float = 0.1,
     laws: tuple[tuple[str, float], ...] = (),
 ) -> Member:
     one = effect(of) if isinstance(of, str) else of
-    return Member(one, size, departed, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
+    return Member(one, size, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
 
 
 def only(names: tuple[Name, ...]) -> Name:
@@ -89,21 +88,16 @@ def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
 
 
 # -- which kind -----------------------------------------------------------------------------------------------
-@given(st.floats(3e-4, 0.1), st.floats(1.0, 30.0), st.floats(0.0, 0.01), st.floats(0.0, 3.0))
-def test_confidence_in_a_kind_grows_with_its_size_over_what_is_left(
-    size: float, times: float, left: float, departed: float
-) -> None:
-    small, large = member(size=size, departed=departed), member(size=size * times, departed=departed)
+@given(st.floats(3e-4, 0.1), st.floats(1.0, 30.0), st.floats(0.0, 0.01))
+def test_confidence_in_a_kind_grows_with_its_size_over_what_is_left(size: float, times: float, left: float) -> None:
+    small, large = member(size=size), member(size=size * times)
     assert probability_of_kind(small, left, STANDARD) <= probability_of_kind(large, left, STANDARD)
 
 
-@given(st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 3.0), st.floats(0.0, 3.0))
-def test_confidence_falls_with_what_is_left_and_with_departure(
-    left: float, more: float, departed: float, further: float
-) -> None:
-    sure = probability_of_kind(member(departed=departed), left, STANDARD)
-    assert probability_of_kind(member(departed=departed), left + more, STANDARD) <= sure
-    assert probability_of_kind(member(departed=departed + further), left, STANDARD) <= sure
+@given(st.floats(0.0, 0.05), st.floats(0.0, 0.05))
+def test_confidence_falls_with_what_is_left(left: float, more: float) -> None:
+    sure = probability_of_kind(member(), left, STANDARD)
+    assert probability_of_kind(member(), left + more, STANDARD) <= sure
 
 
 def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it() -> None:
@@ -133,7 +127,7 @@ def test_least_confidence_is_of_the_kind_below_which_nothing_is_named() -> None:
 
 def test_kind_odds_are_the_logistics_coefficients() -> None:
     for intercept in (-2.0, 0.0, 3.0):
-        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0))
+        plain = replace(STANDARD, kind_odds=(intercept, 0.0))
         assert probability_of_kind(member(), 0.002, plain) == pytest.approx(1 / (1 + math.exp(-intercept)))
 
 

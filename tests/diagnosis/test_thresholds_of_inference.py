@@ -73,6 +73,38 @@ def test_validated_is_how_sure_a_gain_over_what_is_left_out_must_be(curved: Line
     assert decides("validated", 0.8, 1e6, refused) == (False, True)
 
 
+def test_departure_tails_are_how_much_further_than_others_one_departure_may_go(curved: Linearised) -> None:
+    asked = np.array([10.0, 0.0, 0.0])  # standard deviations of the prior
+
+    def departed(thresholds: Thresholds) -> float:
+        found, _, _ = Evidence(replace(curved, thresholds=thresholds), 0.002)._departed(np.eye(3), asked)
+        return float(found[0])
+
+    heavy, normal = decides("departure_tails", 1.0, 1e6, departed)
+    assert normal == pytest.approx(5.0, rel=1e-3)  # halfway: the data knows as much as the prior
+    assert heavy > 8.0
+
+
+def test_least_departure_is_how_exact_an_equation_is_taken_to_be(curved: Linearised) -> None:
+    def cost(thresholds: Thresholds) -> float:
+        evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
+        return evidence.posterior((_curve(curved),)).score - evidence.exact((_curve(curved),)).score
+
+    exact, loose = decides("least_departure", 1e-6, 0.2, cost)
+    assert abs(exact) < 1.0  # of a law that is exact indeed
+    assert loose > exact + 2.0  # room that nothing asks for is paid for
+
+
+def test_foreseen_is_how_much_of_what_is_left_out_an_extension_must_do_away_with() -> None:
+    curved = MODEL.with_part(effect("gas_compression"), np.array([0.3]))
+    runs = [_recording(curved, seed) for seed in range(3)]
+
+    def extended(thresholds: Thresholds) -> bool:
+        return bool(diagnose(runs[:2], hold_out=runs[2], thresholds=thresholds).causes)
+
+    assert decides("foreseen", 0.25, 1.0, extended) == (True, False)
+
+
 def test_unknown_past_is_what_an_arm_may_remember_of_before(curved: Linearised) -> None:
     session = curved.sessions[0]
     little, much = decides("unknown_past", 0.01, 0.1, lambda t: nuisance_precision(session, MODEL, t)[1, 1])

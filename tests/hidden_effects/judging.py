@@ -13,7 +13,8 @@
   hidden family is a *companion*, counted apart.
 - *confidence*: right is a cause that is neither false nor a companion. That of the *law*, of the causes that are right:
   it is the very effect that is there, hidden or not.
-- *explained*: of the held-out variance that could be explained, 1 - (extended^2 - noise^2)/(baseline^2 - noise^2).
+- *explained*: of the held-out variance that could be explained, 1 - (extended^2 - noise^2)/(baseline^2 - noise^2). A
+  fault of the data or noise that is hidden alone is nothing that a model could explain.
 """
 
 from __future__ import annotations
@@ -161,8 +162,9 @@ def _held_out(out: Judgement, row: Found) -> None:
     if before is None or after is None:
         return
     out.worse = after > before * (1.0 + 1e-6)
-    noise = row.get("noise_rmse")
-    if noise is None or before <= EXPLAINABLE * noise:
+    noise, effects = row.get("noise_rmse"), row["truth"]["effects"]
+    only_faults = bool(effects) and all(effect["family"] in SOFT for effect in effects)
+    if noise is None or only_faults or before <= EXPLAINABLE * noise:
         return
     out.explained = 1.0 - max(after**2 - noise**2, 0.0) / (before**2 - noise**2)
 
