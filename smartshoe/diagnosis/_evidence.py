@@ -46,13 +46,15 @@ REWEIGHTED = 12
 class Posterior:
     """``score`` is -2 log of the evidence times the prior odds of the set; ``strengths`` a member's (k,) each.
 
-    ``sizes``: rms by which each member moves the reading beyond what the baseline absorbs; ``together``: all of them.
+    ``sizes``: rms by which each member moves the reading beyond what the baseline absorbs; ``departed``: rms of its
+    fitted departure, in usual ones. ``together``: rms by which all members move the reading.
     """
 
     members: Members
     score: float
     strengths: tuple[Array, ...]
     sizes: tuple[float, ...]
+    departed: tuple[float, ...]
     together: float = 0.0
 
 
@@ -169,9 +171,14 @@ class Evidence:
             self._freedom[members] = grown
         strengths = tuple(mean[[c - 1 for c in given.candidates[m].columns]] for m in members)
         sizes = tuple(self.visible_rms(given.candidates[m].columns, s) for m, s in zip(members, strengths, strict=True))
+        usual = self.thresholds.departure / self.thresholds.least_departure
+        departed = [0.0] * len(members)
+        if departing:
+            scales = (mean / sds)[self._last - 1 :].reshape(len(members), MODULATORS) / usual
+            departed = [float(np.sqrt(np.mean(one**2))) for one in scales]
         columns = [c for m in members for c in given.candidates[m].columns]
         together = self.visible_rms(columns, np.concatenate(strengths)) if members else 0.0
-        return Posterior(members, cost + self.odds_of(members), strengths, sizes, together)
+        return Posterior(members, cost + self.odds_of(members), strengths, sizes, tuple(departed), together)
 
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
         """For each candidate the score of ``members`` with it, its equation taken for exact, and its strengths (k,).
@@ -186,7 +193,7 @@ class Evidence:
         a = self.gram[np.ix_(index, index)] * np.outer(sds, sds) + np.eye(index.size)
         factor = _factor(a)
         covariance = cho_solve(factor, np.eye(index.size), check_finite=False) * np.outer(sds, sds)
-        mean = covariance @ self.gram[index, 0]
+        mean = sds * cho_solve(factor, self.gram[index, 0] * sds, check_finite=False)
         wide = self.thresholds.strength_sd**2
         found = []
         for numbers, columns in self._alike:

@@ -55,12 +55,14 @@ class Member:
     """An effect that was found.
 
     ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
+    ``departed``: how far the data asks its equation to depart, in usual departures.
     ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
     place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
     """
 
     effect: Effect
     size: float
+    departed: float
     alternatives: tuple[Alternative, ...]
     without: Fit
     laws: tuple[Alternative, ...]
@@ -498,13 +500,13 @@ def _members(
     evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
 ) -> tuple[Member, ...]:
     made = []
-    for member in best.members:
+    for member, departed in zip(best.members, best.departed, strict=True):
         one = evidence.given.candidates[member]
         less = fit(likelihood, extended.model.without(one.name), FEW_STEPS)
         size = apart(likelihood.sessions, less.model, extended.model)
         others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
         near = alternatives(evidence, best, member, refused)
-        made.append(Member(one.effect, size, near, less, others, less.cost - extended.cost))
+        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
     return tuple(sorted(made, key=lambda one: -one.size))
 
 

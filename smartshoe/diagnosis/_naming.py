@@ -49,13 +49,15 @@ def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:
-    """That an effect of this family is there: a logistic of what is left over its size, and the evidence for it.
+    """That an effect of this family is there: a logistic of two ratios, each without a unit, and the evidence for it.
 
-    An effect that leaves as much as it explains is likely another's shadow.
+    What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow), and
+    how far its equation is asked to depart, as a share of that and of a usual departure.
     """
-    intercept, per_left = thresholds.kind_odds
+    intercept, per_left, per_departed = thresholds.kind_odds
     ratio = (left + thresholds.material) / (one.size + thresholds.material)
-    score = intercept + per_left * math.log(ratio)
+    departed = one.departed / (1.0 + one.departed)
+    score = intercept + per_left * math.log(ratio) + per_departed * departed
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 

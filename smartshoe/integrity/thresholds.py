@@ -84,16 +84,16 @@ class Thresholds:
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (1.31, -0.91),
+        (1.96, -1.13, -1.75),
         "log odds",
-        "of a kind: intercept; per log of what is left over its size",
-        "logistic regression on 260 cases of two worlds",
+        "of a kind: intercept; per log of what is left over its size; per share of its departure",
+        "logistic regression on 136 cases of two worlds",
     )
     least_confidence: float = threshold(
-        0.75,
+        0.667,
         "probability",
         "of the kind; below it no cause is named; of a zero that is never seen",
-        "three to one for being right",
+        "two to one for being right",
     )
     seen_confidence: float = threshold(0.97, "probability", "of a zero or tare seen at rest", "bank")
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import EntryPoint
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
-from smartshoe.diagnosis._inference import Alternative, Member
+from smartshoe.diagnosis._inference import Alternative, Member, _likelier_law
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
@@ -36,10 +37,11 @@ def member(
     of: str | Effect = "linear_leak",
     size: float = 0.01,
     fall: float = 1000.0,
+    departed: float = 0.1,
     laws: tuple[tuple[str, float], ...] = (),
 ) -> Member:
     one = effect(of) if isinstance(of, str) else of
-    return Member(one, size, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
+    return Member(one, size, departed, (), NOWHERE, tuple(Alternative(name, by) for name, by in laws), fall)
 
 
 def only(names: tuple[Name, ...]) -> Name:
@@ -87,6 +89,22 @@ def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
     assert probability_of_law(member("rate_gain"), STANDARD) == (1.0, ())
 
 
+def test_a_law_that_follows_better_takes_its_rivals_place_once() -> None:
+    """Two laws that fit in turn better in each other's place change places no second time."""
+
+    def likelier(one: Member, *banned: str) -> tuple[str, str] | None:
+        found: Any = SimpleNamespace(members=(one,))
+        return _likelier_law(found, banned)
+
+    better = member(laws=(("orifice_leak", -3.0),))
+    assert likelier(better) == ("linear_leak", "orifice_leak")
+    assert likelier(better, "orifice_leak") is None
+    assert likelier(member(laws=(("orifice_leak", 3.0),))) is None
+    assert likelier(member("rate_gain")) is None
+    (block, *_) = blocks()["static_curve"]
+    assert likelier(member(block, laws=(("contact_area", -3.0),))) is None  # a curve gives way under conditions
+
+
 # -- which kind -----------------------------------------------------------------------------------------------
 @given(st.floats(3e-4, 0.1), st.floats(1.0, 30.0), st.floats(0.0, 0.01))
 def test_confidence_in_a_kind_grows_with_its_size_over_what_is_left(size: float, times: float, left: float) -> None:
@@ -94,10 +112,13 @@ def test_confidence_in_a_kind_grows_with_its_size_over_what_is_left(size: float,
     assert probability_of_kind(small, left, STANDARD) <= probability_of_kind(large, left, STANDARD)
 
 
-@given(st.floats(0.0, 0.05), st.floats(0.0, 0.05))
-def test_confidence_falls_with_what_is_left(left: float, more: float) -> None:
-    sure = probability_of_kind(member(), left, STANDARD)
-    assert probability_of_kind(member(), left + more, STANDARD) <= sure
+@given(st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 30.0), st.floats(0.0, 30.0))
+def test_confidence_falls_with_what_is_left_and_with_departure(
+    left: float, more: float, departed: float, further: float
+) -> None:
+    sure = probability_of_kind(member(departed=departed), left, STANDARD)
+    assert probability_of_kind(member(departed=departed), left + more, STANDARD) <= sure
+    assert probability_of_kind(member(departed=departed + further), left, STANDARD) <= sure
 
 
 def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it() -> None:
@@ -127,7 +148,7 @@ def test_least_confidence_is_of_the_kind_below_which_nothing_is_named() -> None:
 
 def test_kind_odds_are_the_logistics_coefficients() -> None:
     for intercept in (-2.0, 0.0, 3.0):
-        plain = replace(STANDARD, kind_odds=(intercept, 0.0))
+        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0))
         assert probability_of_kind(member(), 0.002, plain) == pytest.approx(1 / (1 + math.exp(-intercept)))
 
 
