@@ -163,7 +163,7 @@ def test_matlabs_numbers_give_the_filters_forces() -> None:
         load = (p - (read @ state).item()) / direct
         state = transition @ state + drive * load
         forces_n.append(full_scale_n * (load - tare))
-    assert forces_n == pytest.approx(calibration.compensator().apply(readings), rel=1e-10, abs=1e-9)
+    np.testing.assert_allclose(forces_n, calibration.compensator().apply(readings), rtol=1e-10, atol=1e-9)
 
 
 def test_json_holds_the_whole_model() -> None:

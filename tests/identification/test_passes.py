@@ -62,9 +62,9 @@ def test_the_pass_gives_what_the_stored_residual_gives(
         error, slopes = level.error_and_slopes(theta, 1)
         stored_error, stored_slopes = level.model_error_and_slopes(theta, 1)
         size = np.max(np.abs(slopes), axis=1, keepdims=True) + 1e-30
-        assert stored_slopes / size == pytest.approx(slopes / size, abs=1e-9)
-        assert stored_error == pytest.approx(error, abs=1e-9 * np.max(np.abs(error)))
-        assert level.model_error(theta, 1) == pytest.approx(error, abs=1e-9 * np.max(np.abs(error)))
+        np.testing.assert_allclose(stored_slopes / size, slopes / size, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(stored_error, error, rtol=0, atol=1e-9 * np.max(np.abs(error)))
+        np.testing.assert_allclose(level.model_error(theta, 1), error, rtol=0, atol=1e-9 * np.max(np.abs(error)))
 
 
 class _Rosenbrock:

@@ -51,7 +51,7 @@ def test_the_static_line_may_have_an_offset() -> None:
     assert found.static_gain == pytest.approx(2.0)
     assert found.static_offset_n == pytest.approx(-60.0)
     assert found.overall.rmse_static_n == pytest.approx(0.0, abs=1e-9)
-    assert found.traces[0].static_n == pytest.approx(load_n, abs=1e-9)
+    np.testing.assert_allclose(found.traces[0].static_n, load_n, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("height", "counts"), [(0.2, False), (0.4, True), (0.55, True)])

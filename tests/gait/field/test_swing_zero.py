@@ -114,7 +114,7 @@ def test_scale_and_unit_do_not_matter(factor: float) -> None:
     newton = SwingZero(4, sample_rate_hz=RATE_HZ)
     other = SwingZero(4, sample_rate_hz=RATE_HZ, full_scale=FULL_SCALE_N * factor)
     expected = newton.push(forces)
-    assert other.push(forces * factor) / factor == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    np.testing.assert_allclose(other.push(forces * factor) / factor, expected, rtol=1e-9, atol=1e-9)
     assert other.swings == newton.swings > 0
 
 
