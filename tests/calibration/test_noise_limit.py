@@ -31,6 +31,6 @@ def test_a_ramp_is_late_by_the_lag_that_is_told(gain: float) -> None:
 @pytest.mark.parametrize("gain", [0.05, 0.3])
 def test_the_gain_for_noise_knows_nothing_of_what_came_before_and_leaves_nothing_behind(gain: float) -> None:
     limit = NoiseLimit(gain)
-    limit.push(np.full(10, 1e6), TIMES[:10])
+    limit.push(np.full(10, 1e15), TIMES[:10])  # of which a part in 10^13 is left after 64 samples
     assert noise_gain(limit) == pytest.approx(gain, rel=1e-2)
     assert limit.push(np.full(5, 3.0), TIMES[:5]) == pytest.approx(np.full(5, 3.0), rel=1e-12)
