@@ -104,7 +104,7 @@ def test_a_shift_adds_its_one_value() -> None:
     shifts = {one.name: one for one in EVERY if one.shifts}
     assert {name: one.shifts for name, one in shifts.items()} == {"zero_offset": "reading", "load_cell_tare": "load"}
     for one in shifts.values():
-        assert one.apply(at.load, at, np.array([0.125])) == pytest.approx(at.load + 0.125, abs=0)
+        np.testing.assert_allclose(one.apply(at.load, at, np.array([0.125])), at.load + 0.125, rtol=0, atol=0)
 
 
 def test_no_other_room_knows_an_effect_by_name() -> None:
@@ -172,7 +172,9 @@ def test_an_effect_of_another_package_is_as_good_as_any(installed: ModuleType, o
     load = np.array([0.0, 0.5, 1.0, 0.2, -0.3, -0.3, 0.0])
     at = Conditions(0.02 * np.arange(7), load, 0.02)
     assert np.any(model.reading(at) != BASELINE.reading(at))
-    assert ExtendedCompensator(model, 50.0).apply(model.reading(at)) / 800.0 == pytest.approx(load, abs=1e-12)
+    np.testing.assert_allclose(
+        ExtendedCompensator(model, 50.0).apply(model.reading(at)) / 800.0, load, rtol=0, atol=1e-12
+    )
 
 
 def _named(name: str) -> Effect:

@@ -190,7 +190,7 @@ def test_gas_follows_boyle_beside_the_wall() -> None:
     # In units of the ambient pressure e = p/(1 + p) is Boyle's law, and the wall holds (N - 1) e.
     in_ambient = ratio * pressure
     load = in_ambient + (USUAL_WALL_RATIO - 1.0) * in_ambient / (1.0 + in_ambient)
-    assert load / load[-1] == pytest.approx(given_.load, abs=1e-12)
+    np.testing.assert_allclose(load / load[-1], given_.load, rtol=0, atol=1e-12)
 
 
 def test_creep_raises_and_leaks_and_heat_lower_the_reading_in_a_hold() -> None:

@@ -124,7 +124,9 @@ def test_effects_together_keep_their_own_strengths():
 def test_catalogue_parameters_are_what_the_recordings_show():
     case = hide({"zero_offset": 0.5}, protocol=SHORT, seed=4, recordings=1, hold_out=0, nuisances=0)
     offset = case.noise_free[0]["pressure"].values - case.clean[0]["pressure"].values
-    assert offset == pytest.approx(np.full(offset.size, case.effects[0].catalogue["offset_mbar"]), abs=1e-3)
+    np.testing.assert_allclose(
+        offset, np.full(offset.size, case.effects[0].catalogue["offset_mbar"]), rtol=0, atol=1e-3
+    )
     case = hide({"delay": 0.5}, protocol=SHORT, seed=4, recordings=1, hold_out=0, nuisances=0)
     late, prompt = case.noise_free[0], case.clean[0]
     delay_s = case.effects[0].catalogue["delay_s"]
