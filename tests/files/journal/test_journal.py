@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import resource
 import subprocess
@@ -175,6 +176,41 @@ def test_a_piece_that_was_written_stays_where_ctrl_c_comes_while_it_is_synced(
         assert file.size == 13
         file.append(b"third\n")
     assert (tmp_path / "walk.csv").read_bytes() == b"first\nsecond\nthird\n"
+
+
+def test_a_piece_that_the_disk_does_not_sync_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(_: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    with AppendedFile(tmp_path / "walk.csv", new=True) as file:
+        file.append(b"first\n")
+        with monkeypatch.context() as patch:
+            patch.setattr(_appending, "_data_to_disk", refused)
+            with pytest.raises(InputError, match="takes no more data"):
+                file.append(b"second\n")
+        file.append(b"third\n")
+    assert (tmp_path / "walk.csv").read_bytes() == b"first\nthird\n"
+
+
+def test_half_a_piece_is_taken_back_where_ctrl_c_comes_while_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = os.write
+    pieces = iter([3])
+
+    def half(handle: int, data: memoryview) -> int:
+        for length in pieces:
+            return written(handle, data[:length])
+        raise KeyboardInterrupt
+
+    with AppendedFile(tmp_path / "walk.csv", new=True) as file:
+        file.append(b"first\n")
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "write", half)
+            with pytest.raises(KeyboardInterrupt):
+                file.append(b"second\n")
+        file.append(b"third\n")
+    assert (tmp_path / "walk.csv").read_bytes() == b"first\nthird\n"
 
 
 def test_records_are_of_the_longest_length_and_kind_and_none_beyond(
