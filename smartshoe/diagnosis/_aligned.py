@@ -13,10 +13,10 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity import Integrity
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, effect
 from smartshoe.recording import Recording
 
-SAME_LAG = 0.25  # of the largest: lags that differ by less are one
 LARGEST_DELAY_S = 2.9
 
 
@@ -30,18 +30,18 @@ class Aligned:
     says: tuple[str, ...]
 
 
-def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
+def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: Thresholds) -> Aligned:
     """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own."""
     lags, rates = np.array(integrity.clock_offset_s), np.array(integrity.clock_rate)
     largest = float(np.max(np.abs(lags), initial=0.0))
     plain = Aligned(list(recordings), list(integrity.usable), (), ())
     if not lags.any() and not rates.any():
         return plain
-    if not rates.any() and np.ptp(lags) <= SAME_LAG * largest <= SAME_LAG * LARGEST_DELAY_S:
+    if not rates.any() and np.ptp(lags) <= thresholds.same * largest <= thresholds.same * LARGEST_DELAY_S:
         return replace(plain, parts=((effect("delay"), np.array([float(np.mean(lags))])),))
     half_s = 0.5 * np.array([recording.duration_s for recording in recordings])
     begins = lags - rates * half_s
-    if rates.all() and np.max(np.abs(begins)) <= SAME_LAG * largest:
+    if rates.all() and np.max(np.abs(begins)) <= thresholds.same * largest:
         return replace(plain, parts=((effect("clock_drift"), np.array([float(np.mean(lags / half_s))])),))
     made, usable, says = [], [], []
     for recording, mask, offset_s, rate in zip(recordings, integrity.usable, lags, rates, strict=True):

@@ -28,9 +28,9 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis._sensitivity import (
-    MODULATORS,
     Linearised,
     departures,
+    directions,
     marginal,
     nuisance_precision,
     nuisances,
@@ -87,6 +87,7 @@ class Evidence:
         count = sum(int(s.fitted.sum()) for s in given.sessions)
         self.raw = visible / count
         self._departures: dict[int, int] = {}
+        self._directions = directions(self.thresholds)
         self._last = 1 + given.own + sum(len(one.columns) for one in given.candidates)
         self._amounts: dict[Members, list[float]] = {}
         self._freedom: dict[Members, Array] = {}
@@ -174,7 +175,7 @@ class Evidence:
         usual = self.thresholds.departure / self.thresholds.least_departure
         departed = [0.0] * len(members)
         if departing:
-            scales = (mean / sds)[self._last - 1 :].reshape(len(members), MODULATORS) / usual
+            scales = (mean / sds)[self._last - 1 :].reshape(len(members), self._directions) / usual
             departed = [float(np.sqrt(np.mean(one**2))) for one in scales]
         columns = [c for m in members for c in given.candidates[m].columns]
         together = self.visible_rms(columns, np.concatenate(strengths)) if members else 0.0
@@ -227,7 +228,7 @@ class Evidence:
 
     def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[Index, Array]:
         """Columns that take part, and the standard deviations (p,) of their coefficients."""
-        usual = self.thresholds.departure / math.sqrt(MODULATORS)
+        usual = self.thresholds.departure / math.sqrt(self._directions)
         departing = departing and bool(members)
         prior = np.full(self._last - 1, self.thresholds.material)
         prior[: self.given.own] = OWN_SD
@@ -240,13 +241,13 @@ class Evidence:
         index = np.arange(1, self._last, dtype=np.intp)
         if not departing:
             return index, prior
-        least = self.thresholds.least_departure / math.sqrt(MODULATORS)
+        least = self.thresholds.least_departure / math.sqrt(self._directions)
         extra: list[int] = []
         spread: list[float] = []
         for member, amount in zip(members, amounts, strict=True):
             first = self._departure_of(member)
-            extra += range(first, first + MODULATORS)
-            spread += [max(least * amount, 1e-7)] * MODULATORS
+            extra += range(first, first + self._directions)
+            spread += [max(least * amount, 1e-7)] * self._directions
         return np.concatenate([index, np.array(extra, dtype=np.intp)]), np.concatenate([prior, spread])
 
     @cached_property

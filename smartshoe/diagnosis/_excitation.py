@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smartshoe.arrays import Mask
-from smartshoe.diagnosis._session import CYCLE_SHARE, Session
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
@@ -98,23 +98,23 @@ class _Rise(NamedTuple):
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
     load, step_s = session.conditions.load, session.conditions.step_s
     span = min(1.0, max(float(np.ptp(load)), 1e-9))
-    for first, last in pairwise(turning_points(load, CYCLE_SHARE * span)):
+    for first, last in pairwise(turning_points(load, thresholds.cycle * span)):
         rise = float(load[last] - load[first])
-        if rise < 3.0 * CYCLE_SHARE * span or load[last] <= 0.0:
+        if rise < 3.0 * thresholds.cycle * span or load[last] <= 0.0:
             continue
         part = (load[first : last + 1] - load[first]) / rise
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
         if samples * thresholds.same < 1.0 and session.thinned == 1:
             continue  # a sample more or less makes another rate of it
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
-        above = float(load[first]) - float(load.min()) > thresholds.clear * CYCLE_SHARE * span
+        above = float(load[first]) - float(load.min()) > thresholds.clear * thresholds.cycle * span
         yield _Rise(rate, samples, float(load[last]), above)
 
 
 def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
     flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
-    return np.asarray(flat & ~session.resting & (session.conditions.load > CYCLE_SHARE))
+    return np.asarray(flat & ~session.resting & (session.conditions.load > thresholds.cycle))
 
 
 def _runs(mask: Mask) -> list[int]:

@@ -21,7 +21,7 @@ from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions, allowed, search, step
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, available, linearised
-from smartshoe.diagnosis._session import CYCLE_SHARE, Session
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.effects.effect import CoreEffect
@@ -98,7 +98,7 @@ def infer(
     plain = least_squares(start, sessions, thresholds)
     given, evidence, best = _searched(plain.model, sessions, thresholds)
     screening = _screening(evidence)
-    can_validate = independent(sessions) > 1  # within one, nothing validates anything
+    can_validate = independent(sessions, thresholds) > 1  # within one, nothing validates anything
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, (), can_validate)
@@ -389,13 +389,13 @@ def _with_arm(model: ExtendedModel, arm: Arm) -> ExtendedModel:
     return replace(model, relaxing_share=arm.share, relaxation_rate_per_s=arm.rate_per_s)
 
 
-def independent(sessions: Sequence[Session]) -> int:
+def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
     fitted = [session for session in sessions if session.fitted.any()]
     if len(fitted) > 1:
         return len(fitted)
     load = fitted[0].conditions.load
-    points = turning_points(load, CYCLE_SHARE * max(float(np.ptp(load)), 1e-9))
+    points = turning_points(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9))
     return sum(load[b] > load[a] for a, b in pairwise(points))
 
 

@@ -132,17 +132,18 @@ class _Prepared:
 
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
-    clocks = aligned(recordings, integrity)
-    scale = full_scale(clocks.recordings[:count], clocks.usable[:count])
+    clocks = aligned(recordings, integrity, thresholds)
+    scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
-    sessions = prepare(clocks.recordings, clocks.usable, held, scale, thinning(clocks.recordings, scale))
+    factor = thinning(clocks.recordings, scale)
+    sessions = prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
     start = baseline_of(sessions, scale)
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in clocks.recordings[:count]]
     limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
-    fine = at_full_rate(sessions, clocks.usable, scale)
+    fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit)
 
@@ -156,9 +157,8 @@ def _diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     extended = found.fit.model
-    alarm = thresholds.false_alarm
-    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], alarm)
-    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions], alarm)
+    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], thresholds)
+    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions], thresholds)
     left = after.rms if after.significant else 0.0
     everything = max(left, after.size)
     silent = given.is_no_unit or not found.can_validate

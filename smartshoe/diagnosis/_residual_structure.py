@@ -12,6 +12,7 @@ from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, slow
 from smartshoe.diagnosis._session import Session
+from smartshoe.integrity.thresholds import Thresholds
 
 BLOCK_S = 5.0
 SIGNIFICANT_Z = 5.0
@@ -61,11 +62,11 @@ class ResidualStructure:
 
 
 def residual_structure(
-    sessions: Sequence[Session], residuals: Sequence[Array], false_alarm: float
+    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
 ) -> ResidualStructure:
-    """Both tests of the residuals, and the place of the largest part; ``false_alarm`` of the tests for noise."""
-    memory = gauss_markov_of(sessions, residuals, false_alarm)
-    says = where(sessions, residuals)
+    """Both tests of the residuals, and the place of the largest part."""
+    memory = gauss_markov_of(sessions, residuals, thresholds.false_alarm)
+    says = where(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
     return ResidualStructure(
@@ -89,7 +90,7 @@ def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array]) -> flo
     return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
 
 
-def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:
+def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> str:
     """The bin of load and direction, and the stretch of time, that hold most of the residual's slow part."""
     load, rate, error, names = [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
@@ -103,7 +104,7 @@ def where(sessions: Sequence[Session], residuals: Sequence[Array]) -> str:
     power = errors**2
     total = float(power.sum()) or 1.0
     level = np.clip((loads * 4).astype(int), 0, 3)
-    direction = np.where(np.abs(rates) < 0.004, 0, np.where(rates > 0, 1, 2))
+    direction = np.where(np.abs(rates) < thresholds.still_per_s, 0, np.where(rates > 0, 1, 2))
     table = np.zeros((3, 4))
     share = np.zeros((3, 4))
     np.add.at(table, (direction, level), power)

@@ -198,11 +198,13 @@ def _shape_of(effect: Effect, values: Array) -> dict[str, float]:
     return {p.name: float(v) for p, v in zip(effect.parameters, values, strict=True) if p.null is None}
 
 
-MODULATORS = 9
+def directions(thresholds: Thresholds) -> int:
+    """How many `departures` an equation has: six factors of its size, and a lag for each time constant."""
+    return 6 + len(thresholds.memory_s)
 
 
 def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
-    """(n, 9) a session: the directions in which a law departs from an equation of its kind, each of the column's rms.
+    """(n, `directions`) a session: those in which a law departs from an equation of its kind, each of the column's rms.
 
     ``column`` (n,) is the equation's own signature. A law of the same kind has its size depend otherwise on the load,
     the direction, the rate and the time, or follows with other time constants: the signature times smooth functions of

@@ -17,6 +17,7 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._denoise import noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Conditions
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals.loading import turning_points
@@ -27,13 +28,10 @@ SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 6.0  # times: for the sake of speed
-# Of full scale, or of the record's own span where that is less: what the load must fall and rise between two cycles.
-CYCLE_SHARE = 0.08
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
 REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
-LOWEST_SHARE = 0.02
-REST_SHARE = 0.02  # of full scale: below it the unit is unloaded
+STANDARD = Thresholds()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +94,7 @@ class Session:
         return self.usable & self.held_out
 
 
-def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask]) -> Scale:
+def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds = STANDARD) -> Scale:
     """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
 
     Raises `NotIdentifiableError` where load or reading never changes.
@@ -117,14 +115,14 @@ def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask]) -> Scale
     slope = sum(float(np.dot(force - force.mean(), values - values.mean())) for force, values in pairs)
     zero = 0.0
     if unit.quantity != "pressure":
-        zero = float(np.median(np.concatenate([values[lowest(force)] for force, values in pairs])))
+        zero = float(np.median(np.concatenate([values[lowest(force, thresholds)] for force, values in pairs])))
     return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
 
 
-def lowest(load_n: Array) -> Mask:
-    """(n,) samples at the lowest load, within a fiftieth of its span."""
+def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
+    """(n,) samples at the lowest load, where it stands still."""
     low, high = float(np.percentile(load_n, 0.1)), float(np.percentile(load_n, 99.9))
-    return np.asarray(load_n <= low + LOWEST_SHARE * (high - low))
+    return np.asarray(load_n <= low + thresholds.standing * (high - low))
 
 
 def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
@@ -147,15 +145,20 @@ def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
 
 
 def prepare(
-    recordings: Sequence[Recording], usable: Sequence[Mask], held_out: Sequence[bool] | None, scale: Scale, factor: int
+    recordings: Sequence[Recording],
+    usable: Sequence[Mask],
+    held_out: Sequence[bool] | None,
+    scale: Scale,
+    factor: int,
+    thresholds: Thresholds = STANDARD,
 ) -> list[Session]:
     """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out."""
     sessions = []
     left_behind: dict[str, dict[str, float]] = {}
     for index, (recording, mask) in enumerate(zip(recordings, usable, strict=True)):
         before = left_behind.get(recording.metadata.get("continues", ""), {})
-        session = _session(recording, index, mask, scale, factor, before)
-        left_behind[recording.name] = _left_behind(session.conditions)
+        session = _session(recording, index, mask, scale, factor, before, thresholds)
+        left_behind[recording.name] = _left_behind(session.conditions, thresholds)
         sessions.append(session)
     if held_out is not None:
         return [
@@ -171,10 +174,12 @@ def prepare(
     return kept
 
 
-def at_full_rate(sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale) -> list[Session]:
+def at_full_rate(
+    sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds = STANDARD
+) -> list[Session]:
     """The same sessions without thinning: cycles and what is held out as they are."""
     return [
-        _session(one.recording, one.index, mask, scale, 1, one.conditions.before, one)
+        _session(one.recording, one.index, mask, scale, 1, one.conditions.before, thresholds, one)
         for one, mask in zip(sessions, usable, strict=True)
     ]
 
@@ -186,6 +191,7 @@ def _session(
     scale: Scale,
     factor: int,
     before: Mapping[str, float],
+    thresholds: Thresholds,
     like: Session | None = None,
 ) -> Session:
     time_s = recording.time_s - recording.time_s[0]
@@ -217,11 +223,11 @@ def _session(
     quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s)
     load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
-    base = min(low, REST_SHARE)
+    base = min(low, thresholds.standing)
     beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
     conditions = Conditions(
         time_s[::factor],
-        smoothed(_rests_levelled(load, base + 0.25 * REST_SHARE, quiet.raw), weights, factor),
+        smoothed(_rests_levelled(load, base + 0.25 * thresholds.standing, quiet.raw), weights, factor),
         step_s * factor,
         quiet.left * float(np.sqrt(np.sum(weights**2))),
         temperature_k=beside.get("temperature_k"),
@@ -231,7 +237,7 @@ def _session(
     kept = smoothed(good.astype(float), weights, factor) > 0.7
     load = conditions.load
     if like is None:
-        held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions)
+        held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions, thresholds)
     else:
         nearest = np.minimum((np.arange(load.size) + like.thinned // 2) // like.thinned, like.cycle.size - 1)
         held_out, cycle = like.held_out[nearest], like.cycle[nearest]
@@ -243,7 +249,7 @@ def _session(
         kept,
         held_out,
         cycle,
-        np.abs(load - base) < REST_SHARE,
+        np.abs(load - base) < thresholds.standing,
         factor,
         quiet,
         smoothed(displacement, weights, factor) if displacement is not None else None,
@@ -298,9 +304,10 @@ def _neighbour(recording: Recording) -> Channel | None:
     return others[0] if others else None
 
 
-def _cycles(conditions: Conditions) -> Index:
+def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     load = conditions.load
-    threshold = CYCLE_SHARE * min(1.0, max(float(np.ptp(load)), 1e-9))
+    # Of full scale, or of the record's own span where that is less.
+    threshold = thresholds.cycle * min(1.0, max(float(np.ptp(load)), 1e-9))
     points = turning_points(load, threshold)
     # A cycle begins at the foot of a rise; the foot of a rest is its last sample at the low level.
     feet = [p for p, q in pairwise(points) if load[q] - load[p] > threshold]
@@ -319,10 +326,10 @@ def _cycles(conditions: Conditions) -> Index:
     return np.cumsum(cycle)
 
 
-def _left_behind(conditions: Conditions) -> dict[str, float]:
+def _left_behind(conditions: Conditions, thresholds: Thresholds) -> dict[str, float]:
     load = conditions.load
     before = conditions.before
-    rises = sum(load[b] > load[a] for a, b in pairwise(turning_points(load, CYCLE_SHARE)))
+    rises = sum(load[b] > load[a] for a, b in pairwise(turning_points(load, thresholds.cycle)))
     return {
         "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
         "cycles": before.get("cycles", 0.0) + rises,

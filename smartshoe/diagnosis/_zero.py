@@ -14,13 +14,12 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import own_of
-from smartshoe.diagnosis._session import REST_SHARE, Scale, Session
+from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
 FIRST_REST_S = 0.5
-MOST_REST_S = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,7 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
     )
 
 
-def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
+def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:
     """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
@@ -64,9 +63,9 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel) -> Array:
             # By the command alone: a large tare lifts the load out of what looks like a rest.
             full = float(np.max(np.abs(command))) or 1.0
             nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
-            resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < REST_SHARE)
+            resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < thresholds.standing)
         moved = np.flatnonzero(~resting)
-        most = max(1, round(MOST_REST_S / session.conditions.step_s))  # drifts have not begun
+        most = max(1, round(thresholds.hold_s / session.conditions.step_s))  # nothing has crept yet
         first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
         kept = session.fitted[first]
         if kept.sum() * session.conditions.step_s >= FIRST_REST_S:
@@ -99,7 +98,7 @@ def zeros_of(
     """
     if scale.unit.quantity != "pressure":
         return ()
-    rests = first_rests(sessions, model)
+    rests = first_rests(sessions, model, thresholds)
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size:
         return _unseen(sessions, model, left, remembered, sensor, machine, thresholds)

@@ -117,7 +117,7 @@ def design(
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     usable = [np.ones(len(one), dtype=bool) for one in recordings]
     factor = thinning(recordings, scale)
-    sessions = prepare(recordings, usable, [False] * len(recordings), scale, factor)
+    sessions = prepare(recordings, usable, [False] * len(recordings), scale, factor, limits)
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.
     sd = 0.01 * noise_percent / math.sqrt(max(factor, 1))

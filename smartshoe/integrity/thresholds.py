@@ -133,6 +133,11 @@ class Thresholds:
         """How many samples or runs are no chance: a ``faulty_share`` of the fewest samples."""
         return max(round(self.faulty_share * self.least_samples), 1)
 
+    @property
+    def cycle(self) -> float:
+        """Share by which a load rises and falls in a cycle: clear of what is clear of standing still."""
+        return self.clear**2 * self.standing
+
 
 def described(given: Thresholds) -> list[dict[str, Any]]:
     """Name, value, unit, meaning and origin of each."""

@@ -16,7 +16,8 @@ from smartshoe.diagnosis._residual_structure import residual_structure
 from smartshoe.diagnosis._session import Session
 
 NOISE = 0.001
-ALARM = Thresholds().false_alarm
+STANDARD = Thresholds()
+ALARM = STANDARD.false_alarm
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def test_first_order_noise_is_noise_however_strong(sessions, seed, tau_s, rms):
     assert found is not None
     assert found.is_noise
     assert found.rms == pytest.approx(rms, rel=0.4)
-    assert not residual_structure(sessions, residuals, ALARM).significant
+    assert not residual_structure(sessions, residuals, STANDARD).significant
 
 
 def switching(session: Session, rng: np.random.Generator) -> np.ndarray:
@@ -64,7 +65,7 @@ def seated(session: Session, rng: np.random.Generator) -> np.ndarray:
 def test_an_unknown_effect_is_no_noise(sessions, unknown):
     rng = np.random.default_rng(4)
     residuals = [noise + 0.01 * unknown(one, rng) for noise, one in zip(noises(sessions, 4), sessions, strict=True)]
-    found, left = gauss_markov_of(sessions, residuals, ALARM), residual_structure(sessions, residuals, ALARM)
+    found, left = gauss_markov_of(sessions, residuals, ALARM), residual_structure(sessions, residuals, STANDARD)
     assert found is not None
     assert not found.is_noise
     assert left.significant

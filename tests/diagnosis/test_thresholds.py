@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +12,14 @@ from deciding import STANDARD, decides
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, described
+from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._zero import first_rests
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.integrity.thresholds import largest_of_noise
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -70,6 +75,38 @@ def test_standing_is_how_far_a_load_at_rest_may_move() -> None:
     recording = Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=falling)
     moves, stands = decides("standing", 0.02, 0.1, lambda t: decay_of(recording, t) is not None)
     assert (moves, stands) == (False, True)
+
+
+def test_standing_is_what_a_load_must_leave_for_another_cycle() -> None:
+    rippled = _pressed(TRIANGLE, TRIANGLE + 0.03 * np.sin(10.0 * np.pi * TIME_S))
+    usable = [np.ones(TIME_S.size, dtype=bool)]
+
+    def cycles(thresholds: Thresholds) -> int:
+        scale = full_scale([rippled], usable, thresholds)
+        return int(prepare([rippled], usable, None, scale, 1, thresholds)[0].cycle[-1]) + 1
+
+    ripples, triangles = decides("standing", 0.002, 0.02, cycles)
+    assert (ripples > 20, triangles) == (True, 10)
+
+
+def test_hold_is_how_long_a_first_rest_shows_a_zero() -> None:
+    load = _held_load(5.0, 20.0)
+    time_s = 0.02 * np.arange(load.size)
+    rising = _pressed(load + 0.01 * (time_s > 2.0), load, time_s)
+    usable = [np.ones(load.size, dtype=bool)]
+    scale = full_scale([rising], usable)
+    sessions = prepare([rising], usable, None, scale, 1)
+    model = ExtendedModel(1.0, 0.0, 0.22, 800.0, 100.0, "mbar")
+    before, after = decides("hold_s", 1.0, 4.0, lambda t: float(first_rests(sessions, model, t)[0, 1]))
+    assert (before, after) == (pytest.approx(0.0, abs=1e-4), pytest.approx(0.005, abs=1e-3))
+
+
+def test_same_is_how_far_lags_of_one_delay_differ() -> None:
+    pair = [_pressed(TRIANGLE), _pressed(TRIANGLE)]
+    usable = tuple(one.sensor.present for one in pair)
+    lagging: Any = SimpleNamespace(clock_offset_s=(1.0, 1.4), clock_rate=(0.0, 0.0), usable=usable)
+    each, shared = decides("same", 0.2, 0.4, lambda t: [one.name for one, _ in aligned(pair, lagging, t).parts])
+    assert (each, shared) == ([], ["delay"])
 
 
 @pytest.mark.parametrize(("field", "word"), [("hold_s", "holds"), ("idle_s", "idle")])

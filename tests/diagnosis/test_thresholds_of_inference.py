@@ -105,6 +105,14 @@ def test_foreseen_is_how_much_of_what_is_left_out_an_extension_must_do_away_with
     assert decides("foreseen", 0.25, 1.0, extended) == (True, False)
 
 
+def test_memory_is_how_else_a_law_may_follow(curved: Linearised) -> None:
+    def departed(thresholds: Thresholds) -> float:
+        return Evidence(replace(curved, thresholds=thresholds), 0.002).posterior((_curve(curved),)).departed[0]
+
+    one, decades = decides("memory_s", (3.0,), (0.3, 3.0, 30.0), departed)
+    assert 0.0 < one != decades > 0.0
+
+
 def test_unknown_past_is_what_an_arm_may_remember_of_before(curved: Linearised) -> None:
     session = curved.sessions[0]
     little, much = decides("unknown_past", 0.01, 0.1, lambda t: nuisance_precision(session, MODEL, t)[1, 1])
