@@ -38,13 +38,20 @@ def test_a_failure_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [target]
 
 
+def test_writing_leaves_no_file_open(tmp_path: Path) -> None:
+    before = len(list(Path("/dev/fd").iterdir()))
+    for k in range(5):
+        write_text(make_folder(tmp_path / f"{k}") / "result.json", "{}")
+    assert len(list(Path("/dev/fd").iterdir())) <= before
+
+
 def test_places_that_cannot_be_written_are_refused_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is a directory"):
         write_text(tmp_path, "x")
     with pytest.raises(UsageError, match=r"x\.json cannot be written \(No such file or directory\): choose a folder"):
         write_text(tmp_path / "missing" / "x.json", "x")
     (tmp_path / "file").write_text("")
-    with pytest.raises(UsageError, match="--out"):
+    with pytest.raises(UsageError, match=r"below cannot be made a folder \(Not a directory\): choose another --out"):
         make_folder(tmp_path / "file" / "below")
 
 

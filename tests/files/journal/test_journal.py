@@ -117,15 +117,15 @@ def test_an_appended_file_does_not_overwrite(tmp_path: Path) -> None:
 
 
 def test_a_new_files_rights_are_those_that_the_umask_leaves(tmp_path: Path) -> None:
-    before = os.umask(0o027)
+    before = os.umask(0o020)
     try:
         AppendedFile(tmp_path / "walk.csv", new=True).close()
         write_text(tmp_path / "result.json", "{}")
-        umask = os.umask(0o027)
+        umask = os.umask(0o020)
     finally:
         os.umask(before)
-    assert umask == 0o027  # left as it was
-    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o640}
+    assert umask == 0o020  # left as it was
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o646}
 
 
 FILL = """
