@@ -90,15 +90,15 @@ def test_readings_in_mbar_go_through_the_same_filters() -> None:
 
 @pytest.mark.parametrize("name", ["static", "lead", "kalman", "smoother"])
 def test_an_estimator_gives_a_stream_the_forces_of_the_whole(name: str) -> None:
-    columns = {name.replace("_n", "_mbar"): 0.2 * values for name, values in columns_of(walked(24.0).recording).items()}
+    columns = {name.replace("_n", "_mbar"): 0.2 * values for name, values in columns_of(walked(14.0).recording).items()}
     columns["left_heel_mbar"][2000:2003] = np.nan
-    pressed = recorded(walked(24.0).time_s, {n: v for n, v in columns.items() if n.endswith(("heel_mbar", "toe_mbar"))})
+    pressed = recorded(walked(14.0).time_s, {n: v for n, v in columns.items() if n.endswith(("heel_mbar", "toe_mbar"))})
     units = [Calibration(a1=0.2, b0=5.2, b1=1.0, reading_unit=MILLIBAR, unit=name) for name in pressed.channels]
     found = analyse_stream(in_blocks(pressed, 1500), units, estimator=name)
     whole = analyse(pressed, units, estimator=name)
     # The record is shorter than the first look, so noise and density are the same; the smoother waits two seconds,
     # and what it has not seen by then moves a load by less than this.
-    assert len(found.strides) == len(whole.strides) > 20
+    assert len(found.strides) == len(whole.strides) > 15
     for own, other in zip(found.strides, whole.strides, strict=True):
         assert_same_numbers(own.to_dict(), other.to_dict(), rel=1e-7)
     assert_same_numbers(found.to_dict()["forces"], whole.to_dict()["forces"], rel=1e-7)
