@@ -56,6 +56,12 @@ def test_of_a_single_recording_each_load_cycle_can_be_left_out() -> None:
     assert independent(sessions_of(recording(seed=1), recording(seed=2))[0]) == 2
 
 
+def test_cycles_are_counted_of_a_load_that_moves_by_a_part_of_the_largest() -> None:
+    (session,), _ = sessions_of(recording(rates=(200, 800)))
+    shallow = replace(session.conditions, load=0.7 + 0.05 * session.conditions.load)
+    assert independent([replace(session, conditions=shallow)]) == 6
+
+
 @given(st.integers(0, 999), st.integers(1, 5))
 @settings(max_examples=15)
 def test_evidence_is_that_of_gaussian_data(seed: int, members: int) -> None:
@@ -95,6 +101,9 @@ def test_noise_that_is_louder_in_parts_is_no_structure(sessions: list[Session]) 
         loud = np.where(np.arange(session.reading.size) // 200 % 2 == 0, 1.0, 4.0)
         found.append(0.001 * loud * rng.standard_normal(loud.size))
     assert abs(slow(sessions, found, 2.0).z) < 4.0
+    sines = [0.002 * np.sin(2 * np.pi * session.conditions.time_s / 20.0) for session in sessions]
+    both = [noise + sine for noise, sine in zip(found, sines, strict=True)]
+    assert slow(sessions, both, 2.0).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
 
 
 def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list[Session]) -> None:
@@ -110,7 +119,7 @@ def test_branches_of_fast_strokes_are_told_by_a_short_echo() -> None:
     time_s = np.arange(0.0, 60.0, 0.01)
     load = 100.0 * (2.0 * np.abs(2.0 * (time_s / 0.6 % 1.0) - 1.0) - 1.0)
     rubbed = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=5.0 * np.sign(np.gradient(load)))
-    said = characteristic_of(rubbed, Thresholds(echo_s=0.04))
+    said = characteristic_of(rubbed, Thresholds(echo_s=1 / 12))
     assert said is not None
     assert float(re.findall(r"lies ([\d.]+) mbar above", said)[0]) == pytest.approx(5.0, rel=0.02)
 
