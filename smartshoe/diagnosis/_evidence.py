@@ -7,10 +7,8 @@ With the reading's residual y, in standard deviations of what counts as noise, a
 * b, the baseline's own changes: flat prior;
 * s_j ~ N(0, material^2): what is immaterial may always be there, of any kind, and needs no name;
 * a_e ~ N(0, strength_sd^2): the effects in S (spike and slab: George and McCulloch 1993);
-* w_e, the error of e's equation in the directions in which equations of its kind depart (Kennedy and O'Hagan 2001), in
-  proportion to the effect's own size: Student's t of few degrees of freedom and scale least_departure a_e, since an
-  equation departs much in one way and little in others. The other equations of e's kind, and e's own at other shapes,
-  are such directions too: s_j of these ~ N(0, (departure a_e)^2 / columns).
+* w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
+  directions in which equations of its kind depart (Kennedy and O'Hagan 2001).
 
 -2 log p(y | S) = y'y - g' A^-1 g + log det A + sum log(prior variances) + const, A = Z'Z + prior precisions, g = Z'y.
 Everything is computed from inner products that are taken once, so that a set costs one small factorisation.
@@ -39,7 +37,6 @@ from smartshoe.diagnosis._sensitivity import (
 Members = tuple[int, ...]
 
 OWN_SD = 10.0
-REWEIGHTED = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +44,7 @@ class Posterior:
     """``score`` is -2 log of the evidence times the prior odds of the set; ``strengths`` a member's (k,) each.
 
     ``sizes``: rms by which each member moves the reading beyond what the baseline absorbs; ``departed``: rms of its
-    fitted departure, in usual ones. ``together``: rms by which all members move the reading.
+    fitted departure, in standard deviations of its prior. ``together``: rms by which all members move the reading.
     """
 
     members: Members
@@ -90,7 +87,6 @@ class Evidence:
         self._directions = directions(self.thresholds)
         self._last = 1 + given.own + sum(len(one.columns) for one in given.candidates)
         self._amounts: dict[Members, list[float]] = {}
-        self._freedom: dict[Members, Array] = {}
         effects = {one.name for one in given.candidates}
         self.odds = 2.0 * math.log(len(effects) / self.thresholds.false_name)
 
@@ -166,17 +162,15 @@ class Evidence:
         amounts = self._amounts.get(members) or [self.thresholds.strength_sd] * len(members)
         for _ in range(2 if departing and members else 1):
             index, sds = self._prior(members, amounts, departing)
-            mean, cost, grown = self._cost(index, sds)
+            mean, cost, _ = self._cost(index, sds)
             amounts = self._amplitudes(mean, members)
-        if departing or not members:
-            self._freedom[members] = grown
         strengths = tuple(mean[[c - 1 for c in given.candidates[m].columns]] for m in members)
         sizes = tuple(self.visible_rms(given.candidates[m].columns, s) for m, s in zip(members, strengths, strict=True))
-        usual = self.thresholds.departure / self.thresholds.least_departure
-        departed = [0.0] * len(members)
-        if departing:
-            scales = (mean / sds)[self._last - 1 :].reshape(len(members), self._directions) / usual
-            departed = [float(np.sqrt(np.mean(one**2))) for one in scales]
+        departed = []
+        for k, _ in enumerate(members):
+            at = self._last - 1 + k * self._directions
+            of = slice(at, at + self._directions)
+            departed.append(float(np.sqrt(np.mean((mean[of] / sds[of]) ** 2))) if departing else 0.0)
         columns = [c for m in members for c in given.candidates[m].columns]
         together = self.visible_rms(columns, np.concatenate(strengths)) if members else 0.0
         return Posterior(members, cost + self.odds_of(members), strengths, sizes, tuple(departed), together)
@@ -190,22 +184,17 @@ class Evidence:
         best = self.posterior(members)
         amounts = [float(np.linalg.norm(strengths)) for strengths in best.strengths]
         index, sds = self._prior(best.members, amounts, True)
-        sds = sds * np.sqrt(self._freedom[best.members])
-        a = self.gram[np.ix_(index, index)] * np.outer(sds, sds) + np.eye(index.size)
-        factor = _factor(a)
+        mean, _, factor = self._cost(index, sds)
         covariance = cho_solve(factor, np.eye(index.size), check_finite=False) * np.outer(sds, sds)
-        mean = sds * cho_solve(factor, self.gram[index, 0] * sds, check_finite=False)
-        wide = self.thresholds.strength_sd**2
+        narrow, wide = self.thresholds.material**2, self.thresholds.strength_sd**2
         found = []
         for numbers, columns in self._alike:
             at, unit = columns - 1, np.eye(columns.shape[1])
-            narrow = sds[at[:, :1]] ** 2
-            each, more = narrow[:, :, None], wide - narrow
-            S = (each * unit - covariance[at[:, :, None], at[:, None, :]]) / each**2
+            S = (narrow * unit - covariance[at[:, :, None], at[:, None, :]]) / narrow**2
             q = mean[at] / narrow
-            inner = unit + more[:, :, None] * S
+            inner = unit + (wide - narrow) * S
             solved = np.linalg.solve(inner, q[:, :, None])[:, :, 0]
-            fall = more[:, 0] * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
+            fall = (wide - narrow) * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
             found += [
                 (best.score - float(fell) + self.odds_of((k,)), k, wide * strengths)
                 for k, fell, strengths in zip(numbers, fall, solved, strict=True)
@@ -228,35 +217,21 @@ class Evidence:
 
     def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[Index, Array]:
         """Columns that take part, and the standard deviations (p,) of their coefficients."""
-        usual = self.thresholds.departure / math.sqrt(self._directions)
-        departing = departing and bool(members)
         prior = np.full(self._last - 1, self.thresholds.material)
         prior[: self.given.own] = OWN_SD
-        if departing:
-            for member, amount in zip(members, amounts, strict=True):
-                kin = self._kin[self.given.candidates[member].slot]
-                prior[kin] = np.maximum(prior[kin], usual * amount)
         for member in members:
             prior[[c - 1 for c in self.given.candidates[member].columns]] = self.thresholds.strength_sd
         index = np.arange(1, self._last, dtype=np.intp)
-        if not departing:
+        if not (departing and members):
             return index, prior
-        least = self.thresholds.least_departure / math.sqrt(self._directions)
+        share = self.thresholds.departure / math.sqrt(self._directions)
         extra: list[int] = []
         spread: list[float] = []
         for member, amount in zip(members, amounts, strict=True):
             first = self._departure_of(member)
             extra += range(first, first + self._directions)
-            spread += [max(least * amount, 1e-7)] * self._directions
+            spread += [max(share * amount, 1e-7)] * self._directions
         return np.concatenate([index, np.array(extra, dtype=np.intp)]), np.concatenate([prior, spread])
-
-    @cached_property
-    def _kin(self) -> dict[str, list[int]]:
-        """Columns of the equations of each kind, at every shape."""
-        found: dict[str, list[int]] = {}
-        for one in self.given.candidates:
-            found.setdefault(one.slot, []).extend(c - 1 for c in one.columns)
-        return found
 
     def left_out_errors(self, members: Members) -> Array:
         """(folds,) squared errors of each recording when the set is fitted to all others.
@@ -299,49 +274,15 @@ class Evidence:
         columns = [self.given.candidates[member].columns for member in members]
         return [float(np.linalg.norm(mean[[c - 1 for c in own]])) for own in columns]
 
-    def _cost(self, index: Index, sds: Array) -> tuple[Array, float, Array]:
-        """Coefficients (p,) and -2 log evidence under a prior of ``sds`` (p,), by what each variance has grown (p,).
-
-        The departures stand last; the other coefficients are needed once only to find their variances.
-        """
+    def _cost(self, index: Index, sds: Array) -> tuple[Array, float, tuple[Array, bool]]:
         a = self.gram[np.ix_(index, index)] * np.outer(sds, sds)
+        a[np.diag_indices_from(a)] += 1.0
         g = self.gram[index, 0] * sds
-        exact, apart = slice(None, self._last - 1), slice(self._last - 1, None)
-        factor = _factor(a[exact, exact] + np.eye(self._last - 1))
-        solved = cho_solve(factor, np.column_stack([g[exact], a[exact, apart]]), check_finite=False)
-        cost = float(self.gram[0, 0] - g[exact] @ solved[:, 0] + _log_det(factor))
-        grown = np.ones(index.size)
-        mean = solved[:, 0]
-        if index.size > mean.size:
-            schur = a[apart, apart] - a[apart, exact] @ solved[:, 1:]
-            departed, more, grown[apart] = self._departed(schur, g[apart] - a[apart, exact] @ mean)
-            cost += more
-            mean = np.concatenate([mean - solved[:, 1:] @ departed, departed])
-        return sds * mean, cost, grown
-
-    def _departed(self, inner: Array, g: Array) -> tuple[Array, float, Array]:
-        """Departures (k,) in scales of their prior, their part of -2 log evidence, and the likeliest variances (k,).
-
-        ``inner`` (k, k), ``g`` (k,): inner products, those of the exact columns taken out. Student's t is a normal law
-        of unknown variance, which expectation and maximisation find (Tipping 2001).
-        """
-        tails, variance = self.thresholds.departure_tails, np.ones(g.size)
-        for _ in range(REWEIGHTED):
-            covariance = np.linalg.inv(inner + np.diag(1.0 / variance))
-            variance = (tails + (covariance @ g) ** 2 + np.diag(covariance)) / (tails + 1.0)
-        factor = _factor(inner + np.diag(1.0 / variance))
+        try:
+            factor = cho_factor(a, lower=True, check_finite=False)
+        except LinAlgError:
+            a[np.diag_indices_from(a)] *= 1.0 + 1e-9
+            factor = cho_factor(a, lower=True, check_finite=False)
         found = cho_solve(factor, g, check_finite=False)
-        prior = tails * (np.log(variance) + 1.0 / variance - 1.0)
-        return found, float(_log_det(factor) - g @ found + np.sum(np.log(variance) + prior)), variance
-
-
-def _factor(matrix: Array) -> tuple[Array, bool]:
-    """The Cholesky factor of a matrix that rounding may have made singular."""
-    try:
-        return cho_factor(matrix, lower=True, check_finite=False)
-    except LinAlgError:
-        return cho_factor(matrix + 1e-9 * np.diag(np.diag(matrix)), lower=True, check_finite=False)
-
-
-def _log_det(factor: tuple[Array, bool]) -> float:
-    return float(2.0 * np.sum(np.log(np.diag(factor[0]))))
+        cost = float(self.gram[0, 0] - g @ found + 2.0 * np.sum(np.log(np.diag(factor[0]))))
+        return sds * found, cost, factor

@@ -15,6 +15,7 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel, Trace
 
 MOST_STEPS = 25
+FEW_STEPS = 4  # of a fit that only has to be compared with others
 SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 SHAPE_SD = 1.0  # of a shape's logarithm, or in sizes, about where it was begun

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from smartshoe.diagnosis._inference import Member
+from smartshoe.diagnosis._members import Member
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 
@@ -52,12 +52,11 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> flo
     """That an effect of this family is there: a logistic of two ratios, each without a unit, and the evidence for it.
 
     What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow), and
-    how far its equation is asked to depart, as a share of that and of a usual departure.
+    how far its equation is asked to depart.
     """
     intercept, per_left, per_departed = thresholds.kind_odds
     ratio = (left + thresholds.material) / (one.size + thresholds.material)
-    departed = one.departed / (1.0 + one.departed)
-    score = intercept + per_left * math.log(ratio) + per_departed * departed
+    score = intercept + per_left * math.log(ratio) + per_departed * one.departed
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 

@@ -24,12 +24,6 @@ class Thresholds:
         "standard deviation by which a real law departs from an equation of its kind",
         "second laboratory and own truths: 0.05 to 0.4",
     )
-    least_departure: float = threshold(
-        0.075, "share of an effect's size", "by which real laws depart in most ways", "trials on both worlds"
-    )
-    departure_tails: float = threshold(
-        1.0, "degrees of freedom", "of Student's t by which they depart in some ways much more", "Cauchy's law"
-    )
     strength_sd: float = threshold(
         0.03, "share of full scale", "prior standard deviation of an effect that is there", "effects.md: 0.1 to 10 %"
     )
@@ -84,10 +78,10 @@ class Thresholds:
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (1.96, -1.13, -1.75),
+        (1.92, -1.04, -0.9),
         "log odds",
-        "of a kind: intercept; per log of what is left over its size; per share of its departure",
-        "logistic regression on 136 cases of two worlds",
+        "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure",
+        "logistic regression on 306 cases of two worlds",
     )
     least_confidence: float = threshold(
         0.667,

@@ -52,14 +52,14 @@ def test_a_zero_that_is_moved_is_the_recordings_own_offset() -> None:
 
 def test_of_a_single_recording_each_load_cycle_can_be_left_out() -> None:
     """And of several each recording."""
-    assert independent(sessions_of(recording(rates=(200, 800)))[0]) == 6
-    assert independent(sessions_of(recording(seed=1), recording(seed=2))[0]) == 2
+    assert independent(sessions_of(recording(rates=(200, 800)))[0], Thresholds()) == 6
+    assert independent(sessions_of(recording(seed=1), recording(seed=2))[0], Thresholds()) == 2
 
 
 def test_cycles_are_counted_of_a_load_that_moves_by_a_part_of_the_largest() -> None:
     (session,), _ = sessions_of(recording(rates=(200, 800)))
     shallow = replace(session.conditions, load=0.7 + 0.05 * session.conditions.load)
-    assert independent([replace(session, conditions=shallow)]) == 6
+    assert independent([replace(session, conditions=shallow)], Thresholds()) == 6
 
 
 @given(st.integers(0, 999), st.integers(1, 5))
@@ -110,7 +110,7 @@ def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list
     quiet, drifting, jumping = (np.zeros(session.reading.size) for session in sessions)
     drifting += 0.012
     jumping += 0.05 * (-1.0) ** np.arange(jumping.size)
-    said = where(sessions, [quiet, drifting, jumping])
+    said = where(sessions, [quiet, drifting, jumping], Thresholds())
     assert f"largest in {sessions[1].recording.name}" in said
 
 

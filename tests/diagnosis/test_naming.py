@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import EntryPoint
-from types import ModuleType, SimpleNamespace
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -19,8 +18,9 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
-from smartshoe.diagnosis._inference import Alternative, Member, _likelier_law
+from smartshoe.diagnosis._laws import likelier_law
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
+from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -93,8 +93,7 @@ def test_a_law_that_follows_better_takes_its_rivals_place_once() -> None:
     """Two laws that fit in turn better in each other's place change places no second time."""
 
     def likelier(one: Member, *banned: str) -> tuple[str, str] | None:
-        found: Any = SimpleNamespace(members=(one,))
-        return _likelier_law(found, banned)
+        return likelier_law((one,), banned)
 
     better = member(laws=(("orifice_leak", -3.0),))
     assert likelier(better) == ("linear_leak", "orifice_leak")

@@ -15,11 +15,11 @@ from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
-from smartshoe.diagnosis._inference import _extrapolates, _worse
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._procedure import _is_within_a_sample, _verdict
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
+from smartshoe.diagnosis._validation import extrapolating, worst_member
 from smartshoe.diagnosis._zero import zeros_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -68,31 +68,9 @@ def test_strength_sd_is_how_large_an_effect_may_be(curved: Linearised) -> None:
 def test_validated_is_how_sure_a_gain_over_what_is_left_out_must_be(curved: Linearised) -> None:
     def refused(thresholds: Thresholds) -> bool:
         evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
-        return _worse(evidence, evidence.posterior((_curve(curved),))) is not None
+        return worst_member(evidence, evidence.posterior((_curve(curved),))) is not None
 
     assert decides("validated", 0.8, 1e6, refused) == (False, True)
-
-
-def test_departure_tails_are_how_much_further_than_others_one_departure_may_go(curved: Linearised) -> None:
-    asked = np.array([10.0, 0.0, 0.0])  # standard deviations of the prior
-
-    def departed(thresholds: Thresholds) -> float:
-        found, _, _ = Evidence(replace(curved, thresholds=thresholds), 0.002)._departed(np.eye(3), asked)
-        return float(found[0])
-
-    heavy, normal = decides("departure_tails", 1.0, 1e6, departed)
-    assert normal == pytest.approx(5.0, rel=1e-3)  # halfway: the data knows as much as the prior
-    assert heavy > 8.0
-
-
-def test_least_departure_is_how_exact_an_equation_is_taken_to_be(curved: Linearised) -> None:
-    def cost(thresholds: Thresholds) -> float:
-        evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
-        return evidence.posterior((_curve(curved),)).score - evidence.exact((_curve(curved),)).score
-
-    exact, loose = decides("least_departure", 1e-6, 0.2, cost)
-    assert abs(exact) < 1.0  # of a law that is exact indeed
-    assert loose > exact + 2.0  # room that nothing asks for is paid for
 
 
 def test_foreseen_is_how_much_of_what_is_left_out_an_extension_must_do_away_with() -> None:
@@ -160,5 +138,5 @@ def test_tolerable_is_the_structure_that_a_good_unit_may_leave() -> None:
 def test_extrapolates_is_how_far_beyond_what_was_fitted_an_effect_is_believed() -> None:
     rated = MODEL.with_part(effect("rate_gain"), np.array([0.02, 0.4]))  # a tenth of the load, and of the rate
     sessions, _ = _sessions([_recording(rated, 0, peak=0.1), _recording(rated, 1)], [False, True])
-    strict, lax = decides("extrapolates", 2.0, 1e4, lambda t: _extrapolates(sessions, rated, t))
+    strict, lax = decides("extrapolates", 2.0, 1e4, lambda t: extrapolating(sessions, rated, t))
     assert (strict, lax) == ("rate_gain", None)

@@ -1,0 +1,101 @@
+"""Which law a kind has: equations compared by fits of the whole model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._members import Member
+from smartshoe.diagnosis._sensitivity import Candidate
+from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._state import State, state_at
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import Effect, blocks, catalogue
+from smartshoe.models.extended import ExtendedModel
+
+SIZES = (0.5, 5.0)  # typical ones of an effect, from which a fit begins
+
+
+def with_laws(given: State, sessions: Sequence[Session], thresholds: Thresholds) -> State:
+    """``given`` with a law in the place of a flexible curve, where one follows nearly as well.
+
+    No law is exact: one that leaves less than the square of the usual departure, of what the flexible curve explains,
+    is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
+    One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
+    is, so that only fits of the whole model compare them fairly.
+    """
+    state = given
+    curves = tuple(one.name for family in blocks().values() for one in family if one.is_memoryless)
+    for block in state.chosen:
+        if not (block.effect.is_flexible and block.effect.is_memoryless):
+            continue
+        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+        found = _law_of(block, state, likelihood)
+        if found is not None:
+            missed, law = found
+            banned = curves if missed < thresholds.departure**2 else ()
+            state = state_at(law, sessions, thresholds, banned)
+    return state
+
+
+def likelier_law(members: Sequence[Member], banned: Sequence[str]) -> tuple[str, str] | None:
+    """A member, and the law of its family that follows better in its place, if one does: fits of the whole model tell.
+
+    The linearised search prefers what comes nearest to all equations of the family.
+    """
+    for member in members:
+        nearest = next(iter(member.laws), None)
+        if nearest is None or nearest.margin >= 0.0 or nearest.effect in banned or member.effect.is_flexible:
+            continue
+        return member.name, str(nearest.effect)
+    return None
+
+
+def with_law(state: State, name: str, law: str, sessions: Sequence[Session]) -> State:
+    """``state`` with ``law`` in the place of its member ``name``, and not the other way round again."""
+    thresholds = state.given.thresholds
+    effect = catalogue()[law]
+    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    bare = state.fit.model.without(name)
+    starts = [bare.with_part(effect, effect.begun(shape)) for shape in effect.shapes]
+    found = fit(likelihood, min(starts, key=likelihood.cost))
+    return state_at(found, sessions, thresholds, (*state.banned, name))
+
+
+def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[float, Fit] | None:
+    """The law that follows nearly as well as a flexible curve, and the share of what that explains which it misses."""
+    thresholds = state.given.thresholds
+    bare = state.fit.model.without(block.name)
+    for part in bare.parts:
+        if part.effect.is_memoryless:
+            bare = bare.without(part.name)
+    nothing = fit(likelihood, bare, FEW_STEPS)
+    flexible = likelihood.cost(state.fit.model)
+    misses: list[tuple[float, Fit]] = []
+    for law in (e for e in catalogue().values() if e.is_memoryless):
+        one = _curved(law, nothing.model, likelihood)
+        # A law of another family is another name, with the odds against one.
+        other = state.evidence.odds if law.family != block.effect.family else 0.0
+        most = thresholds.departure if _is_stretched(one.model) else thresholds.law_departure
+        missed = (one.cost + other - flexible) / max(nothing.cost - flexible, other, 1e-9)
+        if missed < most**2:
+            misses.append((missed, one))
+    return min(misses, key=lambda pair: pair[0]) if misses else None
+
+
+def _curved(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
+    """``model`` with a memoryless law: the best of fits from all its shapes, small and large.
+
+    A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
+    """
+    starts = [model.with_part(law, law.begun(shape, sizes)) for shape in law.shapes for sizes in SIZES]
+    return fit(likelihood, min((fit(likelihood, one, 1) for one in starts), key=lambda f: f.cost).model, FEW_STEPS)
+
+
+def _is_stretched(model: ExtendedModel) -> bool:
+    """Whether a shape of the last effect lies at a bound: beyond it the equation means something else."""
+    last = model.parts[-1]
+    return any(
+        parameter.null is None and not parameter.lower < float(value) < parameter.upper
+        for parameter, value in zip(last.effect.parameters, last.values, strict=True)
+    )

@@ -1,0 +1,91 @@
+"""The effects that were found, each weighed against what could stand in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from smartshoe.diagnosis._evidence import Evidence, Posterior
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._search import BREADTH, additions, allowed
+from smartshoe.diagnosis._sensitivity import Candidate, available
+from smartshoe.diagnosis._validation import (
+    apart,
+)
+from smartshoe.models.effects import Effect, catalogue
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another explanation of what one member explains: ``effect``, None for nothing at all.
+
+    ``margin`` is by how much -2 log of its evidence is worse.
+    """
+
+    effect: str | None
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """An effect that was found.
+
+    ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
+    ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
+    ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
+    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
+    """
+
+    effect: Effect
+    size: float
+    departed: float
+    alternatives: tuple[Alternative, ...]
+    without: Fit
+    laws: tuple[Alternative, ...]
+    fall: float
+
+    @property
+    def name(self) -> str:
+        """The effect's identifier."""
+        return self.effect.name
+
+
+def members_of(
+    evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
+) -> tuple[Member, ...]:
+    made = []
+    for member, departed in zip(best.members, best.departed, strict=True):
+        one = evidence.given.candidates[member]
+        less = fit(likelihood, extended.model.without(one.name), FEW_STEPS)
+        size = apart(likelihood.sessions, less.model, extended.model)
+        others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
+        near = alternatives(evidence, best, member, refused)
+        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
+    return tuple(sorted(made, key=lambda one: -one.size))
+
+
+def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:
+    """The other laws of a member's family, each fitted in its place, nearest first."""
+    channels = {e.name for e in available(likelihood.sessions)}
+    found = []
+    for law in catalogue().values():
+        if law.family != one.effect.family or law.name == one.name or law.name not in channels:
+            continue
+        starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
+        best = min(starts, key=likelihood.cost)
+        found.append(Alternative(law.name, fit(likelihood, best, FEW_STEPS).cost - extended.cost))
+    return tuple(sorted(found, key=lambda a: a.margin))
+
+
+def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:
+    """What could stand in a member's place: every other effect at its best shape, and nothing."""
+    less = tuple(m for m in best.members if m != member)
+    found = [Alternative(None, evidence.posterior(less).score - best.score)]
+    for k in additions(evidence, less, 2 * BREADTH, refused):
+        one = evidence.given.candidates[k]
+        if one.name == evidence.given.candidates[member].name or one.effect.is_flexible:
+            continue
+        other = evidence.posterior((*less, k))
+        if allowed(evidence, other):
+            found.append(Alternative(one.name, other.score - best.score))
+    return tuple(sorted(found, key=lambda one: one.margin))

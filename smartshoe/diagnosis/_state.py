@@ -1,0 +1,91 @@
+"""Where an inference stands: a fit, the linearisation about it and the best set of effects in that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
+from smartshoe.diagnosis._likelihood import Fit, Likelihood
+from smartshoe.diagnosis._search import search, step
+from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
+from smartshoe.diagnosis._session import Session
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.extended import ExtendedModel
+
+LENGTHS = (1.0, 0.5, 0.2, 0.05)  # of a first step
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A linearisation about ``fit``, and the best set in it; ``banned`` are blocks that a law has replaced."""
+
+    given: Linearised
+    evidence: Evidence
+    best: Posterior
+    fit: Fit
+    banned: tuple[str, ...] = ()
+
+    @property
+    def improved(self) -> float:
+        """By how much the best set has more evidence than that of the fit."""
+        return self.evidence.posterior(self.start).score - self.best.score
+
+    @property
+    def start(self) -> Members:
+        """The set of the fit."""
+        return tuple(k for k, one in enumerate(self.given.candidates) if one.name in self.fit.model.names)
+
+    @property
+    def bends(self) -> bool:
+        """Whether a new effect is so large that it bends the linearisation."""
+        new = [size for m, size in zip(self.best.members, self.best.sizes, strict=True) if m not in self.start]
+        return max(new, default=0.0) > self.given.thresholds.linear
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """The candidates of the best set."""
+        return tuple(self.given.candidates[m] for m in self.best.members)
+
+
+def state_at(found: Fit, sessions: Sequence[Session], thresholds: Thresholds, banned: tuple[str, ...] = ()) -> State:
+    """The linearisation about a fit, and the best set in it without what is ``banned``."""
+    return State(*searched(found.model, sessions, thresholds, banned), found, banned)
+
+
+def searched(
+    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, banned: Sequence[str] = ()
+) -> tuple[Linearised, Evidence, Posterior]:
+    """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
+    given = linearised(model, sessions, thresholds)
+    evidence = Evidence(given, given.noise_sd())
+    start = tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)
+    first = step(evidence, start, banned)
+    new = [size for m, size in zip(first.members, first.sizes, strict=True) if m not in start]
+    if max(new, default=0.0) > thresholds.linear:
+        return given, evidence, first
+    return given, evidence, search(evidence, first.members, banned)
+
+
+def with_members(given: Linearised, found: Posterior, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:
+    """``model`` with exactly the effects that were found; new ones on the way to their linear estimates.
+
+    As far as is best of several lengths: a curve that is far from straight is far from its linear estimate.
+    """
+    names = {given.candidates[m].name for m in found.members}
+    for part in model.parts:
+        if part.name not in names:
+            model = model.without(part.name)
+    new = [
+        (given.candidates[member], strengths / given.scales[list(given.candidates[member].columns)])
+        for member, strengths in zip(found.members, found.strengths, strict=True)
+        if given.candidates[member].name not in model.names
+    ]
+
+    def begun(length: float) -> ExtendedModel:
+        out = model
+        for one, strengths in new:
+            out = out.with_part(one.effect, one.start(length * strengths))
+        return out
+
+    return min((begun(length) for length in LENGTHS), key=likelihood.cost) if new else model
