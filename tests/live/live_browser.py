@@ -82,7 +82,10 @@ class Browser:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
 
     def open(self, url: str) -> None:
-        """Go to ``url``."""
+        """Go to ``url``; what the page before complained of (its server may be gone) is forgotten."""
+        self.call("Page.navigate", url="about:blank")
+        self.until("location.href === 'about:blank'")
+        self.errors.clear()
         self.call("Page.navigate", url=url)
 
     def run(self, script: str) -> Any:
