@@ -6,43 +6,42 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._baseline import USUAL
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, fit
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
-from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
 
 
-def with_another_pole(state: State, sessions: Sequence[Session], thresholds: Thresholds) -> State:
+def with_another_pole(state: State, sessions: Sequence[Session]) -> State:
     """The best of fits from several relaxation rates without the effects that add arms to the baseline's.
 
     An effect that bent the baseline's rate at first leaves the true rate to be found as a second arm.
     """
-    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    likelihood = state.likelihood(sessions)
     bare = _without_core_effects(state.fit.model)
     share = USUAL.relaxing_share
-    starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in thresholds.memory_s]
+    starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in state.thresholds.memory_s]
     best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
-    return state_at(best, sessions, thresholds)
+    return state_at(best, sessions, state.thresholds)
 
 
-def with_an_arm_that_creeps(state: State, sessions: Sequence[Session], thresholds: Thresholds) -> State:
+def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     """The best of fits from a baseline that creeps under load, where that of ``state`` falls.
 
     Which of two exponentials is the baseline's is a convention: of a wall it is the one that creeps under load, and
     what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls.
     """
     bare = _without_core_effects(state.fit.model)
-    arms = [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in thresholds.memory_s]
-    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    arms = [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in state.thresholds.memory_s]
+    likelihood = state.likelihood(sessions)
     found = []
     for start in (with_arm(bare, arm) for arm in [*arms, *(arm for _, arm in arms_of(state.fit.model))]):
-        given, _, best = searched(start, sessions, thresholds)
+        given, _, best = searched(start, sessions, state.thresholds)
         found.append(fit(likelihood, with_members(given, best, start, likelihood), FEW_STEPS))
     nearest = min(found, key=lambda one: one.cost + state.evidence.odds * effect_count(one.model))
-    return state_at(nearest, sessions, thresholds)
+    return state_at(nearest, sessions, state.thresholds)
 
 
 def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:

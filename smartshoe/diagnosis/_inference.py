@@ -75,16 +75,16 @@ def infer(
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, (), can_validate)
-    state = _settled(State(given, evidence, best, plain), sessions, thresholds, progress)
+    state = _settled(State(given, evidence, best, plain), sessions, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        again = _settled(with_another_pole(state, sessions, thresholds), sessions, thresholds, progress)
+        again = _settled(with_another_pole(state, sessions), sessions, progress)
         state = again if _is_simpler(again.fit, state, sessions) else state
     if state.fit.model.relaxing_share < 0.0:
-        again = _settled(with_an_arm_that_creeps(state, sessions, thresholds), sessions, thresholds, progress)
+        again = _settled(with_an_arm_that_creeps(state, sessions), sessions, progress)
         state = again if _is_simpler(again.fit, state, sessions) else state
-    lawful = with_laws(state, sessions, thresholds)
-    state = state if lawful is state else _settled(lawful, sessions, thresholds, progress)
+    lawful = with_laws(state, sessions)
+    state = state if lawful is state else _settled(lawful, sessions, progress)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions, screening)
     while (law := likelier_law(found.members, state.banned)) is not None:
@@ -98,19 +98,18 @@ def _judged(
 ) -> Inference:
     """What of a state's effects predicts what is left out, fitted at last, each weighed against its alternatives."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
-    thresholds = given.thresholds
     refused: list[str] = []
     while (worst := worst_member(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
         best = search(evidence, tuple(m for m in best.members if m != worst), [*refused, *state.banned])
-    likelihood = Likelihood(sessions, evidence.noise_sd, extended.model, thresholds)
+    likelihood = state.likelihood(sessions)
     extended = fit(likelihood, with_members(given, best, extended.model, likelihood))
-    while (beyond := extrapolating(sessions, extended.model, thresholds)) is not None:
+    while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
     went_astray = error_of(sessions, extended.model) >= error_of(sessions, plain.model)
-    if not extended.model.parts or went_astray or foreseen(evidence, best) < thresholds.foreseen:
+    if not extended.model.parts or went_astray or foreseen(evidence, best) < state.thresholds.foreseen:
         extended, best = plain, evidence.posterior(())
     members = members_of(evidence, best, refused, likelihood, extended)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused))
@@ -128,8 +127,7 @@ def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
     The number decides where the two hardly read differently: what is immaterial counts for nothing, however sure it is.
     An arm that imitates a lag of a millisecond needs another one in its own place.
     """
-    thresholds = state.given.thresholds
-    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+    thresholds, likelihood = state.thresholds, state.likelihood(sessions)
     new, old = (
         (likelihood.cost(one.model) + state.evidence.odds * effect_count(one.model), effect_count(one.model))
         for one in (other, state.fit)
@@ -139,7 +137,7 @@ def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
     return new[0] < old[0]
 
 
-def _settled(state: State, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress) -> State:
+def _settled(state: State, sessions: Sequence[Session], progress: Progress) -> State:
     """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
 
     In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one.
@@ -151,7 +149,7 @@ def _settled(state: State, sessions: Sequence[Session], thresholds: Thresholds, 
             break
         seen.add(chosen)
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
-        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+        likelihood = state.likelihood(sessions)
         found = min(
             (
                 fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
@@ -159,12 +157,12 @@ def _settled(state: State, sessions: Sequence[Session], thresholds: Thresholds, 
             ),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
-        state = state_at(found, sessions, thresholds, state.banned)
+        state = state_at(found, sessions, state.thresholds, state.banned)
     for name, arm in arms_of(state.fit.model):
-        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
+        likelihood = state.likelihood(sessions)
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
         if _is_simpler(found, state, sessions):
-            state = state_at(found, sessions, thresholds, state.banned)
+            state = state_at(found, sessions, state.thresholds, state.banned)
     return state
 
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
-from smartshoe.diagnosis._members import Member
+from smartshoe.diagnosis._members import Member, begun_with
 from smartshoe.diagnosis._sensitivity import Candidate
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, state_at
-from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
 
 SIZES = (0.5, 5.0)  # typical ones of an effect, from which a fit begins
 
 
-def with_laws(given: State, sessions: Sequence[Session], thresholds: Thresholds) -> State:
+def with_laws(given: State, sessions: Sequence[Session]) -> State:
     """``given`` with a law in the place of a flexible curve, where one follows nearly as well.
 
     No law is exact: one that leaves less than the square of the usual departure, of what the flexible curve explains,
@@ -29,12 +28,11 @@ def with_laws(given: State, sessions: Sequence[Session], thresholds: Thresholds)
     for block in state.chosen:
         if not (block.effect.is_flexible and block.effect.is_memoryless):
             continue
-        likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
-        found = _law_of(block, state, likelihood)
+        found = _law_of(block, state, state.likelihood(sessions))
         if found is not None:
             missed, law = found
-            banned = curves if missed < thresholds.departure**2 else ()
-            state = state_at(law, sessions, thresholds, banned)
+            banned = curves if missed < state.thresholds.departure**2 else ()
+            state = state_at(law, sessions, state.thresholds, banned)
     return state
 
 
@@ -53,18 +51,14 @@ def likelier_law(members: Sequence[Member], banned: Sequence[str]) -> tuple[str,
 
 def with_law(state: State, name: str, law: str, sessions: Sequence[Session]) -> State:
     """``state`` with ``law`` in the place of its member ``name``, and not the other way round again."""
-    thresholds = state.given.thresholds
-    effect = catalogue()[law]
-    likelihood = Likelihood(sessions, state.evidence.noise_sd, state.fit.model, thresholds)
-    bare = state.fit.model.without(name)
-    starts = [bare.with_part(effect, effect.begun(shape)) for shape in effect.shapes]
-    found = fit(likelihood, min(starts, key=likelihood.cost))
-    return state_at(found, sessions, thresholds, (*state.banned, name))
+    likelihood = state.likelihood(sessions)
+    found = fit(likelihood, begun_with(catalogue()[law], state.fit.model.without(name), likelihood))
+    return state_at(found, sessions, state.thresholds, (*state.banned, name))
 
 
 def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[float, Fit] | None:
     """The law that follows nearly as well as a flexible curve, and the share of what that explains which it misses."""
-    thresholds = state.given.thresholds
+    thresholds = state.thresholds
     bare = state.fit.model.without(block.name)
     for part in bare.parts:
         if part.effect.is_memoryless:

@@ -13,6 +13,7 @@ from smartshoe.diagnosis._validation import (
     apart,
 )
 from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.extended import ExtendedModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +72,14 @@ def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit
     for law in catalogue().values():
         if law.family != one.effect.family or law.name == one.name or law.name not in channels:
             continue
-        starts = [less.model.with_part(law, law.begun(shape)) for shape in law.shapes]
-        best = min(starts, key=likelihood.cost)
-        found.append(Alternative(law.name, fit(likelihood, best, FEW_STEPS).cost - extended.cost))
+        start = begun_with(law, less.model, likelihood)
+        found.append(Alternative(law.name, fit(likelihood, start, FEW_STEPS).cost - extended.cost))
     return tuple(sorted(found, key=lambda a: a.margin))
+
+
+def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:
+    """``model`` with a law at the likeliest of its shapes, from where a fit begins."""
+    return min((model.with_part(law, law.begun(shape)) for shape in law.shapes), key=likelihood.cost)
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:

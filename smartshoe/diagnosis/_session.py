@@ -31,7 +31,6 @@ MOST_COARSENED = 6.0  # times: for the sake of speed
 HELD_OUT_EVERY = 3
 FEWEST_CYCLES = 6
 REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
-STANDARD = Thresholds()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +93,7 @@ class Session:
         return self.usable & self.held_out
 
 
-def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds = STANDARD) -> Scale:
+def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds) -> Scale:
     """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
 
     Raises `NotIdentifiableError` where load or reading never changes.
@@ -150,7 +149,7 @@ def prepare(
     held_out: Sequence[bool] | None,
     scale: Scale,
     factor: int,
-    thresholds: Thresholds = STANDARD,
+    thresholds: Thresholds,
 ) -> list[Session]:
     """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out."""
     sessions = []
@@ -175,7 +174,7 @@ def prepare(
 
 
 def at_full_rate(
-    sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds = STANDARD
+    sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds
 ) -> list[Session]:
     """The same sessions without thinning: cycles and what is held out as they are."""
     return [

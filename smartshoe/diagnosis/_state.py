@@ -27,6 +27,11 @@ class State:
     banned: tuple[str, ...] = ()
 
     @property
+    def thresholds(self) -> Thresholds:
+        """What decides."""
+        return self.given.thresholds
+
+    @property
     def improved(self) -> float:
         """By how much the best set has more evidence than that of the fit."""
         return self.evidence.posterior(self.start).score - self.best.score
@@ -34,18 +39,21 @@ class State:
     @property
     def start(self) -> Members:
         """The set of the fit."""
-        return tuple(k for k, one in enumerate(self.given.candidates) if one.name in self.fit.model.names)
+        return _set_of(self.fit.model, self.given)
 
     @property
     def bends(self) -> bool:
         """Whether a new effect is so large that it bends the linearisation."""
-        new = [size for m, size in zip(self.best.members, self.best.sizes, strict=True) if m not in self.start]
-        return max(new, default=0.0) > self.given.thresholds.linear
+        return _bends(self.best, self.start, self.thresholds)
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
         """The candidates of the best set."""
         return tuple(self.given.candidates[m] for m in self.best.members)
+
+    def likelihood(self, sessions: Sequence[Session]) -> Likelihood:
+        """That of models near the fit."""
+        return Likelihood(sessions, self.evidence.noise_sd, self.fit.model, self.thresholds)
 
 
 def state_at(found: Fit, sessions: Sequence[Session], thresholds: Thresholds, banned: tuple[str, ...] = ()) -> State:
@@ -59,12 +67,22 @@ def searched(
     """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
     given = linearised(model, sessions, thresholds)
     evidence = Evidence(given, given.noise_sd())
-    start = tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)
+    start = _set_of(model, given)
     first = step(evidence, start, banned)
-    new = [size for m, size in zip(first.members, first.sizes, strict=True) if m not in start]
-    if max(new, default=0.0) > thresholds.linear:
+    if _bends(first, start, thresholds):
         return given, evidence, first
     return given, evidence, search(evidence, first.members, banned)
+
+
+def _set_of(model: ExtendedModel, given: Linearised) -> Members:
+    """The candidates that stand in a model."""
+    return tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)
+
+
+def _bends(found: Posterior, start: Members, thresholds: Thresholds) -> bool:
+    """Whether an effect that is not in ``start`` is so large that it bends the linearisation."""
+    new = [size for m, size in zip(found.members, found.sizes, strict=True) if m not in start]
+    return max(new, default=0.0) > thresholds.linear
 
 
 def with_members(given: Linearised, found: Posterior, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:

@@ -30,10 +30,8 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     if at.any() and not _one_level(view, at):
         at[:] = False
     known = np.union1d(view.sign * view.dropped_to, common_values(view.reading.values[at], view.thresholds))
-    more = _also_gone(view, at, known) & ~at
-    while more.any():  # with those known cut out the noise is known better
+    while (more := _also_gone(view, at, known) & ~at).any():  # with those known cut out the noise is known better
         at |= more
-        more = _also_gone(view, at, known) & ~at
     if not at.any():
         return
     starts, stops = runs_of(at)

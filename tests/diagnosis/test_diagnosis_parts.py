@@ -45,8 +45,8 @@ def recording(
 
 def sessions_of(*recordings: Recording) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in recordings]
-    scale = full_scale(recordings, usable)
-    return prepare(recordings, usable, None, scale, thinning(recordings, scale)), scale
+    scale = full_scale(recordings, usable, Thresholds())
+    return prepare(recordings, usable, None, scale, thinning(recordings, scale), Thresholds()), scale
 
 
 def likelihood_of(sessions: list[Session], like: ExtendedModel = MODEL) -> Likelihood:
@@ -70,8 +70,8 @@ def test_every_third_load_cycle_is_held_out_and_nothing_else() -> None:
 def test_held_out_recordings_are_never_fitted() -> None:
     pair = [recording(seed=1), recording(seed=2)]
     usable = [one.sensor.present for one in pair]
-    scale = full_scale(pair, usable)
-    first, second = prepare(pair, usable, [False, True], scale, 3)
+    scale = full_scale(pair, usable, Thresholds())
+    first, second = prepare(pair, usable, [False, True], scale, 3, Thresholds())
     assert first.fitted.all()
     assert not second.fitted.any()
 

@@ -58,8 +58,8 @@ def with_reading(given: Recording, change: float = 1.0, offset: float = 0.0) -> 
 def small() -> Linearised:
     pair = [recording(MODEL.with_part(effect("gas_compression"), np.array([0.05])), seed) for seed in range(2)]
     usable = [one.sensor.present for one in pair]
-    scale = full_scale(pair, usable)
-    sessions = prepare(pair, usable, [False, False], scale, 8)
+    scale = full_scale(pair, usable, Thresholds())
+    sessions = prepare(pair, usable, [False, False], scale, 8, Thresholds())
     return linearised(baseline_of(sessions, scale), sessions, Thresholds())
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._ranges import Ranges, ranges_of
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.recording import Recording
@@ -24,8 +25,8 @@ def _ranges(*pairs: tuple[Array, Array]) -> Ranges:
         Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading + noise) for load, reading in pairs
     ]
     usable = [np.ones(TIME_S.size, dtype=bool) for _ in recordings]
-    scale = full_scale(recordings, usable)
-    return ranges_of(prepare(recordings, usable, None, scale, 1), scale)
+    scale = full_scale(recordings, usable, Thresholds())
+    return ranges_of(prepare(recordings, usable, None, scale, 1, Thresholds()), scale)
 
 
 def _proportional(low_n: float, high_n: float) -> tuple[Array, Array]:

@@ -38,8 +38,8 @@ def _session_traits(load: Array, thresholds: Thresholds) -> frozenset[str]:
     time_s = 0.02 * np.arange(load.size)
     recording = Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=MBAR * load)
     usable = [np.ones(load.size, dtype=bool)]
-    scale = full_scale([recording], usable)
-    return excitation_of(prepare([recording], usable, None, scale, 1), thresholds).present
+    scale = full_scale([recording], usable, STANDARD)
+    return excitation_of(prepare([recording], usable, None, scale, 1, STANDARD), thresholds).present
 
 
 def _held_load(hold_s: float, rest_s: float) -> Array:
@@ -94,8 +94,8 @@ def test_hold_is_how_long_a_first_rest_shows_a_zero() -> None:
     time_s = 0.02 * np.arange(load.size)
     rising = _pressed(load + 0.01 * (time_s > 2.0), load, time_s)
     usable = [np.ones(load.size, dtype=bool)]
-    scale = full_scale([rising], usable)
-    sessions = prepare([rising], usable, None, scale, 1)
+    scale = full_scale([rising], usable, STANDARD)
+    sessions = prepare([rising], usable, None, scale, 1, STANDARD)
     model = ExtendedModel(1.0, 0.0, 0.22, 800.0, 100.0, "mbar")
     before, after = decides("hold_s", 1.0, 4.0, lambda t: float(first_rests(sessions, model, t)[0, 1]))
     assert (before, after) == (pytest.approx(0.0, abs=1e-4), pytest.approx(0.005, abs=1e-3))

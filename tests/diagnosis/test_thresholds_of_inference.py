@@ -42,8 +42,8 @@ def _recording(model: ExtendedModel = MODEL, seed: int = 0, peak: float = 1.0, o
 
 def _sessions(runs: list[Recording], held: list[bool]) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in runs]
-    scale = full_scale(runs, usable)
-    return prepare(runs, usable, held, scale, 1), scale
+    scale = full_scale(runs, usable, STANDARD)
+    return prepare(runs, usable, held, scale, 1, STANDARD), scale
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ import numpy as np
 
 from simulators.hidden.effects import EFFECTS
 from simulators.hidden.recordings import HiddenCase
-from smartshoe.diagnosis import Cause, Diagnosis
+from smartshoe.diagnosis import Cause, Diagnosis, Thresholds
 from smartshoe.diagnosis._session import Scale, prepare
 
 # What a fault's word of its own stands for.
@@ -160,7 +160,7 @@ def removed(case: HiddenCase, diagnosis: Diagnosis) -> float | None:
     twins = case.noise_free[len(case.recordings) :]
     model = diagnosis.model
     scale = Scale(model.full_scale_load_n, model.full_scale_reading, case.recordings[0].sensor.unit)
-    sessions = prepare(twins, [np.ones(len(twin), dtype=bool) for twin in twins], None, scale, 1)
+    sessions = prepare(twins, [np.ones(len(twin), dtype=bool) for twin in twins], None, scale, 1, Thresholds())
     before = sum(float(np.sum((s.reading - diagnosis.baseline_model.simulate(s.conditions)) ** 2)) for s in sessions)
     after = sum(float(np.sum((s.reading - model.simulate(s.conditions)) ** 2)) for s in sessions)
     return 1.0 - after / before

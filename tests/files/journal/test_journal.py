@@ -8,7 +8,11 @@ import resource
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -29,6 +33,17 @@ def _written(path: Path, records: list[tuple[int, bytes]]) -> list[int]:
             journal.append(kind, payload)
             ends.append(path.stat().st_size)
     return ends
+
+
+@contextmanager
+def _second_piece(path: Path, broken: ModuleType, name: str, by: Callable[..., Any]) -> Iterator[AppendedFile]:
+    """A file with a first piece, to which a second is appended while something is ``broken``, and a third after it."""
+    with AppendedFile(path, new=True) as file:
+        file.append(b"first\n")
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(broken, name, by)
+            yield file
+        file.append(b"third\n")
 
 
 def _content(path: Path) -> list[tuple[int, bytes]]:
@@ -161,40 +176,30 @@ def test_a_full_disk_ends_with_one_sentence_and_every_acknowledged_record(tmp_pa
     assert contents.torn_bytes == 0  # what did not fit was taken back
 
 
-def test_a_piece_that_was_written_stays_where_ctrl_c_comes_while_it_is_synced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_piece_that_was_written_stays_where_ctrl_c_comes_while_it_is_synced(tmp_path: Path) -> None:
     def interrupted(_: int) -> None:
         raise KeyboardInterrupt
 
-    with AppendedFile(tmp_path / "walk.csv", new=True) as file:
-        file.append(b"first\n")
-        with monkeypatch.context() as patch:
-            patch.setattr(_appending, "_data_to_disk", interrupted)
-            with pytest.raises(KeyboardInterrupt):
-                file.append(b"second\n")
+    with _second_piece(tmp_path / "walk.csv", _appending, "_data_to_disk", interrupted) as file:
+        with pytest.raises(KeyboardInterrupt):
+            file.append(b"second\n")
         assert file.size == 13
-        file.append(b"third\n")
     assert (tmp_path / "walk.csv").read_bytes() == b"first\nsecond\nthird\n"
 
 
-def test_a_piece_that_the_disk_does_not_sync_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_piece_that_the_disk_does_not_sync_is_taken_back(tmp_path: Path) -> None:
     def refused(_: int) -> None:
         raise OSError(errno.EIO, "Input/output error")
 
-    with AppendedFile(tmp_path / "walk.csv", new=True) as file:
-        file.append(b"first\n")
-        with monkeypatch.context() as patch:
-            patch.setattr(_appending, "_data_to_disk", refused)
-            with pytest.raises(InputError, match="takes no more data"):
-                file.append(b"second\n")
-        file.append(b"third\n")
+    with (
+        _second_piece(tmp_path / "walk.csv", _appending, "_data_to_disk", refused) as file,
+        pytest.raises(InputError, match="takes no more data"),
+    ):
+        file.append(b"second\n")
     assert (tmp_path / "walk.csv").read_bytes() == b"first\nthird\n"
 
 
-def test_half_a_piece_is_taken_back_where_ctrl_c_comes_while_it_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_half_a_piece_is_taken_back_where_ctrl_c_comes_while_it_is_written(tmp_path: Path) -> None:
     written = os.write
     pieces = iter([3])
 
@@ -203,13 +208,8 @@ def test_half_a_piece_is_taken_back_where_ctrl_c_comes_while_it_is_written(
             return written(handle, data[:length])
         raise KeyboardInterrupt
 
-    with AppendedFile(tmp_path / "walk.csv", new=True) as file:
-        file.append(b"first\n")
-        with monkeypatch.context() as patch:
-            patch.setattr(os, "write", half)
-            with pytest.raises(KeyboardInterrupt):
-                file.append(b"second\n")
-        file.append(b"third\n")
+    with _second_piece(tmp_path / "walk.csv", os, "write", half) as file, pytest.raises(KeyboardInterrupt):
+        file.append(b"second\n")
     assert (tmp_path / "walk.csv").read_bytes() == b"first\nthird\n"
 
 
