@@ -358,8 +358,9 @@ def _with_offset(
     model: ExtendedModel, zeros: Sequence[Zero], sessions: Sequence[Session], scale: Scale
 ) -> ExtendedModel:
     """``model`` with the recordings' mean offset, so that it gives readings as they are logged."""
-    for zero in zeros:
-        model = model.with_part(zero.effect, np.array([zero.value]))
+    for zero in zeros:  # the chain's end multiplies what is added to the reading before it
+        value = zero.value / model.gain if zero.effect.shifts == "reading" else zero.value
+        model = model.with_part(zero.effect, np.array([value]))
     if not any(zero.effect.shifts == "reading" for zero in zeros):
         rest = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
         if rest != 0.0:

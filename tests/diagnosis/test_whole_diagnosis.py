@@ -1,0 +1,177 @@
+"""Every number of a whole diagnosis, of a unit that is known: what was put in comes out, in its units."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe import Recording, compensate, diagnose, dynamic_protocol
+from smartshoe.diagnosis import Diagnosis
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+FULL_N, FULL_MBAR, STEP_S, NOISE, OFFSET_MBAR = 800.0, 140.0, 0.02, 0.001, 7.0
+PLAIN = ExtendedModel(1.0, 0.08, 0.22, FULL_N, FULL_MBAR, "mbar")
+LOST_N = 40.0
+UNIT = PLAIN.with_part(effect("dead_band"), np.array([LOST_N / FULL_N, 0.2]))
+
+
+def _run(seed: int) -> Recording:
+    """Four heights, each pressed three times, from a rest; the reading as it is logged, with its offset."""
+    protocol = dynamic_protocol((100, 200, 400, 800), repeats=3, rest_s=4.0)
+    time_s = np.arange(0.0, protocol.duration_s, STEP_S)
+    load_n = protocol.load_at(time_s)
+    share = UNIT.simulate(Conditions(time_s, load_n / FULL_N, STEP_S))
+    share = share + NOISE * np.random.default_rng(seed).standard_normal(time_s.size)
+    return Recording.from_arrays(
+        time_s=time_s + 5.0, force_n=load_n, pressure_mbar=OFFSET_MBAR + FULL_MBAR * share, name=f"run_{seed}"
+    )
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Recording]:
+    return [_run(seed) for seed in range(3)]
+
+
+@pytest.fixture(scope="module")
+def found(runs: list[Recording]) -> Diagnosis:
+    return diagnose(runs[:2], hold_out=runs[2])
+
+
+def test_what_was_put_in_is_named_and_nothing_else(found: Diagnosis) -> None:
+    assert found.verdict == "explained"
+    assert {one.name for one in found.causes} == {"dead_band", "zero_offset"}
+    assert found.leftover is None
+    assert found.unit == "mbar"
+    assert found.full_scale_load_n == pytest.approx(FULL_N, rel=0.01)
+    assert "with " in found.says
+    assert [one.size for one in found.causes] == sorted((one.size for one in found.causes), reverse=True)
+
+
+def test_parameters_are_in_newtons_and_millibars_within_their_intervals(found: Diagnosis) -> None:
+    of = {one.name: one.parameters for one in found.causes}
+    lost, offset = of["dead_band"]["lost_load"], of["zero_offset"]["offset"]
+    assert (lost.unit, offset.unit) == ("N", "mbar")
+    assert lost.value == pytest.approx(LOST_N, rel=0.05)
+    assert offset.value == pytest.approx(OFFSET_MBAR, abs=0.2)
+    for one in (lost, offset):
+        assert one.ci95[0] == pytest.approx(one.value - 1.96 * one.sd, rel=1e-4)
+        assert one.ci95[1] == pytest.approx(one.value + 1.96 * one.sd, rel=1e-4)
+
+
+def test_the_joint_parameters_are_those_of_the_model_and_their_covariance_holds_their_sds(found: Diagnosis) -> None:
+    assert found.model is not None
+    listed = list(found.parameters)
+    inside = [one for one in found.model.parts if one.name != "zero_offset"]
+    assert listed == [f"{part.name}.{one.name}" for part in inside for one in part.effect.parameters]
+    sds = np.sqrt(np.diag(np.array(found.covariance)))
+    assert sds == pytest.approx([found.parameters[name].sd for name in listed], rel=1e-9)
+    part = next(one for one in found.model.parts if one.name == "dead_band")
+    assert found.parameters["dead_band.lost_load"].value == pytest.approx(
+        part.values[0] * found.full_scale_load_n, rel=1e-9
+    )
+
+
+def test_what_is_left_on_data_not_fitted_is_the_noise(found: Diagnosis, runs: list[Recording]) -> None:
+    assert found.extended is not None
+    assert found.baseline is not None
+    assert found.gain is not None
+    assert found.extended.rmse == pytest.approx(NOISE * FULL_MBAR, rel=0.03)
+    assert found.baseline.rmse > 3.0 * found.extended.rmse
+    assert (found.gain.rmse_before, found.gain.rmse_after) == (found.baseline.rmse, found.extended.rmse)
+    ratio = found.extended.rmse / found.baseline.rmse
+    assert found.gain.gain_percent == pytest.approx(100.0 * (1.0 - ratio))
+    assert found.explained_percent == pytest.approx(100.0 * (1.0 - ratio**2))
+    assert 98.0 < found.explainable_percent <= 100.0
+    assert found.explained_percent <= found.explainable_percent + 1e-9
+    spread = float(np.std(runs[2].sensor.values))
+    for one in (found.baseline, found.extended):
+        assert one.fit_percent == pytest.approx(100.0 * (1.0 - one.rmse / spread), abs=0.01)
+        assert one.variance_explained_percent == pytest.approx(100.0 * (1.0 - (one.rmse / spread) ** 2), abs=0.01)
+        assert one.unit == "mbar"
+
+
+def test_the_compensated_force_is_wrong_by_the_noise_where_the_baselines_is_wrong_by_the_dead_band(
+    found: Diagnosis,
+) -> None:
+    assert found.extended is not None
+    assert found.baseline is not None
+    # Within the band a little noise is many newtons; no more than the band.
+    assert NOISE * FULL_N < found.extended.force_rmse_n < 0.3 * LOST_N
+    assert found.baseline.force_rmse_n > 1.5 * found.extended.force_rmse_n
+
+
+def test_without_the_cause_the_error_is_what_it_would_be(found: Diagnosis) -> None:
+    assert found.baseline is not None
+    cause = next(one for one in found.causes if one.name == "dead_band")
+    # It is the only effect: without it there is the baseline.
+    assert cause.held_out.rmse_before == pytest.approx(found.baseline.rmse, rel=0.05)
+    assert cause.held_out.ci95[0] < cause.held_out.gain_percent < cause.held_out.ci95[1]
+    beyond = np.sqrt(found.baseline.rmse**2 - (NOISE * FULL_MBAR) ** 2) / FULL_MBAR
+    assert cause.size == pytest.approx(beyond, rel=0.15)
+    said = {one.statistic: one for one in cause.evidence}
+    assert said["size in percent of full scale"].value == pytest.approx(100.0 * cause.size)
+    assert said["gain on held-out data in percent"].value == cause.held_out.gain_percent
+    assert said["fall of -2 log evidence"].value > 100.0
+    margins = [one.margin for one in cause.rivals]
+    assert margins == sorted(margins)
+    assert said["margin to the nearest rival"].value == margins[0]
+    assert cause.rivals[0].effect.replace("_", " ") in said["margin to the nearest rival"].says
+
+
+def test_an_offset_that_is_taken_away_is_an_error_of_its_size(found: Diagnosis) -> None:
+    assert found.extended is not None
+    cause = next(one for one in found.causes if one.name == "zero_offset")
+    off = cause.parameters["offset"].value
+    assert cause.size == pytest.approx(off / found.full_scale_reading, rel=0.02)
+    assert cause.held_out.rmse_after == found.extended.rmse
+    assert cause.held_out.rmse_before == pytest.approx(np.hypot(found.extended.rmse, off), rel=0.02)
+    (seen,) = (one for one in cause.evidence if one.statistic == "deviations from nothing")
+    assert seen.value == pytest.approx(off / cause.parameters["offset"].sd, rel=1e-6)
+
+
+def test_traces_are_the_recordings_and_what_the_models_make_of_them(found: Diagnosis, runs: list[Recording]) -> None:
+    assert [one.name for one in found.traces] == [one.name for one in runs]
+    assert found.extended is not None
+    for one, run in zip(found.traces, runs, strict=True):
+        assert one.time_s == pytest.approx(run.time_s, abs=1e-9)
+        assert one.load_n == pytest.approx(run.force_n, abs=0.01 * FULL_N)
+        assert one.reading == pytest.approx(run.sensor.values, abs=1e-9)
+        assert one.usable.all()
+        assert np.std(one.reading - one.extended) == pytest.approx(NOISE * FULL_MBAR, rel=0.05)
+        assert np.std(one.reading - one.baseline) > 2.0 * NOISE * FULL_MBAR
+    assert [bool(one.held_out.any()) for one in found.traces] == [False, False, True]
+    last = found.traces[2]
+    rms = np.sqrt(np.mean((last.reading - last.extended)[last.held_out] ** 2))
+    assert rms == pytest.approx(found.extended.rmse, rel=1e-6)
+
+
+def test_the_model_gives_readings_as_they_are_logged(found: Diagnosis, runs: list[Recording]) -> None:
+    assert found.model is not None
+    assert "zero_offset" in found.model.names
+    load = runs[2].force_n / found.model.full_scale_load_n
+    simulated = found.model.reading(Conditions(runs[2].time_s - 5.0, load, STEP_S))
+    assert np.sqrt(np.mean((simulated - runs[2].sensor.values) ** 2)) < 2.0 * NOISE * FULL_MBAR
+
+
+def test_a_calibration_of_it_gives_the_load_back(found: Diagnosis, runs: list[Recording]) -> None:
+    made = found.calibration(unit="A", sample_rate_hz=1.0 / STEP_S)
+    load_n, force_n = runs[2].force_n, compensate(runs[2], made)
+    pressed = load_n > 2.0 * LOST_N
+    assert np.sqrt(np.mean((force_n - load_n)[pressed] ** 2)) < 3.0 * NOISE * FULL_N
+
+
+def test_as_json_it_says_the_same(found: Diagnosis) -> None:
+    told = found.to_dict()
+    assert told["schema"] == "smartshoe.diagnosis/1"
+    assert found.extended is not None
+    assert found.gain is not None
+    assert told["extended"]["rmse"] == {"value": found.extended.rmse, "unit": "mbar"}
+    assert told["held_out"]["ci95"] == list(found.gain.ci95)
+    first = told["causes"][0]
+    assert first["size_percent_of_full_scale"] == pytest.approx(100.0 * found.causes[0].size)
+    assert set(first["parameters"]) == set(found.causes[0].parameters)
+    assert told["model"]["full_scale_load_n"] == found.full_scale_load_n

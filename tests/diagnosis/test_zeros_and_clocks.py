@@ -1,0 +1,234 @@
+"""Zeros that are seen and zeros that are not, an area that is declared, readings that come by another clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._aligned import aligned
+from smartshoe.diagnosis._baseline import baseline_of, lagged
+from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
+from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
+from smartshoe.models.core import USUAL_WALL_RATIO
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+STEP_S, FULL_N, FULL_MBAR = 0.04, 800.0, 140.0
+MODEL = ExtendedModel(1.0, 0.08, 0.22, FULL_N, FULL_MBAR, "mbar")
+TIME_S = np.arange(0.0, 60.0, STEP_S)
+PRESSED = np.clip(np.abs((TIME_S / 6.0 + 0.5) % 1.0 - 0.5) * 4.0 - 0.6, 0.0, 1.0) * (TIME_S > 5.0)
+STANDARD = Thresholds()
+
+
+def _run(
+    *, tare: float = 0.0, offset: float = 0.0, foot: float = 0.0, seed: int = 0, unit: str = "mbar", **metadata: object
+) -> Recording:
+    """Shares of full scale: ``tare`` that the load cell shows too much, ``offset`` of the reading, load at the foot."""
+    load = foot + (1.0 - foot) * PRESSED
+    share = MODEL.simulate(Conditions(TIME_S, load, STEP_S)) + offset
+    share = share + 2e-4 * np.random.default_rng(seed).standard_normal(TIME_S.size)
+    shown = {f"pressure_{unit}": FULL_MBAR * share}
+    return Recording.from_arrays(
+        time_s=TIME_S, force_n=FULL_N * (load + tare), name=f"run_{seed}", metadata=metadata, **shown
+    )
+
+
+def _sessions(*runs: Recording) -> tuple[list[Session], Scale]:
+    usable = [one.sensor.present for one in runs]
+    scale = full_scale(runs, usable, STANDARD)
+    return prepare(runs, usable, [False] * len(runs), scale, 1, STANDARD), scale
+
+
+def _zeros(*runs: Recording, left: float = 0.0, remembered: float = 0.0) -> dict[str, Zero]:
+    sessions, scale = _sessions(*runs)
+    model = baseline_of(sessions, scale)
+    return {one.effect.name: one for one in zeros_of(sessions, model, scale, left, remembered, STANDARD)}
+
+
+# -- zeros ------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("offset", [0.03, -0.02])
+def test_a_reading_of_an_unloaded_unit_is_its_zero(offset: float) -> None:
+    found = _zeros(_run(offset=offset, seed=1), _run(offset=offset, seed=2))
+    assert set(found) == {"zero_offset"}
+    assert found["zero_offset"].value == pytest.approx(offset, rel=0.1)
+    assert found["zero_offset"].size == pytest.approx(abs(offset), rel=0.1)
+    assert found["zero_offset"].alternatives == ()
+
+
+@pytest.mark.parametrize("tare", [0.03, -0.02])
+def test_a_load_that_is_shown_where_none_is_borne_is_the_cells_tare(tare: float) -> None:
+    """The effect takes off what the cell shows too much."""
+    found = _zeros(_run(tare=tare, seed=1), _run(tare=tare, seed=2))
+    assert set(found) == {"load_cell_tare"}
+    assert found["load_cell_tare"].value == pytest.approx(-tare, rel=0.1)
+    assert found["load_cell_tare"].size == pytest.approx(abs(tare), rel=0.1)
+
+
+def test_both_zeros_are_told_where_they_differ_the_larger_first() -> None:
+    sessions, scale = _sessions(_run(tare=0.03, offset=-0.015, seed=1))
+    found = zeros_of(sessions, baseline_of(sessions, scale), scale, 0.0, 0.0, STANDARD)
+    assert [one.effect.name for one in found] == ["load_cell_tare", "zero_offset"]
+    # Where they are as large and of one sign the unit bears that load.
+    assert _zeros(_run(tare=0.03, offset=0.03)) == {}
+    assert set(_zeros(_run(tare=0.03, offset=-0.03))) == {"load_cell_tare", "zero_offset"}
+
+
+def test_zeros_that_scatter_are_known_as_well_as_their_mean() -> None:
+    """The standard error of a mean of n, beside how well a rest is known to be zero."""
+    values = [0.03, 0.05, 0.01, 0.03]
+    found = _zeros(*(_run(offset=offset, seed=k) for k, offset in enumerate(values)))
+    error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    assert found == {}  # three hundredths are not four of its deviations
+    apart = _zeros(*(_run(offset=offset + 0.1, seed=k) for k, offset in enumerate(values)))
+    assert apart["zero_offset"].sd == pytest.approx(np.hypot(error, STANDARD.zero_sd), rel=0.1)
+
+
+def test_no_zero_is_told_of_a_sensor_whose_zero_is_a_convention() -> None:
+    sessions, scale = _sessions(_run(offset=0.03, unit="v"))
+    assert zeros_of(sessions, MODEL, scale, 0.0, 0.0, STANDARD) == ()
+    assert _zeros(_run(offset=2.0), _run(offset=2.0)) == {}
+
+
+def test_a_unit_that_is_never_unloaded_leaves_open_which_zero_it_is() -> None:
+    runs = [_run(foot=0.1, offset=0.1, seed=seed) for seed in range(3)]
+    found = _zeros(*runs)
+    assert set(found) == {"zero_offset"}
+    assert found["zero_offset"].value == pytest.approx(0.1, abs=3.0 * found["zero_offset"].sd)
+    assert found["zero_offset"].alternatives == ("load_cell_tare",)
+    # Whatever the model leaves or remembers may lie in the offset too.
+    assert _zeros(*runs, left=0.05) == {}
+    assert _zeros(*runs, remembered=0.5) == {}
+    known = found["zero_offset"].sd
+    assert _zeros(*runs, left=0.01)["zero_offset"].sd == pytest.approx(np.hypot(known, 0.01), rel=0.05)
+    assert _zeros(*runs, remembered=0.1)["zero_offset"].sd > known
+
+
+def test_a_first_rest_is_what_is_commanded_where_a_tare_lifts_the_load() -> None:
+    plain = _run(tare=0.2, offset=0.05)
+    commanded = plain.with_channel(replace(plain.load, name="command", role="command", values=FULL_N * PRESSED))
+    sessions, _ = _sessions(commanded)
+    rests = first_rests(sessions, MODEL, STANDARD)
+    assert rests.shape == (1, 3)
+    load, reading = float(sessions[0].conditions.load[0]), float(np.mean(sessions[0].reading[:25]))
+    assert rests[0, :2] == pytest.approx([load, reading], abs=2e-3)
+
+
+def test_what_has_drifted_by_the_first_rest_is_no_zero() -> None:
+    sessions, _ = _sessions(_run())
+    drifting = MODEL.with_part(effect("zero_drift"), np.array([0.002, 0.0]))
+    (rest,) = first_rests(sessions, drifting, STANDARD)
+    kept = TIME_S < STANDARD.hold_s
+    assert rest[2] == pytest.approx(0.002 * float(np.mean(TIME_S[kept])), rel=0.05)
+    assert rest[1] == pytest.approx(-rest[2], abs=1e-3)
+
+
+def test_each_recordings_own_offset_is_found_under_a_model() -> None:
+    sessions, scale = _sessions(_run(offset=0.02, seed=1), _run(offset=-0.04, seed=2), _run(offset=0.1, seed=3))
+    found = offsets(sessions, baseline_of(sessions, scale))
+    assert found == pytest.approx(np.array([0.02, -0.04, 0.1]) * FULL_MBAR / scale.reading, abs=1e-3)
+
+
+# -- what is declared -------------------------------------------------------------------------------------------
+def _ratio(area_m2: float | None, unit: str = "mbar") -> float:
+    declared = {} if area_m2 is None else {"effective_area_m2": area_m2}
+    return baseline_of(*_sessions(_run(unit=unit, **declared))).wall_ratio
+
+
+def test_an_effective_area_tells_how_much_of_the_load_the_wall_bears() -> None:
+    """1 + k1 x0^2/(nRT): the pressure that the load over the area would make, over the one that is read."""
+    pascal_per_newton = FULL_MBAR * 100.0 / FULL_N
+    for area_m2 in (0.005, 0.02):
+        assert _ratio(area_m2) == pytest.approx(1.0 / (area_m2 * pascal_per_newton), rel=0.02)
+    for impossible in (1.0, 1e-4, None):  # the wall would pull, or bear nearly all
+        assert _ratio(impossible) == USUAL_WALL_RATIO
+    assert _ratio(0.02, "v") == USUAL_WALL_RATIO
+
+
+def test_a_lag_comes_to_a_step_by_its_time_constant() -> None:
+    step = np.concatenate([[0.0], np.ones(400)])
+    answer = lagged(step, 0.01, 0.5)
+    assert answer[1:] == pytest.approx(1.0 - np.exp(-0.01 * np.arange(1, 401) / 0.5), abs=1e-12)
+    assert lagged(3.0 + 0.0 * step, 0.01, 0.5) == pytest.approx(3.0 + 0.0 * step, abs=1e-12)
+
+
+# -- two clocks -------------------------------------------------------------------------------------------------
+def _told(offset_s: tuple[float, ...], rate: tuple[float, ...], runs: list[Recording]) -> Any:
+    usable = tuple(one.sensor.present for one in runs)
+    integrity: Any = SimpleNamespace(clock_offset_s=offset_s, clock_rate=rate, usable=usable)
+    return aligned(runs, integrity, STANDARD)
+
+
+def _late(lag_s: float, rate: float = 0.0) -> Recording:
+    """A reading that shows each moment by ``lag_s`` late, and by ``rate`` more a second away from the middle."""
+    middle_s = 0.5 * (TIME_S[0] + TIME_S[-1])
+    source_s = TIME_S - lag_s - rate * (TIME_S - middle_s)
+    share = np.interp(source_s, TIME_S, PRESSED)
+    return Recording.from_arrays(time_s=TIME_S, force_n=FULL_N * PRESSED, pressure_mbar=FULL_MBAR * share, name="late")
+
+
+@pytest.mark.parametrize(("lag_s", "way"), [(0.6, "earlier"), (-0.6, "later")])
+def test_a_reading_of_another_clock_is_moved_to_the_loads(lag_s: float, way: str) -> None:
+    runs = [_late(lag_s), _run()]
+    found = _told((lag_s, 0.0), (0.0, 0.0), runs)
+    assert found.parts == ()
+    (said,) = found.says
+    assert "late" in said
+    assert f"0.6 s {way}" in said
+    usable = found.usable[0]
+    assert 0 < np.count_nonzero(~usable) <= 0.6 / STEP_S + 2  # no reading was taken for the time beyond its ends
+    assert usable[0 if lag_s > 0 else -1]
+    off = found.recordings[0].sensor.values - FULL_MBAR * PRESSED
+    assert np.max(np.abs(off[usable])) < 0.02 * FULL_MBAR
+    assert found.recordings[1] is runs[1]
+    assert found.usable[1].all()
+
+
+def test_a_clock_that_runs_fast_is_slowed() -> None:
+    found = _told((0.2, 0.0), (0.01, 0.0), [_late(0.2, 0.01), _run()])
+    off = found.recordings[0].sensor.values - FULL_MBAR * PRESSED
+    assert np.max(np.abs(off[found.usable[0]])) < 0.03 * FULL_MBAR
+
+
+def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
+    runs = [_late(0.6), _run()]
+    masks = [one.sensor.present.copy() for one in runs]
+    masks[0][500:520] = False
+    integrity: Any = SimpleNamespace(clock_offset_s=(0.6, 0.0), clock_rate=(0.0, 0.0), usable=tuple(masks))
+    lost = np.flatnonzero(~aligned(runs, integrity, STANDARD).usable[0][:1400])
+    assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
+    assert lost.size == pytest.approx(20, abs=1)
+
+
+def test_a_lag_that_all_share_is_the_models() -> None:
+    found = _told((0.5, 0.52), (0.0, 0.0), [_run(), _run()])
+    ((one, value),) = found.parts
+    assert (one.name, found.says) == ("delay", ())
+    assert value == pytest.approx([0.51])
+    assert _told((0.0, 0.0), (0.0, 0.0), [_run()]).parts == ()
+    # A delay of the catalogue is no longer than its bound.
+    assert _told((9.0, 9.1), (0.0, 0.0), [_run(), _run()]).parts == ()
+
+
+def test_clocks_that_part_from_the_start_on_are_a_drift() -> None:
+    rate = 0.002
+    half_s = 0.5 * float(TIME_S[-1] - TIME_S[0])
+    found = _told((rate * half_s, rate * half_s), (rate, rate), [_run(), _run()])
+    ((one, value),) = found.parts
+    assert one.name == "clock_drift"
+    assert value == pytest.approx([rate], rel=0.01)
+    # It is what such a clock makes of a reading.
+    drifted = MODEL.with_part(one, value).simulate(Conditions(TIME_S, PRESSED, STEP_S))
+    late = _late(rate * half_s, rate).sensor.values / FULL_MBAR
+    plain = MODEL.simulate(Conditions(TIME_S, late, STEP_S))
+    assert np.sqrt(np.mean((drifted - plain) ** 2)) < 5e-3
+    # Clocks that were apart at the start too are moved one by one.
+    assert _told((0.5 + rate * half_s, 0.5 + rate * half_s), (rate, rate), [_run(), _run()]).parts == ()
