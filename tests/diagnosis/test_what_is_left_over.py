@@ -1,4 +1,4 @@
-"""What a model leaves over, by numbers that are known: errors by cycle, what repeats, what wanders, which noise it is."""
+"""What a model leaves over, by known numbers: errors by cycle, what repeats, what wanders, which noise it is."""
 
 from __future__ import annotations
 
@@ -205,7 +205,8 @@ def test_means_of_noise_vary_as_its_own_fast_part_says(sessions: list[Session], 
     rng = np.random.default_rng(3)
     noise = [lfilter([1.0], [1.0, -colour], rng.standard_normal(s.reading.size)) for s in sessions]
     assert abs(slow(sessions, noise, 5.0).z) < 3.0
-    wander = [one + 3.0 * np.sin(2 * np.pi * s.conditions.time_s / 60.0) for one, s in zip(noise, sessions, strict=True)]
+    sines = [3.0 * np.sin(2 * np.pi * s.conditions.time_s / 60.0) for s in sessions]
+    wander = [one + sine for one, sine in zip(noise, sines, strict=True)]
     found = slow(sessions, wander, 5.0)
     assert found.z > 3.0
     assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=0.25)
