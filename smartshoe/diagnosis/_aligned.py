@@ -17,8 +17,6 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, effect
 from smartshoe.recording import Recording
 
-LARGEST_DELAY_S = 2.9
-
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
@@ -37,8 +35,9 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     plain = Aligned(list(recordings), list(integrity.usable), (), ())
     if not lags.any() and not rates.any():
         return plain
-    if not rates.any() and np.ptp(lags) <= thresholds.same * largest <= thresholds.same * LARGEST_DELAY_S:
-        return replace(plain, parts=((effect("delay"), np.array([float(np.mean(lags))])),))
+    delay = effect("delay")
+    if not rates.any() and np.ptp(lags) <= thresholds.same * largest and largest < delay.parameters[0].upper:
+        return replace(plain, parts=((delay, np.array([float(np.mean(lags))])),))
     half_s = 0.5 * np.array([recording.duration_s for recording in recordings])
     begins = lags - rates * half_s
     if rates.all() and np.max(np.abs(begins)) <= thresholds.same * largest:

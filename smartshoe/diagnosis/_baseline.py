@@ -10,11 +10,12 @@ from scipy.signal import lfilter
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.models.core import USUAL_WALL_RATIO
-from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.extended import BASELINE, ExtendedModel
 
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
-POLES_PER_S = np.geomspace(0.01, 20.0, 31)
-LEAST_RELAXING, MOST_RELAXING = -0.9, 5.0
+_, SHARE, RATE = BASELINE
+# A resolution: neighbours differ by less than fits from them move. Half and twice as many: the same answers.
+POLES_PER_S = np.geomspace(RATE.lower, RATE.upper, 35)
 
 
 def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
@@ -39,7 +40,7 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
         gain = float(fast + slow)
         if gain <= 0 or fast <= 0:
             continue
-        share = min(max(gain / float(fast) - 1.0, LEAST_RELAXING), MOST_RELAXING)
+        share = min(max(gain / float(fast) - 1.0, SHARE.lower), SHARE.upper)
         fast = gain / (1.0 + share)
         slow = gain - fast
         error = float(

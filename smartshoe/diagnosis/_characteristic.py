@@ -11,8 +11,6 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
-STANDARD = Thresholds()
-
 
 @dataclass(frozen=True, eq=False)
 class Branches:
@@ -35,7 +33,7 @@ class Branches:
         return 0.5 * (self.ups + self.downs)
 
 
-def branches_of(recording: Recording, thresholds: Thresholds = STANDARD) -> Branches | None:
+def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None:
     """The two branches; None where the load seldom passes the same place in both directions."""
     if not recording.of_role("load") or len(recording.sensors) != 1:
         return None
@@ -68,7 +66,7 @@ def branches_of(recording: Recording, thresholds: Thresholds = STANDARD) -> Bran
     return Branches(recording, place, rising, falling, by_curve, _explained(y[moving], either[moving]))
 
 
-def friction_of(recording: Recording, thresholds: Thresholds = STANDARD) -> str | None:
+def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:
     """A sentence where the reading follows the load's direction and not the load; None where it does not."""
     found = branches_of(recording, thresholds)
     if found is None or found.by_curve >= thresholds.follows or found.by_branch < thresholds.follows:
@@ -87,7 +85,7 @@ def _friction(found: Branches) -> str:
     )
 
 
-def characteristic_of(recording: Recording, thresholds: Thresholds = STANDARD) -> str | None:
+def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | None:
     """A sentence on curve and loop of the reading over its load; None where the two hardly go together."""
     found = branches_of(recording, thresholds)
     if found is None or max(found.by_curve, found.by_branch) < thresholds.follows:

@@ -4,7 +4,7 @@ With the reading's residual y, in standard deviations of what counts as noise, a
 
     y = X0 b + sum over all candidates x_j s_j + sum over e in S ( x_e a_e + Phi_e w_e ) + noise
 
-* b, the baseline's own changes: flat prior;
+* b ~ N(0, 1), the baseline's own changes: anything up to full scale, which is flat;
 * s_j ~ N(0, material^2): what is immaterial may always be there, of any kind, and needs no name;
 * a_e ~ N(0, strength_sd^2): the effects in S (spike and slab: George and McCulloch 1993);
 * w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
@@ -35,8 +35,6 @@ from smartshoe.diagnosis._sensitivity import (
 )
 
 Members = tuple[int, ...]
-
-OWN_SD = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +136,7 @@ class Evidence:
         """Of several strengths the direction that the data asks for, of unit length."""
         index = [*range(1, 1 + self.given.own), *columns]
         part = self.gram[np.ix_(index, index)]
-        part = part + np.diag([OWN_SD**-2] * self.given.own + [self.thresholds.strength_sd**-2] * len(columns))
+        part = part + np.diag([1.0] * self.given.own + [self.thresholds.strength_sd**-2] * len(columns))
         found = np.linalg.solve(part, self.gram[index, 0])[self.given.own :]
         size = float(np.linalg.norm(found))
         return np.asarray(found / size) if size > 0 else np.ones(len(columns)) / math.sqrt(len(columns))
@@ -218,7 +216,7 @@ class Evidence:
     def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[Index, Array]:
         """Columns that take part, and the standard deviations (p,) of their coefficients."""
         prior = np.full(self._last - 1, self.thresholds.material)
-        prior[: self.given.own] = OWN_SD
+        prior[: self.given.own] = 1.0
         for member in members:
             prior[[c - 1 for c in self.given.candidates[member].columns]] = self.thresholds.strength_sd
         index = np.arange(1, self._last, dtype=np.intp)
@@ -242,7 +240,7 @@ class Evidence:
         columns = [*range(1, 1 + given.own), *(c for m in members for c in given.candidates[m].columns)]
         # What the rest says little of is taken for nothing there, rather than for anything up to the largest effect.
         sds = [max(float(abs(s)), limits.material) for part in self.posterior(members).strengths for s in part]
-        precision = np.array([OWN_SD**-2] * given.own + [sd**-2 for sd in sds])
+        precision = np.array([1.0] * given.own + [sd**-2 for sd in sds])
         raw = self._folds
         errors = np.zeros(len(raw))
         total = sum(raw)

@@ -16,8 +16,6 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
 
-STANDARD = Thresholds()
-
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
@@ -30,7 +28,7 @@ class Excitation:
     peaks: tuple[float, ...]
     repeats: int
     present: frozenset[str]
-    thresholds: Thresholds = STANDARD
+    thresholds: Thresholds
 
     def limits(self) -> list[str]:
         """A sentence for each thing of which this data says nothing."""
@@ -54,7 +52,7 @@ class Excitation:
         return said
 
 
-def excitation_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD) -> Excitation:
+def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excitation:
     """What all sessions together hold."""
     rises = [rise for session in sessions for rise in _rises(session, thresholds)]
     alike = float(np.log1p(thresholds.same))
@@ -67,17 +65,15 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds = STANDARD
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
     rest_s = max((rest for own in rests_s for rest in own), default=0.0)
     pauses = [rest for own in rests_s for rest in own[1:-1]]
-    # A reading has come to its zero when any sensor's lag is over.
-    settled_s = thresholds.clear * thresholds.sensor_lag_s
     repeats = max(kinds.values(), default=0)
     found = {
         "rates": len(rates) > 1,
         "peaks": len(peaks) > 1,
         "steps": any(rise.rate * thresholds.echo_s > thresholds.same for rise in rises),
         "holds": hold_s >= thresholds.hold_s,
-        "rests": rest_s >= settled_s,
+        "rests": rest_s >= thresholds.settled_s,
         "idle": rest_s >= thresholds.idle_s,
-        "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), settled_s),
+        "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), thresholds.settled_s),
         "repeats": repeats > 1,
         "minor_loops": any(rise.is_minor for rise in rises),
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,

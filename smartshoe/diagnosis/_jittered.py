@@ -7,10 +7,10 @@ from scipy.ndimage import gaussian_filter1d
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects import Conditions, timing_jitter
+from smartshoe.signals.noise import UNIFORM_SD
 
 BLOCK = 12  # samples, over which the slope at which the noise is largest is a mean
 PASSES = 3  # a ramp shorter than the jitter seems steeper than it is read; from the second pass on it settles
-LEAST_SAMPLES = 0.3  # standard deviation: what it rounds off a corner then is a tenth of what a whole sample does
 
 
 def as_sampled(load: Array, reading: Array, step_s: float) -> Array:
@@ -23,8 +23,8 @@ def as_sampled(load: Array, reading: Array, step_s: float) -> Array:
     seen = load
     for _ in range(PASSES):
         sd = jitter_s(seen, reading, step_s) / step_s
-        if sd < LEAST_SAMPLES:
-            return load
+        if sd < UNIFORM_SD:
+            return load  # a time stamp says no more
         seen = np.asarray(gaussian_filter1d(load, sd, mode="nearest"))
     return seen
 

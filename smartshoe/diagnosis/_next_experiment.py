@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,8 +16,6 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
 from smartshoe.protocol import Protocol
 
-SEPARATED = 6.0  # difference of -2 log likelihood under which another effect does as well
-DOUBTFUL = 5.0 * SEPARATED  # margins below this deserve another experiment
 SHOWN_BY = {
     "rates": "rates",
     "holds": "long_hold",
@@ -58,11 +57,9 @@ def next_experiment(
     names = (cause.name, *cause.equivalents)
     pair = f"{cause.name} and {rival}".replace("_", " ")
     channel = _channel(cause.name, rival, sessions)
-    if expected[best] < DOUBTFUL and channel is not None:
-        says = f"no load history tells {pair} apart well: log the {channel} too"
-        return NextExperiment(names, None, channel, says, expected[best])
-    if expected[best] < SEPARATED:
-        says = f"no load history that a machine can run tells {pair} apart: take either, they predict the same"
+    if expected[best] < -2.0 * math.log(excitation.thresholds.false_name):
+        instead = f"log the {channel} too" if channel else "take either, they predict the same"
+        says = f"no load history that a machine can run tells {pair} apart: {instead}"
         return NextExperiment(names, None, channel, says, expected[best])
     says = (
         f"run {best.replace('_', ' ')}: it should tell {pair} apart by {expected[best]:,.0f} of -2 log likelihood,"

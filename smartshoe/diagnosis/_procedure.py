@@ -27,13 +27,13 @@ from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
-from smartshoe.signals.noise import NORMAL_95
+from smartshoe.signals.noise import NORMAL_95, UNIFORM_SD
 
 
 def _silent(_: str) -> None:
@@ -109,15 +109,15 @@ def _refused(
         0.0,
         0.0,
         data_faults=integrity.faults,
-        limits=(*refusals, *(said for said in map(_seen, recordings) if said is not None)),
+        limits=(*refusals, *(said for one in recordings if (said := _seen(one, thresholds)) is not None)),
         thresholds=thresholds,
     )
 
 
-def _seen(recording: Recording) -> str | None:
+def _seen(recording: Recording, thresholds: Thresholds) -> str | None:
     """What is known of a recording without a model."""
-    decay = decay_of(recording)
-    return decay.says if decay is not None else characteristic_of(recording)
+    decay = decay_of(recording, thresholds)
+    return decay.says if decay is not None else characteristic_of(recording, thresholds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def _diagnosed(
     everything = max(left, after.size)
     silent = given.is_no_unit or not found.can_validate
     names = names_of(found.members, everything, thresholds)
-    names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings, thresholds))
+    names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
@@ -210,15 +210,13 @@ def _diagnosed(
     )
 
 
-def _is_within_a_sample(
-    name: Name, model: ExtendedModel, recordings: Sequence[Recording], thresholds: Thresholds
-) -> bool:
+def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[Recording]) -> bool:
     """Whether a latency is too short to be one: a time stamp does not say where within its interval a sample lies."""
     if not (name.effect.is_latency and name.effect.parameters[0].unit == "s"):
         return False
     values = next(part.values for part in model.parts if part.name == name.member.name)
     step_s = max(recording.sample_time_s for recording in recordings)
-    return abs(float(values[0])) < thresholds.timing_resolution * step_s
+    return abs(float(values[0])) < UNIFORM_SD * step_s
 
 
 def _verdict(
@@ -343,7 +341,7 @@ def _zero_cause(
     seen = Statement(
         "deviations from nothing",
         deviations,
-        thresholds.zero_deviations,
+        largest_of_noise(1, thresholds),
         f"it is {deviations:.3g} standard deviations from nothing",
     )
     sure = (

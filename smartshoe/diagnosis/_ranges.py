@@ -11,8 +11,6 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 
-STANDARD = Thresholds()
-
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
@@ -22,7 +20,7 @@ class Ranges:
     is_trap: bool = False
 
 
-def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds = STANDARD) -> Ranges:
+def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> Ranges:
     """A sentence for each thing that the loads' range does not allow to be said."""
     said: list[str] = []
     kept = [(s.conditions.load[s.usable], s.reading[s.usable]) for s in sessions if s.usable.sum() > 10]

@@ -17,7 +17,7 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._denoise import noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals.loading import turning_points
@@ -28,9 +28,6 @@ SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 6.0  # times: for the sake of speed
-HELD_OUT_EVERY = 3
-FEWEST_CYCLES = 6
-REST_NOISE = 4.0  # standard deviations of the load's noise: within them a rest is a rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +62,7 @@ class Session:
     """One recording on an even grid, in shares of full scale (`smartshoe.models.effects.Conditions`).
 
     ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
-    left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a tenth of the time where there are none.
+    left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a part of the time where there are few.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
     ``quiet`` is the load at the full rate.
     """
@@ -168,7 +165,7 @@ def prepare(
     count = 0
     for session in sessions:
         number = session.cycle + count
-        kept.append(replace(session, held_out=number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1))
+        kept.append(replace(session, held_out=(number + 1) % thresholds.held_out_every == 0))
         count = int(number[-1]) + 1
     return kept
 
@@ -223,10 +220,11 @@ def _session(
     load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, thresholds.standing)
+    reach = largest_of_noise(load.size, thresholds) * quiet.raw
     beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
     conditions = Conditions(
         time_s[::factor],
-        smoothed(_rests_levelled(load, base + 0.25 * thresholds.standing, quiet.raw), weights, factor),
+        smoothed(_rests_levelled(load, base + 0.25 * thresholds.standing, reach), weights, factor),
         step_s * factor,
         quiet.left * float(np.sqrt(np.sum(weights**2))),
         temperature_k=beside.get("temperature_k"),
@@ -261,13 +259,13 @@ def _quiet(load: Array, reading: Array, step_s: float) -> Quiet:
     return Quiet(as_sampled(quiet, reading, step_s), raw, left)
 
 
-def _rests_levelled(load: Array, level: float, noise: float) -> Array:
-    """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise."""
+def _rests_levelled(load: Array, level: float, reach: float) -> Array:
+    """``load`` with each rest at its mean: an unloaded unit feels none of the load cell's noise, up to ``reach``."""
     out = load.copy()
     for first, last in zip(*runs_of(load < level), strict=True):
         part = load[first:last]
         middle = float(np.median(part))
-        still = np.abs(part - middle) < REST_NOISE * noise
+        still = np.abs(part - middle) < reach
         if still.sum() > 10:
             out[first:last][still] = part[still].mean()
     return out
@@ -317,8 +315,9 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
         while end + 1 < load.size and load[end + 1] <= level:
             end += 1
         starts.append(end)
-    if len(starts) < FEWEST_CYCLES:
-        parts = np.arange(load.size) * (2 * FEWEST_CYCLES) // load.size
+    fewest = 2 * thresholds.held_out_every  # so that two are judged
+    if len(starts) < fewest:
+        parts = np.arange(load.size) * (2 * fewest) // load.size
         return np.asarray(parts, dtype=np.intp)
     cycle = np.zeros(load.size, dtype=np.intp)
     cycle[starts[1:]] = 1

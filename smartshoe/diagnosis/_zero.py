@@ -15,11 +15,9 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Scale, Session
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
-
-FIRST_REST_S = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +66,7 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         most = max(1, round(thresholds.hold_s / session.conditions.step_s))  # nothing has crept yet
         first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
         kept = session.fitted[first]
-        if kept.sum() * session.conditions.step_s >= FIRST_REST_S:
+        if kept.sum() * session.conditions.step_s >= thresholds.settled_s:
             drifted = float(np.mean(_drifted(session, model)[first][kept]))
             reading = float(np.mean(session.reading[first][kept])) - drifted
             found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
@@ -107,7 +105,7 @@ def zeros_of(
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
     reading_sd = float(np.hypot(reading_sd, thresholds.departure * np.mean(np.abs(drifted))))
     load, reading = float(np.mean(loads)), float(np.mean(readings))
-    many = thresholds.zero_deviations
+    many = largest_of_noise(1, thresholds)
     if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
         return ()  # a convention of the sensor's; or the reading agrees with the load, and the unit bears it
     named = []
@@ -139,6 +137,6 @@ def _unseen(
     below = thresholds.departure * lowest
     drifted = thresholds.departure * float(np.mean([np.ptp(_drifted(one, model)) for one in fitted]))
     sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
-    if abs(mean) > thresholds.foreign_zero or abs(mean) < thresholds.zero_deviations * sd:
+    if abs(mean) > thresholds.foreign_zero or abs(mean) < largest_of_noise(1, thresholds) * sd:
         return ()
     return (Zero(sensor, mean, sd, abs(mean), (machine.name,)),)

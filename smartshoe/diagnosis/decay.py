@@ -19,8 +19,6 @@ from smartshoe.signals.noise import NORMAL_95, white_noise_sd
 
 Course = Literal["exponential", "slower", "faster", "undecided"]
 
-STANDARD = Thresholds()
-
 
 @dataclass(frozen=True, slots=True)
 class Decay:
@@ -47,8 +45,9 @@ class Decay:
     says: str
 
 
-def decay_of(recording: Recording, thresholds: Thresholds = STANDARD) -> Decay | None:
+def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Decay | None:
     """The decay of the first sensor's reading, or None: the load moves, or the reading does not fall steadily."""
+    thresholds = thresholds or Thresholds()
     standing = _load_stands_still(recording, thresholds.standing)
     if standing is None or not recording.sensors:
         return None

@@ -158,7 +158,7 @@ def _window_lags(
     moving = np.abs(d_load) > thresholds.faulty_share * np.max(np.abs(d_load))
     limit = largest_of_noise(grid.size, thresholds) * float(np.median(np.abs(d_reading[moving]))) + 1e-300
     d_reading = np.clip(d_reading, -limit, limit)  # edges of dropouts and jumps
-    longest_s = thresholds.clear * thresholds.hold_s
+    longest_s = thresholds.lasting_s
     most = min(int(np.ceil(longest_s / width_s)), grid.size // 6)
     windows = int(max(1, min(WINDOWS, grid.size * width_s / (thresholds.clear * longest_s))))
     lags_bins = np.arange(-most, most + 1)

@@ -9,9 +9,10 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._scales import ROUNDING, SECOND_DIFFERENCE
-from smartshoe.integrity._view import LATTICE_ERROR, View, toggling
+from smartshoe.integrity._view import View, toggling
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
+from smartshoe.signals.noise import UNIFORM_SD
 
 
 def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
@@ -87,7 +88,7 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     beyond = np.maximum(0.5 * (motion * repeats - step), 0.0)
     many = np.maximum(beyond / (3.0 * np.maximum(motion, 1e-300)), 1.0)
     noise = np.maximum(reading.noise[starts], reading.noise[stops])
-    width = np.hypot(noise, LATTICE_ERROR * step)
+    width = np.hypot(noise, UNIFORM_SD * step)
     out: Array = repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
     return out
 

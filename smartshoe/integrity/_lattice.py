@@ -8,8 +8,9 @@ import numpy as np
 
 from smartshoe.arrays import Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._view import LATTICE_ERROR, View
+from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
+from smartshoe.signals.noise import UNIFORM_SD
 
 
 def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
@@ -23,7 +24,7 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         return
     if not _stands_while_load_moves(view, step):
         return
-    error = LATTICE_ERROR * step
+    error = UNIFORM_SD * step
     noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
     if error < view.thresholds.material * view.span or error < view.thresholds.same * noise:
         return

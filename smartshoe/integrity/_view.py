@@ -20,8 +20,6 @@ from smartshoe.integrity._scales import (
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
 
-LATTICE_ERROR = 1.0 / math.sqrt(12.0)  # of a step: root mean square of what rounding to a grid adds
-
 
 def toggling(step: float, thresholds: Thresholds) -> float:
     """No clear noise: half a grid ``step`` is what the toggling of a silent signal between two levels looks like."""

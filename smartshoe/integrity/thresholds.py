@@ -40,12 +40,8 @@ class Thresholds:
     zero_sd: float = threshold(
         4e-4, "share of full scale", "how well a recording's rest is known to be zero", "load cells: 0.02 % of rating"
     )
-    zero_deviations: float = threshold(4.0, "standard deviations", "from which an offset is named", "one in 16,000")
     linear: float = threshold(
         0.01, "share of full scale", "an effect up to which one linearisation serves for all", "squares: 1e-4"
-    )
-    timing_resolution: float = threshold(
-        0.25, "sample intervals", "a latency shorter than this lies within what a time stamp says", "uniform: sd 0.29"
     )
     tolerable: float = threshold(
         1.5e-3,
@@ -94,6 +90,9 @@ class Thresholds:
     memory_s: tuple[float, ...] = threshold(
         (0.3, 3.0, 30.0), "s", "time constants by which a law may follow otherwise", "one a decade of the protocols"
     )
+    held_out_every: int = threshold(
+        3, "load cycles", "of which one judges and fits nothing, where no recording is held out", "two thirds to fit"
+    )
     # What an experiment can show at all.
     false_alarm: float = threshold(
         1e-4,
@@ -114,9 +113,6 @@ class Thresholds:
         0.02, "share of the span", "within which a load, or a reading that is lost, stands still", "judgement"
     )
     echo_s: float = threshold(0.1, "s", "within which a reading answers a corner of its load", "slowest sensor known")
-    sensor_lag_s: float = threshold(
-        0.2, "s", "a shorter lag may be the sensor's own, a longer one is of two clocks", "twice the echo"
-    )
     local: int = threshold(64, "samples", "over which a local scale is taken", "a median to 15 %")
     bins: int = threshold(4000, "bins", "to which long recordings are thinned where lags are looked for", "speed")
     hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
@@ -126,6 +122,21 @@ class Thresholds:
     def few(self) -> int:
         """How many samples or runs are no chance: a ``faulty_share`` of the fewest samples."""
         return max(round(self.faulty_share * self.least_samples), 1)
+
+    @property
+    def sensor_lag_s(self) -> float:
+        """A shorter lag may be the sensor's own, a longer one is of two clocks: clear of any echo."""
+        return self.clear * self.echo_s
+
+    @property
+    def settled_s(self) -> float:
+        """When any sensor's lag is over: a reading has come to its zero."""
+        return self.clear * self.sensor_lag_s
+
+    @property
+    def lasting_s(self) -> float:
+        """What lasts as long is no matter of moments, but a drift: clear of the shortest hold that shows creep."""
+        return self.clear * self.hold_s
 
     @property
     def cycle(self) -> float:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.recording import Recording
 
@@ -20,7 +21,7 @@ TRIANGLE = 100.0 * (2.0 * np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0) - 1.0)
 
 
 def _said(reading: Array, load: Array = TRIANGLE) -> str | None:
-    return characteristic_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading))
+    return characteristic_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading), Thresholds())
 
 
 def _rising() -> Array:

@@ -205,11 +205,11 @@ def test_a_gains_interval_holds_the_gain_and_shrinks_to_nothing_for_nothing() ->
 
 def test_one_rate_is_said_to_say_nothing_of_rates() -> None:
     sessions, _ = sessions_of(recording(rates=(200, 200)))
-    said = " ".join(excitation_of(sessions).limits())
+    said = " ".join(excitation_of(sessions, Thresholds()).limits())
     assert "one loading rate only" in said
     several, _ = sessions_of(recording())
-    assert "one loading rate only" not in " ".join(excitation_of(several).limits())
-    assert {"rates", "rests", "repeats"} <= excitation_of(several).present
+    assert "one loading rate only" not in " ".join(excitation_of(several, Thresholds()).limits())
+    assert {"rates", "rests", "repeats"} <= excitation_of(several, Thresholds()).present
 
 
 @pytest.mark.parametrize("name", sorted(EXPERIMENTS))

@@ -26,7 +26,7 @@ def _ranges(*pairs: tuple[Array, Array]) -> Ranges:
     ]
     usable = [np.ones(TIME_S.size, dtype=bool) for _ in recordings]
     scale = full_scale(recordings, usable, Thresholds())
-    return ranges_of(prepare(recordings, usable, None, scale, 1, Thresholds()), scale)
+    return ranges_of(prepare(recordings, usable, None, scale, 1, Thresholds()), scale, Thresholds())
 
 
 def _proportional(low_n: float, high_n: float) -> tuple[Array, Array]:

@@ -126,3 +126,15 @@ def test_still_is_the_slowest_ramp() -> None:
 def test_false_alarm_sets_the_largest_deviate_that_noise_makes() -> None:
     rare, common = decides("false_alarm", 1e-6, 1e-2, lambda t: largest_of_noise(10_000, t))
     assert rare > 6.0 > 5.0 > common
+
+
+def test_held_out_every_is_the_share_of_load_cycles_that_judges() -> None:
+    recording = _pressed(TRIANGLE)
+    usable = [np.ones(TIME_S.size, dtype=bool)]
+    scale = full_scale([recording], usable, STANDARD)
+
+    def held_out(thresholds: Thresholds) -> list[int]:
+        (session,) = prepare([recording], usable, None, scale, 1, thresholds)
+        return sorted({int(number) for number in session.cycle[session.held_out]})
+
+    assert decides("held_out_every", 3, 5, held_out) == ([2, 5, 8], [4, 9])

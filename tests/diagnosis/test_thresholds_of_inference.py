@@ -100,15 +100,15 @@ def test_unknown_past_is_what_an_arm_may_remember_of_before(curved: Linearised) 
 @pytest.mark.parametrize(
     ("field", "low", "high", "named"),
     [
-        ("foreign_zero", 0.02, 0.3, (False, True)),  # of the reading's span
-        ("zero_sd", 4e-4, 0.02, (True, False)),
-        ("zero_deviations", 4.0, 200.0, (True, False)),
+        ("foreign_zero", 0.002, 0.3, (False, True)),  # of the reading's span
+        ("zero_sd", 4e-4, 0.002, (True, False)),
+        ("false_alarm", 1e-4, 1e-100, (True, False)),
     ],
 )
 def test_a_zero_is_named_by_its_size_and_how_well_it_is_known(
     field: str, low: float, high: float, named: tuple[bool, bool]
 ) -> None:
-    sessions, scale = _sessions([_recording(seed=seed, offset=0.04) for seed in range(2)], [False] * 2)
+    sessions, scale = _sessions([_recording(seed=seed, offset=0.005) for seed in range(2)], [False] * 2)
 
     def is_named(thresholds: Thresholds) -> bool:
         return bool(zeros_of(sessions, MODEL, scale, 0.0, 0.0, thresholds))
@@ -122,12 +122,11 @@ def test_seen_confidence_is_that_of_an_offset_at_rest() -> None:
     assert {one.name: one.confidence for one in found.causes} == {"zero_offset": 0.83}
 
 
-def test_timing_resolution_is_how_short_a_delay_a_time_stamp_shows() -> None:
-    model = MODEL.with_part(effect("delay"), np.array([0.2 * STEP_S]))
+@pytest.mark.parametrize(("samples", "within"), [(0.28, True), (0.3, False)])
+def test_a_delay_below_the_uncertainty_of_a_time_stamp_is_none(samples: float, within: bool) -> None:
+    model = MODEL.with_part(effect("delay"), np.array([samples * STEP_S]))
     member: Any = SimpleNamespace(name="delay")
-    name = Name(member, effect("delay"), 0.9, 1.0, ())
-    within = decides("timing_resolution", 0.1, 0.25, lambda t: _is_within_a_sample(name, model, [_recording()], t))
-    assert within == (False, True)
+    assert _is_within_a_sample(Name(member, effect("delay"), 0.9, 1.0, ()), model, [_recording()]) == within
 
 
 def test_tolerable_is_the_structure_that_a_good_unit_may_leave() -> None:

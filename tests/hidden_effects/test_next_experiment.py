@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,7 @@ from simulators.hidden._scaling import machine_of
 from simulators.hidden.recordings import HiddenCase, hide
 from simulators.provider import provider
 from smartshoe.calibration import Calibration
-from smartshoe.diagnosis import Cause, Diagnosis, diagnose
-from smartshoe.diagnosis._next_experiment import SEPARATED
+from smartshoe.diagnosis import Cause, Diagnosis, Thresholds, diagnose
 from smartshoe.models.twin import TwinBladder
 from smartshoe.protocol import Protocol
 
@@ -56,7 +57,9 @@ def test_an_ambiguous_pair_becomes_certain_after_the_proposed_experiment(name, p
     second = diagnose([*case.recordings, added], case.hold_out)
     assert of_family(second, "timing").name == name
     # No law is exact, so that the other stays among the equivalents; what speaks against it grows.
-    assert margin(second, name) > max(SEPARATED, min(abs(rival.margin) for rival in doubtful.rivals))
+    assert margin(second, name) > max(
+        -2.0 * math.log(Thresholds().false_name), min(abs(rival.margin) for rival in doubtful.rivals)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -80,10 +80,10 @@ def test_echo_is_how_late_a_reading_may_answer_a_knock() -> None:
     assert "reading has" not in " ".join(fault.says for fault in _found(late, echo_s=0.4).faults)
 
 
-def test_sensor_lag_is_the_longest_that_is_not_of_two_clocks() -> None:
+def test_twice_the_echo_is_the_longest_lag_that_is_not_of_two_clocks() -> None:
     late = _pressed(np.interp(TIME_S - 0.35, TIME_S, WANDERING) + 1e-3 * NOISE, WANDERING)
-    assert "two_clocks" in _kinds(late, sensor_lag_s=0.2)
-    assert "two_clocks" not in _kinds(late, sensor_lag_s=0.5)
+    assert "two_clocks" in _kinds(late, echo_s=0.1)
+    assert "two_clocks" not in _kinds(late, echo_s=0.25)
 
 
 def test_bins_are_how_finely_a_lag_is_looked_for() -> None:
