@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds, described
 from smartshoe.diagnosis._baseline import baseline_of
-from smartshoe.diagnosis._evidence import OWN_SD, Evidence
+from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.models.effects import Conditions, effect
@@ -75,7 +75,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         precision = nuisance_precision(session, given.model, limits)
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
         prior = np.full(rows.shape[1] - 1, limits.material)
-        prior[: given.own] = OWN_SD
+        prior[: given.own] = 1.0
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
         kept = session.fitted

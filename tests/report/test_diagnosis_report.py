@@ -228,7 +228,7 @@ def test_the_size_comes_before_the_judgement(name: str) -> None:
 
 def test_likelihood_thresholds_and_limits_are_folded_and_the_thresholds_whole() -> None:
     html = page("two causes")
-    for said in ("is told in −2 log likelihood", "one in 16,000", "An error of the sensor's gain alone"):
+    for said in ("is told in −2 log likelihood", "load cells: 0.02 % of rating", "An error of the sensor's gain alone"):
         before = html[: html.index(said)]
         assert before.count("<details") > before.count("</details>"), said
     assert html.count("<summary>Every number that decides") == 1
