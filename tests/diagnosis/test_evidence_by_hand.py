@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, dynamic_protocol
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._evidence import OWN_SD, Evidence
+from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._next_experiment import expected_margin
 from smartshoe.diagnosis._search import additions, allowed, search, step
@@ -91,7 +91,7 @@ class _Twin:
 
     def prior(self, members: tuple[int, ...]) -> Array:
         sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.material)
-        sds[: self.given.own] = OWN_SD
+        sds[: self.given.own] = 1.0
         for member in members:
             sds[[c - 1 for c in self.given.candidates[member].columns]] = self.given.thresholds.strength_sd
         return sds
@@ -213,7 +213,7 @@ def test_a_recording_that_is_left_out_is_foreseen_from_the_others(given: Lineari
     errors = []
     for k in range(2):
         rest, own = free[1 - k], free[k]
-        shrink = np.diag([SD / OWN_SD] * 3 + [SD / strength])
+        shrink = np.diag([SD] * 3 + [SD / strength])
         wide = np.concatenate([rest[:, 1:], shrink])
         found = np.linalg.lstsq(wide, np.concatenate([rest[:, 0], np.zeros(4)]), rcond=None)[0]
         errors.append(float(np.sum((own[:, 0] - own[:, 1:] @ found) ** 2)))
