@@ -75,14 +75,15 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     y, given = reading.values, view.thresholds
     repeats = stops - starts
     # Where no grid is known the smallest gap between readings is an upper bound of its step.
-    step = max(reading.step or reading.least_gap, ROUNDING * view.span)
+    step = reading.local_step[starts]
+    step = np.maximum(np.where(step > 0.0, step, reading.least_gap[starts]), ROUNDING * view.span)
     least = np.minimum(_noise_beside(y, starts, stops, given.local // 4), view.noise_at_load[starts])
     # A rail repeats without being held. Between two levels an undithered signal toggles, which looks like half a step
     # of noise and says nothing.
     rail = (y[starts] == y.min()) | (y[starts] == y.max())
-    noisy = (least > toggling(step, given)) & ~rail & _alternates(y, starts, stops, given)
+    noisy = (least > toggling(given) * step) & ~rail & _alternates(y, starts, stops, given)
     within = np.ones(starts.size)
-    within[noisy] = erf(step / (np.sqrt(8.0) * least[noisy]))
+    within[noisy] = erf(step[noisy] / (np.sqrt(8.0) * least[noisy]))
     within[noisy] = np.maximum(within[noisy], _common(y, starts[noisy], stops[noisy], given.local // 2))
     motion = _motion(view, starts, stops, step)
     beyond = np.maximum(0.5 * (motion * repeats - step), 0.0)
@@ -143,7 +144,7 @@ def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -
     return out
 
 
-def _motion(view: View, starts: Index, stops: Index, step: float) -> Array:
+def _motion(view: View, starts: Index, stops: Index, step: Array) -> Array:
     """(runs,) motion a sample across each run: the least of before, after and catching up; 0 where they disagree.
 
     Of a long run no more than the load's own move within either half explains: a step of load after the run is not

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smartshoe.arrays import Mask
+from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View
 from smartshoe.signals.masks import runs_of
@@ -19,26 +19,28 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     A grid adds an error. It is a fault where that is material, and more than the share of the noise by which two
     noises count as the same: more noise dithers the grid and hides it.
     """
-    step = view.reading.step
-    if step == 0.0 or view.span == 0.0:
+    step = view.reading.local_step
+    on_grid = step > 0.0
+    if on_grid.mean() < 1.0 - view.thresholds.same or view.span == 0.0:
         return
     if not _stands_while_load_moves(view, step):
         return
-    error = UNIFORM_SD * step
+    usual = float(np.sqrt(np.mean(step[on_grid] ** 2)))
+    error = UNIFORM_SD * usual
     noise = float(np.sqrt(max(view.reading.quiet_noise**2 - error**2, 0.0)))
     if error < view.thresholds.material * view.span or error < view.thresholds.same * noise:
         return
     yield Finding(
         "quantisation",
         np.ones(len(view.recording), dtype=bool),
-        f"the reading lies on a lattice of {step:.4g} {view.recording.sensor.unit.symbol},"
-        f" {100 * step / view.span:.2g} % of its span: an error of {100 * error / view.span:.2g} % that noise does not"
+        f"the reading lies on a lattice of {usual:.4g} {view.recording.sensor.unit.symbol},"
+        f" {100 * usual / view.span:.2g} % of its span: an error of {100 * error / view.span:.2g} % that noise does not"
         " smooth away",
     )
 
 
-def _stands_while_load_moves(view: View, step: float) -> bool:
+def _stands_while_load_moves(view: View, step: Array) -> bool:
     """Whether a reading stays on a level while the load goes on; a noiseless reading of a load in steps does not."""
     starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
     moved = view.gain * np.abs(view.steady_load[stops] - view.steady_load[starts])
-    return int((moved > view.thresholds.same * step).sum()) >= view.thresholds.clear * view.thresholds.few
+    return int((moved > view.thresholds.same * step[starts]).sum()) >= view.thresholds.clear * view.thresholds.few

@@ -172,7 +172,7 @@ def _strongest(
     amplitude = max(abs(whole), float(np.median(own)))
     step, noise = view.reading.step, float(np.median(view.reading.noise[weight > 0.0]))
     # From peak to peak it must be material; the first line of a toggling between two levels has 2/pi of a step.
-    least = max(0.5 * given.material * view.span, 2.0 / np.pi * step if noise < toggling(step, given) else 0.0)
+    least = max(0.5 * given.material * view.span, 2.0 / np.pi * step if noise < toggling(given) * step else 0.0)
     steady = halves[0] < given.clear**2 * halves[1]  # first halves of the stretches against second ones: ringing dies
     if amplitude < least or not steady or given.clear**2 * abs(whole) < amplitude:  # mains wander a little
         return None

@@ -18,7 +18,7 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
     if top is None:
         return
     tied = (view.reading.values == top) & ~bad
-    least = _least_hidden(view)
+    least = _least_hidden(view, tied)
     hidden = _hidden(view, tied, top, -1.0)
     stands = _noise_stands_still(view, tied, top, -1.0)
     if hidden <= least and not stands:
@@ -42,7 +42,9 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     if bottom is None:
         return
     tied = (view.reading.values == bottom) & ~bad
-    if not _noise_stands_still(view, tied, bottom, 1.0) or _hidden(view, tied, bottom, 1.0) <= _least_hidden(view):
+    if not _noise_stands_still(view, tied, bottom, 1.0) or _hidden(view, tied, bottom, 1.0) <= _least_hidden(
+        view, tied
+    ):
         return
     on = tied & (view.load.values > view.curve[0][0] + view.thresholds.standing * view.load_span)
     yield Finding(
@@ -54,10 +56,11 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     )
 
 
-def _least_hidden(view: View) -> float:
+def _least_hidden(view: View, tied: Mask) -> float:
     """How much of the reading must be cut off for a rail to be told from a peak that stands on one level."""
     reading, given = view.reading, view.thresholds
-    return given.clear * reading.step + reading.largest * reading.quiet_noise + given.material * view.span
+    step = float(reading.local_step[tied][0])
+    return given.clear * step + reading.largest * reading.quiet_noise + given.material * view.span
 
 
 def _rail(view: View, bad: Mask, inward: float) -> float | None:

@@ -29,7 +29,7 @@ def isolated(signal: Signal, corner: Array, scale: float, span: float, near: int
     # Noise that a filter has smoothed has small second differences: then the residual's own scale is the larger.
     given = signal.thresholds
     noise = np.maximum(signal.noise, local_scale(signal.outlying, given, signal.step))
-    allowed = signal.largest * noise + given.clear * (signal.step + given.clear * scale * corner) + jitter
+    allowed = signal.largest * noise + given.clear * (signal.local_step + given.clear * scale * corner) + jitter
     allowed += given.material * span + own_corner(signal.values, near)
     found: Mask = np.abs(signal.outlying) > allowed
     return comes_back(signal.values, found, given)

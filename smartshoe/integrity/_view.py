@@ -21,9 +21,9 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
 
 
-def toggling(step: float, thresholds: Thresholds) -> float:
-    """No clear noise: half a grid ``step`` is what the toggling of a silent signal between two levels looks like."""
-    return 0.5 * step * math.sqrt(thresholds.clear)
+def toggling(thresholds: Thresholds) -> float:
+    """In grid steps, no clear noise: half a step is what the toggling of a silent signal between two looks like."""
+    return 0.5 * math.sqrt(thresholds.clear)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +50,45 @@ class Signal:
         return lattice_step(*self.levels, self.thresholds)
 
     @cached_property
-    def least_gap(self) -> float:
-        """The smallest difference between two values that differ: no grid's step is larger."""
-        gaps = np.diff(self.levels[0])
-        return float(gaps.min()) if gaps.size else 0.0
+    def least_gap(self) -> Array:
+        """(m,) the smallest difference between values near each reading that differ: no grid's step is larger there."""
+        from scipy.ndimage import minimum_filter1d
+
+        levels = self.levels[0]
+        if levels.size < 2:
+            return np.zeros(self.values.size)
+        gaps = np.diff(levels)
+        beside = max(self.thresholds.local, round(self.thresholds.standing * gaps.size))
+        least = minimum_filter1d(np.append(gaps, gaps[-1]), beside)
+        out: Array = least[np.searchsorted(levels, self.values)]
+        return out
+
+    @cached_property
+    def local_step(self) -> Array:
+        """(m,) the grid's step at each reading, 0 where it lies on none.
+
+        Where the grid is uneven (a logarithmic code) or part of the readings lie on it (a converter with two ranges),
+        the distance between neighbours among the values that come back after others: noise takes none of its own twice.
+        """
+        if self.step > 0.0:
+            return np.full(self.values.size, self.step)
+        visited = self.values[np.flatnonzero(np.diff(self.values, prepend=np.nan) != 0.0)]
+        values, visits = np.unique(visited, return_counts=True)
+        levels = values[visits > 1]
+        if levels.size < 3:
+            return np.zeros(self.values.size)
+        place = np.minimum(np.searchsorted(levels, self.values), levels.size - 1)
+        on = levels[place] == self.values
+        # A peak may touch a level once: where most readings lie on a grid all do.
+        out: Array = np.where(on | (on.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[place], 0.0)
+        return out
 
     @cached_property
     def is_noisy(self) -> bool:
         """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
         second = np.diff(self.values, 2)
         product = second[1:] * second[:-1]
-        least = max(toggling(self.step, self.thresholds), self.thresholds.material * float(np.ptp(self.values)))
+        least = max(toggling(self.thresholds) * self.step, self.thresholds.material * float(np.ptp(self.values)))
         return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > least
 
     @cached_property
@@ -229,7 +257,8 @@ class View:
         step = np.diff(self.reading.values)
         noise = np.maximum(self.reading.noise[1:], self.reading.noise[:-1])
         clear = self.thresholds.clear
-        allowed = clear * (self.gain * self.load_move + clear * self.reading_move + self.reading.step)
+        grid = np.maximum(self.reading.local_step[1:], self.reading.local_step[:-1])
+        allowed = clear * (self.gain * self.load_move + clear * self.reading_move + grid)
         allowed = np.maximum(
             allowed + np.sqrt(2.0) * self.reading.largest * noise, self.thresholds.material * self.span
         )

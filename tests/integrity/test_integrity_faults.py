@@ -150,6 +150,17 @@ def test_a_coarse_lattice_is_a_fault(protocol, seed, step_percent):
     assert found.usable[0].all()
 
 
+@settings(max_examples=6)
+@given(PROTOCOLS, SEEDS, st.floats(0.01, 0.1), st.floats(0.5, 4.0))
+def test_steps_that_grow_with_the_reading_are_a_lattice(protocol, seed, step, mu):
+    # A logarithmic code, as telephony has it (ITU-T G.711).
+    recording = recorded(protocol, seed)
+    code = np.log1p(mu * np.maximum(recording.sensor.values, 0.0) / 84.0)
+    found = examine([with_reading(recording, 84.0 * np.expm1(np.rint(code / step) * step) / mu)])
+    assert kinds(found) == {"quantisation"}
+    assert found.usable[0].all()
+
+
 def test_a_lattice_that_noise_dithers_is_none():
     recording = recorded(dynamic_protocol(), 5, 0.3)
     step = 0.024  # 12 bits over 100 mbar

@@ -68,6 +68,16 @@ def test_ringing_after_each_move_of_the_load_is_no_hum():
 
 
 @FEW
+@given(SEEDS, st.floats(20.0, 60.0), st.floats(0.2, 3.0))
+def test_readings_on_a_lattice_in_the_lower_of_two_ranges_are_not_held(seed, switch_mbar, noise_mbar):
+    recording = recorded(dynamic_protocol(), seed, 0.1)
+    rng = np.random.default_rng(seed)
+    reading = on_lattice(recording.sensor.values)
+    noisy = reading + noise_mbar * (reading > switch_mbar) * rng.standard_normal(reading.size)
+    assert "held_samples" not in kinds(examine([with_reading(recording, noisy)]))
+
+
+@FEW
 @given(SEEDS, st.floats(0.05, 0.3))
 def test_samples_taken_early_or_late_are_no_spikes(seed, jitter_s):
     recording = recorded(dynamic_protocol(), seed, 0.1)
