@@ -1,12 +1,14 @@
-"""Whether what is left over is nothing but noise that remembers: stationary, Gaussian, first-order, deaf to the load.
+"""Whether what is left over is nothing but noise that remembers: stationary, Gaussian, Markov, deaf to the load.
 
 Slow noise does not average out within a block of seconds, so that it looks like structure. It differs from structure by
-what it must be. White and first-order noise together are an autoregressive moving average of order one (Granger and
-Morris 1976), and what it leaves when it predicts the next sample, the innovations, is
+what it must be. Any stationary noise is, as nearly as its length tells, an autoregression (Wold 1938; its order by
+Schwarz's criterion, 1978), and what that leaves when it predicts the next sample, the innovations, is
 
-*white*, which a slow sine, a drift and a step are not (Bartlett 1955, the cumulative periodogram);
+*white* (Bartlett 1955, the cumulative periodogram);
 *Gaussian*, which a level that switches, a draught and a jump are not: they surprise rarely, and then a lot;
 *as large under any load and at any rate*, which friction, seating and a pinched hose are not.
+
+And it forgets: a slow sine and a drift are foretold for longer than any noise is.
 """
 
 from __future__ import annotations
@@ -24,12 +26,8 @@ from smartshoe.diagnosis._session import Session
 
 BLOCK_S = 0.2  # means over it: what forgets within it counts as white
 SLOWEST_S = 5.0  # memory; what seems to remember longer may as well be a drift
-MEMORIES_S = np.geomspace(0.5 * BLOCK_S, SLOWEST_S, 18)
-# Means of first-order noise over blocks have 0.27 at most, white noise beside it lowers it, windows raise it.
-MOVING_AVERAGES = np.linspace(-0.98, 0.5, 38)
-SETTLED = 5  # blocks
 FEWEST = 300  # blocks: below, the tests tell little
-JUMPS = 10.0  # the same: far more than a model's small errors at corners bring about
+JUMPS = 10.0  # deviations: far more than a model's small errors at corners bring about
 TWO_LEVELS = -1.0  # excess kurtosis: of two levels that lie three standard deviations of the noise apart
 CUT = 9.0  # squares of innovations, in variances: so that one jump is no trend with load
 
@@ -78,11 +76,11 @@ class GaussMarkov:
 class _Blocks:
     """Means over blocks (b,) of one session: residual, 0 where it lacks; load; its rate's size.
 
-    ``good`` ones are there, and so are those just before: what comes after a gap is a surprise to any filter.
+    ``there``: nothing in the block is masked.
     """
 
     residual: Array
-    good: Mask
+    there: Mask
     load: Array
     rate: Array
     step_s: float
@@ -91,33 +89,31 @@ class _Blocks:
 def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array], false_alarm: float) -> GaussMarkov | None:
     """What the slow part of ``residuals``, (n,) a session, is made of; None where there is too little to tell."""
     blocks = [_blocks(session, residual) for session, residual in zip(sessions, residuals, strict=True)]
-    blocks = [one for one in blocks if one.good.any()]
-    count = sum(int(one.good.sum()) for one in blocks)
-    if count < FEWEST or not any(one.residual.any() for one in blocks):
+    blocks = [one for one in blocks if one.there.any()]
+    if not any(one.residual.any() for one in blocks):
         return None
-    powers = np.stack([_powers(blocks, float(theta)) for theta in MOVING_AVERAGES], axis=1)
-    t, m = np.unravel_index(int(np.argmin(powers)), powers.shape)
-    tau_s, theta, power = float(MEMORIES_S[t]), float(MOVING_AVERAGES[m]), float(powers[t, m])
-    variance = power / count
-    step_s = float(np.median([one.step_s for one in blocks]))
-    phi = float(np.exp(-step_s / tau_s))
-    whole = variance * (1.0 + 2.0 * phi * theta + theta**2) / (1.0 - phi**2)
-    remembered = max(whole + theta * variance / phi, 0.0)  # the covariance of neighbours, one step back
-    surprises, squares, drives, coloured = [], [], [], 0.0
-    for one in blocks:
-        innovations = _innovations(one, tau_s, theta)
-        coloured = max(coloured, _kolmogorov(innovations))
-        square = innovations[one.good] ** 2 / variance
-        surprises.append(square**2)
-        squares.append(np.minimum(square, CUT))
-        drives.append(np.stack([one.load[one.good], one.rate[one.good]]))
-    kurtosis = (float(np.mean(np.concatenate(surprises))) - 3.0) / np.sqrt(24.0 / count)
-    drive, size = np.concatenate(drives, axis=1), np.concatenate(squares)
-    follows = max(abs(_correlation(one, size)) for one in drive) * np.sqrt(count)
-    level = np.concatenate([one.residual[one.good] for one in blocks])
+    there = sum(int(one.there.sum()) for one in blocks)
+    covariance = np.sum([_covariance(one.residual) for one in blocks], axis=0) / there
+    weights = _autoregression(covariance, there)
+    good = [_past_is_known(one, weights.size) for one in blocks]
+    count = sum(int(one.sum()) for one in good)
+    if count < FEWEST:
+        return None
+    new = [lfilter([1.0, *-weights], [1.0], one.residual) for one in blocks]
+    coloured = max(_kolmogorov(np.where(known, one, 0.0)) for one, known in zip(new, good, strict=True))
+    square = np.concatenate([one[known] for one, known in zip(new, good, strict=True)]) ** 2
+    square /= square.mean()
+    kurtosis = (float(np.mean(square**2)) - 3.0) / np.sqrt(24.0 / count)
+    drives = [
+        np.concatenate([one[known] for one, known in zip(drive, good, strict=True)])
+        for drive in ([one.load for one in blocks], [one.rate for one in blocks])
+    ]
+    follows = max(abs(_correlation(one, np.minimum(square, CUT))) for one in drives) * np.sqrt(count)
+    level = np.concatenate([one.residual[one.there] for one in blocks])
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
+    tau_s = _memory_s(weights, float(np.median([one.step_s for one in blocks])))
     tests = coloured, float(kurtosis), float(follows)
-    return GaussMarkov(float(np.sqrt(remembered)), tau_s, *tests, flatness, false_alarm)
+    return GaussMarkov(math.sqrt(_remembered(covariance)), tau_s, *tests, flatness, false_alarm)
 
 
 def _blocks(session: Session, residual: Array) -> _Blocks:
@@ -128,31 +124,57 @@ def _blocks(session: Session, residual: Array) -> _Blocks:
     def means(signal: Array) -> Array:
         return np.asarray(signal[: count * width].reshape(count, width).mean(axis=1))
 
-    good = np.asarray(session.usable[: count * width].reshape(count, width).all(axis=1))
+    there = np.asarray(session.usable[: count * width].reshape(count, width).all(axis=1))
     level = means(residual)
-    level = np.where(good, level - (level[good].mean() if good.any() else 0.0), 0.0)
-    # As many before as there were blocks in one second; a moving average forgets the start by then.
-    lacking = np.concatenate([np.ones(SETTLED), ~good])
-    good = np.convolve(lacking, np.ones(SETTLED + 1), "valid") == 0.0
+    level = np.where(there, level - (level[there].mean() if there.any() else 0.0), 0.0)
     rate = np.abs(means(session.conditions.rate_per_s))
-    return _Blocks(level, good, means(session.conditions.load), rate, width * step_s)
+    return _Blocks(level, there, means(session.conditions.load), rate, width * step_s)
 
 
-def _innovations(blocks: _Blocks, tau_s: float, theta: float) -> Array:
-    """(b,) what is new in each block, 0 where its past is not known."""
-    phi = float(np.exp(-blocks.step_s / tau_s))
-    return np.where(blocks.good, lfilter([1.0, -phi], [1.0, theta], blocks.residual), 0.0)
+def _covariance(residual: Array) -> Array:
+    """(lags,) sums of products, up to the slowest memory; of a sequence with its gaps, so that it is positive."""
+    size = round(SLOWEST_S / BLOCK_S) + 1
+    padded = np.concatenate([residual, np.zeros(size)])
+    return np.array([padded[: residual.size] @ padded[k : k + residual.size] for k in range(size)])
 
 
-def _powers(blocks: Sequence[_Blocks], theta: float) -> Array:
-    """(memories,) power of the `_innovations`, a parabola in phi: e = v - phi w, w being v a block later."""
-    power = np.zeros(MEMORIES_S.size)
-    for one in blocks:
-        v = lfilter([1.0], [1.0, theta], one.residual)
-        now, before = v[one.good], np.concatenate([[0.0], v[:-1]])[one.good]
-        phi = np.exp(-one.step_s / MEMORIES_S)
-        power += now @ now - 2.0 * phi * (now @ before) + phi**2 * (before @ before)
-    return power
+def _autoregression(covariance: Array, count: int) -> Array:
+    """(order,) weights of the past, latest first: Levinson's recursion (1947)."""
+    weights, variance = np.zeros(0), float(covariance[0])
+    best = count * math.log(variance), weights
+    for order in range(1, covariance.size):
+        reflected = float(covariance[order] - weights @ covariance[order - 1 : 0 : -1]) / variance
+        weights = np.append(weights - reflected * weights[::-1], reflected)
+        variance *= max(1.0 - reflected**2, np.finfo(float).eps)
+        score = count * math.log(variance) + order * math.log(count)
+        if score < best[0]:
+            best = score, weights
+    return best[1]
+
+
+def _past_is_known(blocks: _Blocks, order: int) -> Mask:
+    """(b,) blocks that are there, with all before them that foretell them: after a gap anything is a surprise."""
+    lacking = np.concatenate([np.ones(order), ~blocks.there])
+    return np.asarray(np.convolve(lacking, np.ones(order + 1), "valid") == 0.0)
+
+
+def _memory_s(weights: Array, step_s: float) -> float:
+    """After how long what can be foretold of a sample has fallen to exp(-2) of its variance a step before.
+
+    The time constant of first-order noise, white noise beside it or not; infinite beyond `SLOWEST_S`.
+    """
+    impulse = np.zeros(100 * round(SLOWEST_S / BLOCK_S))
+    impulse[0] = 1.0
+    power = np.cumsum(lfilter([1.0], [1.0, *-weights], impulse)[::-1] ** 2)[::-1]  # foretold a step before, and so on
+    fallen = np.flatnonzero(power[1:] <= math.exp(-2.0) * power[1])
+    at = float(fallen[0]) * step_s if fallen.size else math.inf
+    return at if at < SLOWEST_S else math.inf
+
+
+def _remembered(covariance: Array) -> float:
+    """Variance of the part that remembers: neighbours' covariance a step back, as it falls from one to the next."""
+    whole, one, two = (float(value) for value in covariance[:3])
+    return float(np.clip(one * one / two if two > 0.0 else one, max(one, 0.0), whole))
 
 
 def _kolmogorov(innovations: Array) -> float:

@@ -12,6 +12,7 @@ from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._gauss_markov import gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, Progress, infer
 from smartshoe.diagnosis._naming import Name, names_of
@@ -176,7 +177,9 @@ def _diagnosed(
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
-    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, after.memory)
+    fitted = [one for one in sessions if one.fitted.any()]  # the others may be of loads that nothing was learnt of
+    memory = gauss_markov_of(fitted, [residual_of(one, extended) for one in fitted], thresholds.false_alarm)
+    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, memory)
     named = {cause.name for cause in causes}
     parameters, covariance = joint_parameters(found.fit, scale)
     force = force_rmse_n(fine, extended)

@@ -48,6 +48,35 @@ def test_first_order_noise_is_noise_however_strong(sessions, seed, tau_s, rms):
     assert not residual_structure(sessions, residuals, STANDARD).significant
 
 
+def averaged(rng: np.random.Generator, size: int, step_s: float, length_s: float) -> np.ndarray:
+    """White noise through a running mean, of unit variance."""
+    width = round(length_s / step_s)
+    return np.convolve(rng.standard_normal(size + width - 1), np.ones(width), "valid") / np.sqrt(width)
+
+
+def shaken(rng: np.random.Generator, size: int, step_s: float, period_s: float) -> np.ndarray:
+    """A broad band about one frequency, a third of critical damping, of unit variance."""
+    angle = 2.0 * np.pi * step_s / period_s
+    radius = np.exp(-0.3 * angle)
+    out = lfilter([1.0], [1.0, -2.0 * radius * np.cos(angle), radius**2], rng.standard_normal(size + 2000))[2000:]
+    return out / out.std()
+
+
+@pytest.mark.parametrize("drawn", [averaged, shaken])
+@settings(max_examples=4, deadline=None)
+@given(st.integers(0, 999), st.floats(0.5, 2.0), st.floats(0.003, 0.05))
+def test_noise_of_any_spectrum_is_noise(sessions, drawn, seed, memory_s, rms):
+    rng = np.random.default_rng(seed + 1)
+    residuals = [
+        noise + rms * drawn(rng, noise.size, one.conditions.step_s, memory_s)
+        for noise, one in zip(noises(sessions, seed), sessions, strict=True)
+    ]
+    found = gauss_markov_of(sessions, residuals, ALARM)
+    assert found is not None
+    assert found.is_noise
+    assert not residual_structure(sessions, residuals, STANDARD).significant
+
+
 def switching(session: Session, rng: np.random.Generator) -> np.ndarray:
     step_s = session.conditions.step_s
     return np.where(np.cumsum(rng.random(session.reading.size) < step_s / 3.0) % 2 == 0, -1.0, 1.0)
