@@ -106,7 +106,7 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
             trial = walk.keep_inside(theta - step, problem)
             move = theta - trial
             following = problem.evaluate(trial)
-            predicted = float(2.0 * move @ now.gradient - move @ now.normal @ move)
+            predicted = _promised(now, move)
             accepted = walk.judge(now, following, predicted, move)
             if accepted or float(np.max(np.abs(move) / (np.abs(theta) + 1e-300))) < 1e-16:
                 break
@@ -141,6 +141,11 @@ def _newton_step(now: Evaluation, free: Mask) -> Array:
     if free.any():
         step[free] = solve_normal(now.normal[np.ix_(free, free)], now.gradient[free])
     return step
+
+
+def _promised(now: Evaluation, move: Array) -> float:
+    """By how much the cost of the linear problem falls from theta to theta - ``move``."""
+    return float(2.0 * move @ now.gradient - move @ now.normal @ move)
 
 
 def _length(vector: Array) -> float:
@@ -198,9 +203,11 @@ class _TrustRegion(_GaussNewton):
     def __init__(self, first: Evaluation) -> None:
         self.radius = np.inf
         self.scale = np.sqrt(np.maximum(first.normal.diagonal(), 1e-300))
+        self.last = first, np.zeros(first.gradient.size)  # and the full step from there
 
     def step(self, now: Evaluation, newton: Array, free: Mask) -> Array:
         self.scale = np.maximum(self.scale, np.sqrt(now.normal.diagonal()))
+        self.last = now, newton
         if self.radius == np.inf or _length(self.scale * newton) <= self.radius:
             return newton
         scale = self.scale[free]
@@ -222,14 +229,15 @@ class _TrustRegion(_GaussNewton):
     def keep_inside(self, trial: Array, problem: Problem) -> Array:
         if (trial >= problem.lower).all() and (trial <= problem.upper).all():
             return trial
+        on_bounds: Array = np.clip(trial, problem.lower, problem.upper)
+        if self.radius < np.inf:  # a reflection has climbed
+            return on_bounds
         reflected = np.where(trial < problem.lower, 2 * problem.lower - trial, trial)
         reflected = np.where(reflected > problem.upper, 2 * problem.upper - reflected, reflected)
-        inside: Array = np.clip(np.where(np.isfinite(reflected), reflected, trial), problem.lower, problem.upper)
-        # A reflection that would climb ends on the bound instead.
-        crossed = (trial < problem.lower) | (trial > problem.upper)
-        if crossed.any() and self.radius < np.inf:
-            inside = np.where(crossed, np.clip(trial, problem.lower, problem.upper), inside)
-        return inside
+        reflected = np.clip(np.where(np.isfinite(reflected), reflected, trial), problem.lower, problem.upper)
+        # Of the two the one that promises more: the least may lie on a bound, and reflections from it come back.
+        now, newton = self.last
+        return max(on_bounds, reflected, key=lambda point: _promised(now, trial + newton - point))
 
     def judge(self, now: Evaluation, following: Evaluation, predicted: float, move: Array) -> bool:
         gained = now.cost - following.cost

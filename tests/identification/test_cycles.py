@@ -43,6 +43,61 @@ def test_repeats_lie_on_each_other_for_any_rests_and_sampling_phase(
     assert group.duration_s == pytest.approx(800.0 / rate, abs=0.005)
 
 
+@pytest.mark.parametrize("base_n", [0.0, 150.0])
+def test_a_cycle_is_laid_by_the_level_half_way_up_from_its_own_foot(base_n: float) -> None:
+    """Repeats that last 4 % longer or shorter lie on each other between mid-rise and mid-fall."""
+    at, load, tops = [0.0], [base_n], []
+    for slower in (1.0, 1.04, 0.96):
+        start = at[-1] + 2.0
+        at += [start, start + 4.0 * slower, start + 8.0 * slower]
+        load += [base_n, base_n + 600.0, base_n]
+        tops.append(at[-2])
+    time_s = np.arange(0.0, at[-1] + 1.0, 0.01)
+    force_n = np.interp(time_s, at, load)
+    recording = Recording.from_arrays(time_s=time_s + 7.0, force_n=force_n, pressure_mbar=0.5 * force_n)
+    (group,) = repeated_cycles([recording])
+    assert (group.level_n, group.peak_n) == (
+        pytest.approx(base_n + 300.0, abs=1.0),
+        pytest.approx(base_n + 600.0, abs=1),
+    )
+    assert group.duration_s == pytest.approx(4.0, rel=0.01)
+    for repeat, top_s, slower in zip(group.repeats, tops, (1.0, 1.04, 0.96), strict=True):
+        assert (repeat.base_n, repeat.peak_n) == (pytest.approx(base_n, abs=2), pytest.approx(base_n + 600.0, abs=1))
+        assert repeat.duration_s == pytest.approx(4.0 * slower, rel=0.01)
+        up, down = repeat.crossings_s(base_n + 300.0)
+        assert (up, down) == (
+            pytest.approx(top_s - 2.0 * slower, abs=0.02),
+            pytest.approx(top_s + 2.0 * slower, abs=0.02),
+        )
+        places = group.places_s(repeat, [recording])
+        own = time_s[repeat.start : repeat.stop]
+        assert np.interp([up, down], own, places) == pytest.approx([0.0, group.duration_s], abs=0.01)
+        assert np.interp(top_s, own, places) == pytest.approx(0.5 * group.duration_s, abs=0.02)
+        covered = places[group.covers(places)]
+        assert (covered[0], covered[-1]) == (
+            pytest.approx(group.first_s, abs=0.02),
+            pytest.approx(group.last_s, abs=0.02),
+        )
+    assert group.first_s < -1.5
+    assert group.last_s > 1.4 * group.duration_s
+
+
+def test_of_a_long_rest_no_more_counts_than_the_cycle_lasts() -> None:
+    (group,) = repeated_cycles([triangles([400.0, 400.0], [2.0, 60.0])])
+    assert group.last_s == pytest.approx(2.5 * group.duration_s) or group.last_s < 2.5 * group.duration_s
+    (longer,) = repeated_cycles([triangles([400.0, 400.0, 400.0], [2.0, 60.0, 60.0]), triangles([400.0], [2.0])])
+    assert longer.last_s < 2.5 * longer.duration_s + 1e-9
+
+
+def test_a_hold_at_the_top_makes_another_kind() -> None:
+    plain = triangles([200.0, 200.0], [2.0, 2.0])
+    time_s = np.arange(0.0, 28.0, 0.01)
+    held_n = np.interp(time_s, [0.0, 2.0, 6.0, 8.0, 12.0, 14.0, 18.0, 20.0, 24.0], [0, 0, 800, 800, 0, 0, 800, 800, 0])
+    held = Recording.from_arrays(time_s=time_s, force_n=held_n, pressure_mbar=0.5 * held_n)
+    durations = sorted(group.duration_s for group in repeated_cycles([plain, held]))
+    assert durations == pytest.approx([4.0, 6.0], rel=0.01)
+
+
 def test_rates_and_peaks_are_told_apart() -> None:
     recording = triangles([100.0, 200.0, 103.0, 205.0, 400.0], [2.0, 1.0, 3.0, 2.0, 2.0], noise_n=1.0)
     groups = repeated_cycles([recording])

@@ -196,17 +196,19 @@ def _limit(plain_python: bool) -> None:
 def record(checkout: Path, tests: list[str], files: list[str], plain_python: bool) -> dict[str, Any]:
     """What each of ``tests`` runs of ``files``: its lines, cost in s, outcome; and the lines that imports run."""
 
-    def work() -> dict[str, Any]:
+    def work() -> dict[str, Any] | None:
         from recording import Recorder
 
         _limit(plain_python)
         recorder = Recorder(str(checkout), files)
-        run_pytest(checkout, ["--maxfail=1000000", *tests], [recorder])
-        return recorder.found()
+        status = run_pytest(checkout, ["--maxfail=1000000", *tests], [recorder])
+        return recorder.found() if status <= 1 else None  # beyond it not even their files could be read
 
     said, _ = in_child(work, 7200.0)
     if not isinstance(said, dict):
-        raise SystemExit(f"the tests end their process:\n{(checkout / 'said.txt').read_text()[-3000:]}")
+        raise SystemExit(
+            f"the tests end their process, or cannot be read:\n{(checkout / 'said.txt').read_text()[-3000:]}"
+        )
     return said
 
 

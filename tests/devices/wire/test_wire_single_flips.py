@@ -76,6 +76,20 @@ def _form(old: int, new: int, change: Change) -> Change:
     return tuple(sorted(received))
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_a_form_is_two_chains_to_the_end_whose_change_no_checksum_sees(form: Change) -> None:
+    """The bytes of one chain were zeros and those of the other its steps, before the bit was flipped."""
+    places = [place for place, _ in form]
+    assert places == sorted(set(places))
+    left, taken = ([place for place, value in form if (value == 0) is zero] for zero in (False, True))
+    change = 0
+    for chain in (left, taken):
+        for place, after in zip(chain, [*chain[1:], FOUR_READINGS], strict=True):
+            assert dict(form)[place] in (0, after - place)
+            change ^= _syndrome(place + 1, after - place)
+    assert change == 0
+
+
 def test_the_forms_refused_are_all_that_neither_checksum_nor_place_can_tell() -> None:
     flips = list(_flips())
     assert sum(int(_ways(*sorted(flip)).sum()) for flip in flips) == 102_995_464
