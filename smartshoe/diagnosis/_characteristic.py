@@ -43,7 +43,7 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
     if x.size < thresholds.least_samples or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return None
     width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
-    rate = np.gradient(np.convolve(x, np.full(width, 1.0 / width), "same"))
+    rate = np.gradient(np.convolve(x, np.ones(width), "same"))  # to one scale: it is held against its own largest
     low, high = (float(value) for value in np.percentile(x, [1, 99]))
     still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
     # Rice's rule, of each direction's half.

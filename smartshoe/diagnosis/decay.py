@@ -183,9 +183,8 @@ def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list
     found = least_squares(error, begin, x_scale=np.maximum(np.abs(begin), 1e-3), max_nfev=200)
     residual = np.asarray(found.fun, dtype=float)
     square = float(residual @ residual)
-    alike = float(residual[1:] @ residual[:-1] / square) if square > 0 else 0.0
-    longer = (1.0 + min(max(alike, 0.0), 0.99)) / (1.0 - min(max(alike, 0.0), 0.99))
-    variance = square * longer / max(residual.size - begin.size, 1)
+    alike = float(np.clip(residual[1:] @ residual[:-1] / square, 0.0, 0.99)) if square > 0 else 0.0
+    variance = square * (1.0 + alike) / (1.0 - alike) / max(residual.size - begin.size, 1)
     jac = np.asarray(found.jac, dtype=float)
     scale = np.linalg.norm(jac, axis=0)
     scale[scale == 0.0] = 1.0

@@ -11,17 +11,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._characteristic import characteristic_of
+from smartshoe.diagnosis._characteristic import Branches, branches_of, characteristic_of, friction_of
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
 
 TIME_S = np.arange(0.0, 60.0, 0.01)
+STANDARD = Thresholds()
 TRIANGLE = 100.0 * (2.0 * np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0) - 1.0)
 
 
 def _said(reading: Array, load: Array = TRIANGLE) -> str | None:
-    return characteristic_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading), Thresholds())
+    return characteristic_of(Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading), STANDARD)
 
 
 def _rising() -> Array:
@@ -68,3 +69,72 @@ def test_slopes_are_those_of_the_curve() -> None:
 def test_a_reading_that_has_nothing_to_do_with_the_load_has_no_course() -> None:
     assert _said(np.random.default_rng(1).normal(0.0, 1.0, TIME_S.size)) is None
     assert _said(np.full(TIME_S.size, 5.0)) is None
+
+
+def _numbers(said: str | None) -> tuple[float, float, float]:
+    """Slopes about the middle and at the ends, and how far the branches lie to either side."""
+    assert said is not None
+    middle, ends = (float(value) for value in re.findall(r"by ([\d.]+) mbar/N", said))
+    return middle, ends, float(re.findall(r"lie ([\d.e-]+) mbar to either side", said)[0])
+
+
+def test_slopes_of_a_curve_are_told_where_they_are() -> None:
+    """Of u + 2 u^3 on -1..1: lines through its middle quarter and its outer halves, either side."""
+    u = np.linspace(-1.0, 1.0, 4001)
+    curve = u + 2.0 * u**3
+    middle, ends, apart = _numbers(_said(100.0 * (TRIANGLE / 100.0 + 2.0 * (TRIANGLE / 100.0) ** 3)))
+    for part, found in ((np.abs(u) < 0.25, middle), (u > 0.5, ends)):
+        assert found == pytest.approx(float(np.polyfit(u[part], curve[part], 1)[0]), rel=0.05)
+    assert apart < 1.0
+
+
+def test_ends_that_differ_are_told_by_their_mean() -> None:
+    lower, upper = np.minimum(TRIANGLE + 30.0, 0.0), np.maximum(TRIANGLE - 30.0, 0.0)
+    _, ends, _ = _numbers(_said(TRIANGLE + 1.0 * upper + 3.0 * lower))
+    assert ends == pytest.approx(0.5 * (2.0 + 4.0), rel=0.05)  # beyond 30 of 100, so over the outer halves
+
+
+@given(half=st.floats(1.0, 15.0), slope=st.floats(0.5, 4.0))
+@settings(max_examples=10)
+def test_a_loop_is_told_by_half_its_width(half: float, slope: float) -> None:
+    middle, ends, apart = _numbers(_said(slope * TRIANGLE + half * _rising()))
+    assert apart == pytest.approx(half, rel=0.03)
+    assert (middle, ends) == (pytest.approx(slope, rel=0.05), pytest.approx(slope, rel=0.05))
+
+
+def test_how_much_the_curve_and_the_branches_explain() -> None:
+    def found(reading: Array) -> Branches:
+        one = branches_of(Recording.from_arrays(time_s=TIME_S, force_n=TRIANGLE, pressure_mbar=reading), STANDARD)
+        assert one is not None
+        return one
+
+    line, rubbed = found(TRIANGLE), found(10.0 * _rising())
+    assert line.by_curve == pytest.approx(1.0, abs=0.01)
+    assert (rubbed.by_curve, rubbed.by_branch) == (pytest.approx(0.0, abs=0.02), pytest.approx(1.0, abs=0.02))
+    assert rubbed.ups == pytest.approx(np.full(rubbed.place.size, 10.0))
+    assert rubbed.mean == pytest.approx(np.zeros(rubbed.place.size))
+    noise = 20.0 * np.random.default_rng(3).standard_normal(TIME_S.size)
+    power = float(np.var(TRIANGLE))
+    assert found(TRIANGLE + noise).by_curve == pytest.approx(power / (power + 400.0), abs=0.03)
+    assert line.place[0] == pytest.approx(-98.0, abs=6.0)
+    assert line.place[-1] == pytest.approx(98.0, abs=6.0)
+    assert np.diff(line.place) == pytest.approx(np.full(line.place.size - 1, np.diff(line.place)[0]))
+
+
+def test_a_load_that_goes_one_way_only_has_no_branches() -> None:
+    up = np.linspace(-100.0, 100.0, TIME_S.size)
+    assert branches_of(Recording.from_arrays(time_s=TIME_S, force_n=up, pressure_mbar=up), STANDARD) is None
+    still = Recording.from_arrays(time_s=TIME_S, force_n=np.full(TIME_S.size, 5.0), pressure_mbar=TRIANGLE)
+    assert branches_of(still, STANDARD) is None
+    few = Recording.from_arrays(time_s=TIME_S[:40], force_n=TRIANGLE[:40], pressure_mbar=TRIANGLE[:40])
+    assert branches_of(few, STANDARD) is None
+
+
+def test_only_friction_is_told_as_friction() -> None:
+    def told(reading: Array) -> str | None:
+        return friction_of(Recording.from_arrays(time_s=TIME_S, force_n=TRIANGLE, pressure_mbar=reading), STANDARD)
+
+    assert "friction" in str(told(5.0 * _rising()))
+    assert told(TRIANGLE) is None
+    assert told(TRIANGLE + 5.0 * _rising()) is None
+    assert told(np.random.default_rng(1).standard_normal(TIME_S.size)) is None

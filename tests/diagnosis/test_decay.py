@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from smartshoe.diagnosis.decay import Decay, decay_of
 from smartshoe.recording import Recording
@@ -93,6 +96,108 @@ def test_the_sentence_says_what_would_tell_leak_from_relaxation() -> None:
     falling = 100.0 * np.exp(-TIME_S / 20.0)
     assert "only a logged load tells apart" in _found(falling).says
     assert "a load that stands still cannot tell apart" in _found(falling, np.full(TIME_S.size, 500.0)).says
+
+
+def _said(text: str, pattern: str) -> float:
+    (number,) = re.findall(pattern, text)
+    return float(number)
+
+
+@pytest.mark.parametrize(
+    ("tau_s", "words"), [(200.0, "200 s"), (1200.0, "20 min"), (6000.0, "100 min"), (12_600.0, "3.5 h")]
+)
+def test_a_time_constant_is_told_in_seconds_minutes_or_hours(tau_s: float, words: str) -> None:
+    time_s = tau_s / 100.0 * TIME_S[::2]
+    reading = 100.0 * np.exp(-time_s / tau_s)
+    decay = decay_of(Recording.from_arrays(time_s=time_s, pressure_mbar=reading))
+    assert decay is not None
+    assert f"with a time constant of {words}" in decay.says
+
+
+def test_what_is_lost_and_within_which_time_is_said_from_the_onset() -> None:
+    waits_s, tau_s = 30.0, 20.0
+    decay = _found(200.0 * np.exp(-np.maximum(TIME_S - waits_s, 0.0) / tau_s))
+    last = 100.0 * (1.0 - np.exp(-(TIME_S[-1] - waits_s) / tau_s))
+    assert decay.lost_percent == pytest.approx(last, abs=1.5)
+    assert decay.onset_s == pytest.approx(waits_s, abs=2.0)
+    assert decay.within_s == pytest.approx(TIME_S[-1] - decay.onset_s, abs=0.5)
+    assert decay.from_start_s > 1.5 * decay.tau_s
+    assert _said(decay.says, r"falls by ([\d.]+) %") == pytest.approx(decay.lost_percent, abs=0.1)
+    assert _said(decay.says, r" in ([\d.]+) s from") == pytest.approx(decay.within_s, abs=0.1)
+    assert _said(decay.says, r"from ([\d.]+) s on") == pytest.approx(decay.onset_s, abs=0.1)
+    assert _said(decay.says, r"\(([\d.]+) s when counted from the first sample") == pytest.approx(
+        decay.from_start_s, abs=0.1
+    )
+    at_once = _found(200.0 * np.exp(-TIME_S / tau_s))
+    assert at_once.from_start_s == pytest.approx(at_once.tau_s, rel=0.02)
+    assert "counted from" not in at_once.says
+    assert " s on" not in at_once.says
+
+
+def test_a_plateau_is_said_in_the_readings_unit() -> None:
+    decay = _found(80.0 + 20.0 * np.exp(-TIME_S / 15.0))
+    assert _said(decay.says, r"towards ([\d.]+) mbar") == pytest.approx(80.0, abs=0.5)
+    assert decay.course == "exponential"
+    assert decay.order == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_reading_below_zero_that_dies_away_falls_too() -> None:
+    decay = _found(-100.0 * np.exp(-TIME_S / 20.0))
+    assert decay.tau_s == pytest.approx(20.0, rel=0.03)
+    assert decay.lost_percent == pytest.approx(99.3, abs=0.7)
+
+
+def test_an_interval_is_as_wide_as_the_noise_makes_it_scatter() -> None:
+    found = [_found(100.0 * np.exp(-TIME_S / 40.0), seed=seed) for seed in range(40)]
+    taus = np.array([one.tau_s for one in found])
+    halves = np.array([0.5 * (one.ci95_s[1] - one.ci95_s[0]) for one in found])
+    assert float(np.median(halves)) == pytest.approx(1.96 * float(np.std(taus, ddof=1)), rel=0.4)
+    assert np.mean(np.abs(taus - 40.0) < halves) >= 0.8
+
+
+def test_an_interval_is_wider_where_what_is_left_goes_on_from_sample_to_sample() -> None:
+    """As if so many fewer samples were there; of a smooth rest some are counted still."""
+    falls = 100.0 * np.exp(-TIME_S / 40.0)
+    rng = np.random.default_rng(2)
+    white = rng.standard_normal(TIME_S.size)
+    walks = lfilter([np.sqrt(1.0 - 0.99**2)], [1.0, -0.99], rng.standard_normal(TIME_S.size))
+
+    def half(off: Array) -> float:
+        one = decay_of(Recording.from_arrays(time_s=TIME_S, pressure_mbar=falls + off))
+        assert one is not None
+        return one.ci95_s[1] - one.tau_s
+
+    assert half(walks) > 3.0 * half(white)
+    slowly = np.sin(2.0 * np.pi * TIME_S / 50.0)
+    assert half(walks) < half(slowly) < 40.0 * half(white)
+
+
+def test_what_lacks_and_when_the_recording_begins_change_nothing() -> None:
+    falls = 100.0 * np.exp(-TIME_S / 20.0) + NOISE_MBAR * np.random.default_rng(1).standard_normal(TIME_S.size)
+    whole = decay_of(Recording.from_arrays(time_s=TIME_S, pressure_mbar=falls))
+    later = decay_of(Recording.from_arrays(time_s=TIME_S + 500.0, pressure_mbar=falls))
+    torn = decay_of(
+        Recording.from_arrays(time_s=TIME_S, pressure_mbar=np.where((TIME_S > 20.0) & (TIME_S < 25.0), np.nan, falls))
+    )
+    assert whole is not None
+    assert later is not None
+    assert torn is not None
+    assert (later.tau_s, later.onset_s) == (pytest.approx(whole.tau_s, rel=1e-6), pytest.approx(whole.onset_s))
+    assert torn.tau_s == pytest.approx(whole.tau_s, rel=0.02)
+
+
+def test_a_load_that_stands_still_but_for_a_blip_stands() -> None:
+    falling = 100.0 * np.exp(-TIME_S / 20.0)
+    load = np.full(TIME_S.size, 500.0)
+    load[1000:1010] = 650.0
+    assert "stands still" in _found(falling, load).says
+
+
+def test_a_fall_with_a_rise_in_it_is_none() -> None:
+    sinks = 100.0 * np.exp(-TIME_S / 40.0)
+    assert decay_of(_recording(sinks + 60.0 * ((TIME_S > 40.0) & (TIME_S < 60.0)))) is None
+    assert decay_of(_recording(sinks + 1.0 * ((TIME_S > 40.0) & (TIME_S < 60.0)))) is not None
+    assert decay_of(_recording(-5.0 - 50.0 * (1.0 - np.exp(-TIME_S / 40.0)))) is None  # away from zero
 
 
 def test_without_a_reading_there_is_none() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ import pytest
 
 from smartshoe import dynamic_protocol, static_protocol
 from smartshoe.cli import run_command
+from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis.design import Design, design
 from smartshoe.errors import UsageError
+from smartshoe.protocol import Protocol, Segment
 
 CURVES = {"contact_area", "gas_compression", "sensor_nonlinearity", "wall_hardening"}
 
@@ -46,6 +49,53 @@ def test_less_noise_and_larger_effects_leave_no_more_open() -> None:
     for name in noisy.names:
         assert set(quiet.cannot_be_told(name)) <= set(noisy.cannot_be_told(name))
     assert np.all(quiet.least <= noisy.least)
+
+
+def test_noise_size_and_length_count_as_in_a_test_of_a_mean(triangles: Design) -> None:
+    """-2 log evidence is that of n samples of an effect of so many noises; four times as much is half the size."""
+    protocol = dynamic_protocol((100, 200, 400, 800))
+    louder = design([protocol], noise_percent=0.2)
+    stronger = design([protocol], strength_percent=0.6)
+    twice = design([protocol, protocol])
+    assert stronger.evidence == pytest.approx(4.0 * triangles.evidence)
+    assert louder.evidence == pytest.approx(triangles.evidence / 4.0)
+    assert twice.evidence == pytest.approx(2.0 * triangles.evidence, rel=0.01)
+    # White noise of a sample, at the log's rate, whatever is thinned.
+    assert triangles.evidence == pytest.approx(protocol.duration_s * 100.0 * 3.0**2, rel=0.02)
+    seen = np.isfinite(triangles.least)
+    # What shows is so many noises, or what counts at all.
+    ratio = design([protocol], noise_percent=20.0).least[seen] / design([protocol], noise_percent=10.0).least[seen]
+    assert np.all((ratio > 1.0) & (ratio < 2.0 + 1e-9))
+    assert np.max(ratio) == pytest.approx(2.0)
+    material = replace(Thresholds(), material=0.01)
+    least = design([protocol], thresholds=material).least
+    assert np.all(least[seen] >= 0.01)
+
+
+def test_an_effect_that_the_baseline_follows_whole_is_never_seen() -> None:
+    """Without a load that moves nothing that acts on it shows."""
+    held = Protocol("held", (Segment("ramp", 400.0, 1.0), Segment("hold", 400.0, 60.0)))
+    told = design([held])
+    assert np.isinf(told.least).any()
+    listed = {one["effect"]: one["least_percent_of_full_scale"] for one in told.to_dict()["effects"]}
+    for name, least in zip(told.names, told.least, strict=True):
+        assert listed[name] == (pytest.approx(100.0 * float(least)) if np.isfinite(least) else None)
+
+
+def test_what_is_unlike_is_a_share_and_nothing_is_unlike_itself(triangles: Design) -> None:
+    assert np.all((triangles.unlike >= 0.0) & (triangles.unlike <= 1.0))
+    assert np.all(np.diag(triangles.unlike) == 0.0)
+    for name in triangles.names:
+        assert name not in triangles.cannot_be_told(name)
+    k = triangles.names.index("gas_compression")
+    alike = [triangles.names.index(name) for name in triangles.cannot_be_told("gas_compression")]
+    order = [float(triangles.unlike[k, j]) for j in alike]
+    assert order == sorted(order)
+    told = triangles.to_dict()
+    assert told["strength_percent_of_full_scale"] == pytest.approx(0.3)
+    assert len(told["pairs"]) == len(triangles.names) * (len(triangles.names) - 1)
+    pair = next(one for one in told["pairs"] if one["effects"] == ["gas_compression", "delay"])
+    assert pair["unlike"] == float(triangles.unlike[k, triangles.names.index("delay")])
 
 
 def test_a_design_asks_for_a_protocol_and_for_positive_numbers() -> None:

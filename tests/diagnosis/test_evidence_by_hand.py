@@ -22,7 +22,7 @@ from smartshoe.diagnosis._state import searched, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of, foreseen, worst_member
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.protocol import Protocol
+from smartshoe.protocol import Protocol, Segment
 from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
@@ -31,6 +31,7 @@ RATE_HZ, SD, SPAN_MBAR = 25.0, 0.002, 140.0
 MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, SPAN_MBAR, "mbar")
 TRUTH = MODEL.with_part(effect("gas_compression"), np.array([0.08]))
 STANDARD = Thresholds()
+OWN_SD = 1.0  # of a baseline's own changes: anything up to full scale
 SCALE = Scale(800.0, SPAN_MBAR, MILLIBAR)
 PROTOCOL = dynamic_protocol((100, 300, 800), repeats=2, rest_s=4.0)
 
@@ -494,7 +495,8 @@ def test_an_expected_margin_is_what_the_rival_cannot_make_up_for(sessions: list[
     """By hand: the rival's linear step weighs the new data's misfit against its misfit of the old."""
     likelihood = Likelihood(sessions, SD, MODEL, STANDARD)
     truth, rival = fit(likelihood, TRUTH), fit(likelihood, MODEL.with_part(effect("rate_gain"), np.array([0.02, 1.0])))
-    protocol: Protocol = dynamic_protocol((200, 400), repeats=2, rest_s=3.0)
+    up, down = Segment("ramp", 800.0, 3.0), Segment("ramp", 0.0, 1.5)  # from its first moment on
+    protocol = Protocol("at once", (up, down, up, down))
     at = sessions[0].conditions
     time_s = np.arange(0.0, protocol.duration_s, at.step_s)
     conditions = Conditions(time_s, protocol.load_at(time_s) / 800.0, at.step_s)
