@@ -25,6 +25,7 @@ from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
 from smartshoe.diagnosis._parameters import parameters_of
 from smartshoe.diagnosis._ranges import ranges_of
+from smartshoe.diagnosis._sensitivity import available, nuisance_precision
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, kernel, prepare, smoothed, thinning
 from smartshoe.diagnosis._state import state_at
 from smartshoe.errors import NotIdentifiableError
@@ -232,6 +233,30 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
     assert session.displacement.max() == pytest.approx(0.004, rel=0.03)
     (plain,), _ = _prepared(_pressed(load))
     assert (plain.conditions.temperature_k, plain.conditions.neighbour, plain.displacement) == (None, None, None)
+
+
+def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> None:
+    load = _triangles()
+    time_s = STEP_S * np.arange(load.size)
+    beside = Recording.from_arrays(
+        time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * load, pressure_2_mbar=35.0 * load
+    )
+    alone, both = _prepared(_pressed(load))[0], _prepared(beside)[0]
+    assert "cross_talk" not in {one.name for one in available(alone)}
+    assert "cross_talk" in {one.name for one in available(both)}
+    assert "cross_talk" not in {one.name for one in available([*alone, *both])}
+    found = available(alone)
+    assert all(one.is_physical and one.shifts is None and not one.is_refinement for one in found)
+    assert {"delay", "linear_leak", "dead_band"} <= {one.name for one in found}
+
+
+@pytest.mark.parametrize(("begun", "share"), [(0.0, 0.1), (0.5, 0.1), (0.5, 0.3)])
+def test_what_an_arm_may_remember_is_its_share_of_what_the_unit_may_have_borne(begun: float, share: float) -> None:
+    (session,), _ = _prepared(_pressed(begun + (1.0 - begun) * _triangles()))
+    model = replace(MODEL, gain=1.5, relaxing_share=share)
+    precision = nuisance_precision(session, model, STANDARD)
+    held = 1.5 * share * max(float(session.conditions.load[0]), STANDARD.unknown_past)
+    assert precision == pytest.approx(np.diag([0.0, held**-2]), rel=1e-6)
 
 
 def test_a_later_recording_knows_the_load_that_went_before_and_the_one_after_it_all() -> None:

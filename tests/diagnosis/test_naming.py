@@ -166,6 +166,14 @@ def test_what_nothing_accounts_for_as_well_is_surer(margin: float, more: float) 
     assert probability_of_kind(less, 1e-3, STANDARD) <= probability_of_kind(surer, 1e-3, STANDARD)
 
 
+def test_what_nothing_accounts_for_as_well_is_there_or_not_by_even_odds() -> None:
+    sure, even = (replace(member(), alternatives=(Alternative(None, by),)) for by in (1e6, 0.0))
+    assert probability_of_kind(even, 1e-3, STANDARD) == pytest.approx(0.5 * probability_of_kind(sure, 1e-3, STANDARD))
+    # A worse fit than with nothing counts for no more than that.
+    worse = replace(member(), alternatives=(Alternative(None, -40.0),))
+    assert probability_of_kind(worse, 1e-3, STANDARD) == probability_of_kind(even, 1e-3, STANDARD)
+
+
 def test_departure_counts_margins_where_an_effect_brings_much() -> None:
     rival = member(fall=10_000.0, laws=(("orifice_leak", 500.0),))
     exact, loose = (probability_of_law(rival, replace(STANDARD, departure=by))[0] for by in (0.02, 0.5))

@@ -23,6 +23,7 @@ from smartshoe.diagnosis._session import Scale, Session, at_full_rate
 from smartshoe.diagnosis._validation import extrapolating
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
+from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
@@ -286,6 +287,23 @@ def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Se
     assert "at 0-25 % of the load while the load is held" in where(sessions, held, STANDARD)
     falling = [1.0 * (s.conditions.load > 0.8) * (s.conditions.rate_per_s < -0.05) for s in sessions]
     assert "at 75-100 % of the load while unloading" in where(sessions, falling, STANDARD)
+
+
+def test_the_slow_part_is_as_large_whatever_the_rate_of_the_log() -> None:
+    """Means over half a second: a recording with four times the samples holds no more of it."""
+    coarse, quick = recording(seed=1), recording(seed=2)
+    step_s = 0.25 * float(quick.time_s[1])
+    time_s = np.arange(0.0, float(quick.time_s[-1]), step_s)
+    fine = Recording.from_arrays(
+        time_s=time_s,
+        force_n=np.interp(time_s, quick.time_s, quick.force_n),
+        pressure_mbar=np.interp(time_s, quick.time_s, quick.sensor.values),
+        name="fine",
+    )
+    sessions, _ = sessions_of(coarse, fine)
+    assert sessions[1].conditions.step_s < 0.3 * sessions[0].conditions.step_s
+    residuals = [np.full(one.reading.size, size) for one, size in zip(sessions, (0.02, 0.01), strict=True)]
+    assert f"largest in {coarse.name}" in where(sessions, residuals, STANDARD)
 
 
 # -- which noise ------------------------------------------------------------------------------------------------------

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from smartshoe import Recording, compensate, diagnose, dynamic_protocol
-from smartshoe.diagnosis import Diagnosis
+from smartshoe.diagnosis import Diagnosis, Thresholds
+from smartshoe.diagnosis._held_out import Errors
+from smartshoe.diagnosis._lack_of_fit import LackOfFit
+from smartshoe.diagnosis._procedure import _outside, _sentence, _verdict, _with_offset
+from smartshoe.diagnosis._residual_structure import ResidualStructure
+from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._zero import Zero, offsets, shift_of
+from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -37,8 +48,14 @@ def runs() -> list[Recording]:
 
 
 @pytest.fixture(scope="module")
-def found(runs: list[Recording]) -> Diagnosis:
-    return diagnose(runs[:2], hold_out=runs[2])
+def told() -> list[str]:
+    """What is said on the way."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def found(runs: list[Recording], told: list[str]) -> Diagnosis:
+    return diagnose(runs[:2], hold_out=runs[2], progress=told.append)
 
 
 def test_what_was_put_in_is_named_and_nothing_else(found: Diagnosis) -> None:
@@ -49,6 +66,14 @@ def test_what_was_put_in_is_named_and_nothing_else(found: Diagnosis) -> None:
     assert found.full_scale_load_n == pytest.approx(FULL_N, rel=0.01)
     assert "with " in found.says
     assert [one.size for one in found.causes] == sorted((one.size for one in found.causes), reverse=True)
+
+
+def test_what_is_being_done_is_said_on_the_way(found: Diagnosis, told: list[str]) -> None:
+    assert found.causes
+    assert told[0] == "fitting the baseline"
+    assert told[-1] == "judging on held-out data"
+    assert "weighing alternatives" in told
+    assert any("dead band" in one for one in told if one.startswith("fitting "))
 
 
 def test_parameters_are_in_newtons_and_millibars_within_their_intervals(found: Diagnosis) -> None:
@@ -175,3 +200,73 @@ def test_as_json_it_says_the_same(found: Diagnosis) -> None:
     assert first["size_percent_of_full_scale"] == pytest.approx(100.0 * found.causes[0].size)
     assert set(first["parameters"]) == set(found.causes[0].parameters)
     assert told["model"]["full_scale_load_n"] == found.full_scale_load_n
+
+
+# -- what is refused, or not explained --------------------------------------------------------------------------------
+def test_a_load_that_pulls_as_much_as_it_presses_is_refused_in_newtons(runs: list[Recording]) -> None:
+    pulled = Recording.from_arrays(
+        time_s=runs[0].time_s, force_n=runs[0].force_n - 300.0, pressure_mbar=runs[0].sensor.values, name="pulled"
+    )
+    refused = diagnose(pulled)
+    assert refused.verdict == "refused"
+    assert refused.model is None
+    assert refused.causes == ()
+    assert "from -300 to" in refused.limits[0]
+    assert refused.limits[0] in refused.says
+    # What can be seen without a model is said all the same.
+    assert any("over this load the pressure rises" in said for said in refused.limits)
+    with pytest.raises(NotIdentifiableError, match="no model"):
+        refused.calibration()
+    with pytest.raises(NotIdentifiableError, match="no model"):
+        refused.plot()
+    assert refused.to_dict()["baseline"] == {"rmse": {}, "fit_percent": None, "force_rmse_n": None}
+    # A tare that shows some newtons of pull is none.
+    tared = Recording.from_arrays(
+        time_s=runs[0].time_s, force_n=runs[0].force_n - 40.0, pressure_mbar=runs[0].sensor.values, name="tared"
+    )
+    assert _outside([tared], Thresholds()) == ()
+
+
+def _left(rms: float) -> ResidualStructure:
+    return ResidualStructure(LackOfFit(rms, 50.0, 9), LackOfFit(0.0, 0.0, 0), None, "", rms)
+
+
+def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
+    limits = Thresholds()
+    before, after = Errors(np.array([4e-4]), np.array([1.0]), 1.0), Errors(np.array([1e-4]), np.array([1.0]), 1.0)
+    causes: Any = [SimpleNamespace(name=name) for name in ("dead_band", "delay", "zero_offset")]
+    large, small = 10.0 * limits.tolerable, 0.1 * limits.material
+
+    def said(causes: Any, left: float) -> tuple[str, str]:
+        verdict = _verdict(causes, _left(large), _left(left), limits)
+        return verdict, _sentence(verdict, causes, before, after, _left(left), limits)
+
+    good = "the baseline simulation is good to 2 % of full scale on data it was not fitted to"
+    assert said([], small) == ("adequate", good)
+    assert said(causes, small) == ("explained", f"{good}, with dead band, delay and zero offset to 1 %")
+    assert said(causes[:1], small)[1] == f"{good}, with dead band to 1 %"
+    rest = f"{100 * large:.2g} % repeats and is not explained"
+    assert said([], large) == ("unexplained", f"{good}; {rest}, and no effect of the catalogue accounts for it")
+    assert said(causes[:2], large) == ("partly_explained", f"{good}, with dead band and delay to 1 %; {rest}")
+    between = 0.5 * (limits.material + limits.tolerable)
+    assert said([], between) == ("adequate", f"{good}; {100 * between:.2g} % repeats and is not explained")
+
+
+def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list[Recording]) -> None:
+    """So that it reads as was logged; once, whatever the gain at the chain's end."""
+    usable = [run.sensor.present for run in runs]
+    scale = full_scale(runs, usable, Thresholds())
+    sessions = prepare(runs, usable, [False] * 3, scale, 4, Thresholds())
+    model = replace(PLAIN, gain=1.25)
+    plain = _with_offset(model, (), sessions, scale)
+    (part,) = plain.parts
+    assert part.name == "zero_offset"
+    assert part.values[0] * model.gain == pytest.approx(float(np.mean(offsets(sessions, model))))
+    named = Zero(shift_of("reading"), 0.05, 0.001, 0.05)
+    (only,) = _with_offset(model, (named,), sessions, scale).parts
+    assert only.values[0] * model.gain == pytest.approx(0.05)
+    tared = Zero(shift_of("load"), -0.02, 0.001, 0.02)
+    both = {part.name: float(part.values[0]) for part in _with_offset(model, (tared,), sessions, scale).parts}
+    assert both["load_cell_tare"] == -0.02
+    with_tare = model.with_part(shift_of("load"), np.array([-0.02]))
+    assert both["zero_offset"] * model.gain == pytest.approx(float(np.mean(offsets(sessions, with_tare))))
