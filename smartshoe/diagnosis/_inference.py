@@ -21,9 +21,9 @@ from smartshoe.diagnosis._arms import (
 )
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._laws import likelier_law, with_law, with_laws
-from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis._members import Member, members_of
+from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions, search
 from smartshoe.diagnosis._session import Session
@@ -87,8 +87,8 @@ def infer(
     state = state if lawful is state else _settled(lawful, sessions, progress)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions, screening)
-    while (law := likelier_law(found.members, state.banned)) is not None:
-        state = with_law(state, *law, sessions)
+    while laws := likelier_laws(found.members, state.banned):
+        state = with_likelier_laws(state, laws, sessions)
         found = _judged(state, plain, sessions, screening)
     return found
 
@@ -104,6 +104,12 @@ def _judged(
         best = search(evidence, tuple(m for m in best.members if m != worst), [*refused, *state.banned])
     likelihood = state.likelihood(sessions)
     extended = fit(likelihood, with_members(given, best, extended.model, likelihood))
+    if extended.model.parts and error_of(sessions, extended.model) >= error_of(sessions, plain.model):
+        # A model that others had bent: from the plain one, each effect at its likeliest shape.
+        model = plain.model
+        for one in (given.candidates[m].effect for m in best.members):
+            model = fit(likelihood, begun_with(one, model, likelihood), FEW_STEPS).model
+        extended = fit(likelihood, model)
     while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with
@@ -36,24 +36,25 @@ def with_laws(given: State, sessions: Sequence[Session]) -> State:
     return state
 
 
-def likelier_law(members: Sequence[Member], banned: Sequence[str]) -> tuple[str, str] | None:
-    """A member, and the law of its family that follows better in its place, if one does: fits of the whole model tell.
+def likelier_laws(members: Sequence[Member], banned: Sequence[str]) -> dict[str, str]:
+    """Members, and the law of its family that follows better in the place of each: fits of the whole model tell.
 
     The linearised search prefers what comes nearest to all equations of the family.
     """
-    for member in members:
-        nearest = next(iter(member.laws), None)
-        if nearest is None or nearest.margin >= 0.0 or nearest.effect in banned or member.effect.is_flexible:
-            continue
-        return member.name, str(nearest.effect)
-    return None
+    nearest = ((one, next(iter(one.laws), None)) for one in members if not one.effect.is_flexible)
+    return {
+        one.name: str(law.effect)
+        for one, law in nearest
+        if law is not None and law.margin < 0.0 and law.effect not in banned
+    }
 
 
-def with_law(state: State, name: str, law: str, sessions: Sequence[Session]) -> State:
-    """``state`` with ``law`` in the place of its member ``name``, and not the other way round again."""
-    likelihood = state.likelihood(sessions)
-    found = fit(likelihood, begun_with(catalogue()[law], state.fit.model.without(name), likelihood))
-    return state_at(found, sessions, state.thresholds, (*state.banned, name))
+def with_likelier_laws(state: State, laws: Mapping[str, str], sessions: Sequence[Session]) -> State:
+    """``state`` with each of ``laws`` in the place of its member, and not the other way round again."""
+    likelihood, model = state.likelihood(sessions), state.fit.model
+    for name, law in laws.items():
+        model = begun_with(catalogue()[law], model.without(name), likelihood)
+    return state_at(fit(likelihood, model), sessions, state.thresholds, (*state.banned, *laws))
 
 
 def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[float, Fit] | None:

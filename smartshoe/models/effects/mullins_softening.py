@@ -17,6 +17,7 @@ from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
 
 NEWTON_STEPS = 3
+SETTLED = 1e-6  # of full scale: the next step would be a square of it
 
 
 class MullinsSoftening(Effect):
@@ -61,7 +62,10 @@ class MullinsSoftening(Effect):
                 u = np.minimum(u, most)
                 bend = np.tanh(np.maximum(square - u * u, 0.0) / width)
                 steeper = np.where(bend > 0.0, 2.0 * amount / width * u * u * (1.0 - bend * bend), 0.0)
-                u = u - (u * (1.0 - amount * bend) - load) / (1.0 - amount * bend + steeper)
+                off = (u * (1.0 - amount * bend) - load) / (1.0 - amount * bend + steeper)
+                u = u - off
+                if np.max(np.abs(off), initial=0.0) < SETTLED:
+                    break
             return u
 
         spring, arm = shared(static, signal, conditions)
