@@ -19,6 +19,7 @@ from smartshoe.models.effects import (
     hum,
     timing_jitter,
 )
+from smartshoe.models.effects._sensor_evidence import SLOPE, growing_noise
 from smartshoe.models.first_order import lag
 
 STEP_S = 0.01
@@ -121,7 +122,7 @@ def test_noise_that_grows_with_pressure_is_told_from_jitter(seed: int, strength:
 
 
 @settings(max_examples=6, deadline=None)
-@given(seed=st.integers(0, 10**6), jitter_s=st.floats(0.002, 0.006))
+@given(seed=st.integers(0, 10**6), jitter_s=st.floats(0.004, 0.008))
 def test_jitter_is_told_from_noise_that_grows_with_pressure(seed: int, jitter_s: float) -> None:
     rng = np.random.default_rng(seed)
     moved = np.interp(CASE.time_s + jitter_s * rng.standard_normal(CASE.n), CASE.time_s, CASE.prediction)
@@ -131,6 +132,14 @@ def test_jitter_is_told_from_noise_that_grows_with_pressure(seed: int, jitter_s:
     assert evidence.strength == pytest.approx(jitter_s * np.max(np.abs(CASE.slope)), rel=0.25)
     growing = CASE.found(heteroscedastic_noise, residual)
     assert growing is None or growing.value < 4.0 < evidence.value
+
+
+def test_jitter_within_what_a_time_stamp_leaves_open_is_not_told() -> None:
+    rng = np.random.default_rng(5)
+    moved = np.interp(CASE.time_s + 0.15 * STEP_S * rng.standard_normal(CASE.n), CASE.time_s, CASE.prediction)
+    residual = 0.2 * _white(rng) + moved - CASE.prediction
+    assert growing_noise(residual, CASE.prediction, STEP_S, SLOPE) is not None
+    assert CASE.found(timing_jitter, residual) is None
 
 
 def test_ringing_and_a_coarse_lattice_are_no_jitter() -> None:

@@ -8,6 +8,7 @@ from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, SensorEvidence, Waveformless, growing_noise
 from smartshoe.models.effects.effect import Conditions, Effect
 from smartshoe.models.effects.exposure import by
+from smartshoe.signals.noise import UNIFORM_SD
 
 
 class TimingJitter(Waveformless, Effect):
@@ -24,12 +25,15 @@ class TimingJitter(Waveformless, Effect):
 def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
     """Whether the variance of ``residual`` (n,) grows with the slope of ``prediction`` (n,), that with its size apart.
 
-    Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
+    Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000, or by no
+    more than a time stamp leaves open: where within its interval a sample lies.
     """
     found = growing_noise(residual, prediction, sample_time_s, SLOPE)
     if found is None:
         return None
     value, strength, local = found
     jitter_s = strength / sqrt(float(local.slope_squared.max()))
+    if jitter_s < UNIFORM_SD * sample_time_s:
+        return None
     says = f"the noise grows with the slope of the pressure, as from {1e3 * jitter_s:.2g} ms of jitter in the sampling"
     return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
