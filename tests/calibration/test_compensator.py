@@ -116,13 +116,13 @@ def test_a_foreign_or_damaged_file_is_refused_with_its_key(tmp_path: Path, chang
 
 def test_a_missing_reading_repeats_the_one_before_it_in_its_block_or_the_last() -> None:
     gappy, whole = Compensator(A1, B0, B1), Compensator(A1, B0, B1)
-    for given, meant in (
+    for block, meant in (
         ([10.0, 20.0], [10.0, 20.0]),
         ([30.0, np.nan, np.inf, 40.0], [30.0, 30.0, 30.0, 40.0]),
         ([np.nan, 5.0, np.nan], [40.0, 5.0, 5.0]),
         ([np.nan], [5.0]),
     ):
-        assert gappy.push(np.array(given)).tolist() == whole.push(np.array(meant)).tolist()
+        assert gappy.push(np.array(block)).tolist() == whole.push(np.array(meant)).tolist()
     assert gappy.missing_count == 5
 
 

@@ -97,6 +97,22 @@ def test_what_was_put_in_lies_within_error_bars(inverse: Identification, forward
     assert forward.noise["reading"].value == pytest.approx(1.0, rel=0.05)
 
 
+def test_what_is_known_has_no_error_bar(inverse: Identification) -> None:
+    """A noise is told by its size alone; a spring that was given stays where it is."""
+    assert {name: (one.sd, one.unit) for name, one in inverse.noise.items()} == {
+        "load": (0.0, "N"), "reading": (0.0, "mbar")
+    }  # fmt: skip
+    held = identify(press(load_noise=LOAD_SD_N), structure="grey_box", fixed={"k1": TOE[0]})
+    one = held.parameters["k1"]
+    assert (one.value, one.sd, one.ci95) == (pytest.approx(TOE[0]), 0.0, (one.value, one.value))
+    # Of data that hardly tell the pole as well, where intervals are those of the likelihood.
+    loud = identify(press(load_noise=80.0), structure="grey_box", fixed={"k1": TOE[0], "c": 1.0}, delay=0.0)
+    assert any("likelihood profile" in note for note in loud.remarks)
+    for name in ("k1", "c"):
+        one = loud.parameters[name]
+        assert one.ci95 == (one.value, one.value)
+
+
 def test_correlations_are_those_of_the_covariance(inverse: Identification) -> None:
     sds = np.array([one.sd for one in inverse.parameters.values()])
     assert np.sqrt(np.diag(inverse.covariance)) == pytest.approx(sds)

@@ -99,5 +99,5 @@ def _share_of_text(data: bytes) -> float:
 
 
 def _is_frame(gap: bytes) -> bool:
-    payload = unframed(gap) if len(gap) > 3 else None
+    payload = unframed(gap)
     return payload is not None and len(payload) >= 9 and is_intact(payload)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import pearson3
 
-from smartshoe.devices.wire.clock import KEPT_BINS, DeviceClock
+from smartshoe.devices.wire.clock import KEPT_BINS, ClockFit, DeviceClock
 from smartshoe.devices.wire.delay_law import STRAY, DelayLaw, _tables
 from smartshoe.devices.wire.delay_line import robust_line
 from smartshoe.errors import UsageError
@@ -268,3 +268,11 @@ def test_the_table_of_the_guide(law: str) -> None:
     held = np.mean([run.share_within_stated(30.0) for run in long])
     print(f"\n| {law} | " + " | ".join(f"{1e3 * cell:.2f} ms" for cell in cells) + f" | {100 * held:.0f} % |")
     assert all(cell < 1e-3 for cell in cells[:3])
+
+
+def test_a_line_is_known_best_in_its_middle_and_on_either_side_alike() -> None:
+    fit = ClockFit(1000.0, 0.5, 0.003, 20.0, 4.0, "mean", 100, 100_000)
+    assert fit.sd_s(1000.0) == pytest.approx(0.003)
+    either = fit.sd_s(np.array([0.0, 2000.0]))
+    assert either == pytest.approx(np.full(2, np.hypot(0.003, 4e-6 * 1000.0)))
+    assert fit.host_time(np.array([1000.0, 1600.0])) == pytest.approx([1000.5, 1600.5 + 20e-6 * 600.0])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.devices.wire.lines import LineDecoder, encode_header, encode_lines, line_checksum
+from smartshoe.devices.wire.lines import LONGEST_LINE, LineDecoder, encode_header, encode_lines, line_checksum
 from smartshoe.devices.wire.samples import Samples, join_samples
 from smartshoe.errors import UsageError
 from smartshoe.units import COUNTS, MILLIBAR, VOLT
@@ -111,6 +111,19 @@ def test_comments_garbage_and_half_lines_are_left_out() -> None:
     assert got.readings.tolist()[-39:] == readings[1:].tolist()
     counters = decoder.counters
     assert (counters.information, counters.malformed, counters.implausible, counters.resynchronisations) == (1, 3, 1, 1)
+
+
+def test_a_line_without_an_end_takes_no_memory_and_is_one_that_is_left_out() -> None:
+    data, readings = _lines(20)
+    decoder = LineDecoder()
+    got = [decoder.feed(data)]
+    for _ in range(50):
+        got.append(decoder.feed(b"1," * 2000))
+        assert len(decoder._rest) <= LONGEST_LINE
+    later, _ = _lines(40)
+    got.append(decoder.feed(b"2\n" + later[len(data) :]))
+    assert decoder.counters.malformed == 1
+    assert join_samples(got).readings.tolist()[:19] == readings[:19].tolist()
 
 
 def test_the_serial_plotters_labels_are_read() -> None:

@@ -88,6 +88,10 @@ def test_a_form_is_two_chains_to_the_end_whose_change_no_checksum_sees(form: Cha
             assert dict(form)[place] in (0, after - place)
             change ^= _syndrome(place + 1, after - place)
     assert change == 0
+    payloads = np.zeros((FOUR_READINGS, 2), dtype=np.uint8)
+    for place, value in form:
+        payloads[place, 1] = value
+    assert may_be_flipped(payloads).tolist() == [1]
 
 
 def test_the_forms_refused_are_all_that_neither_checksum_nor_place_can_tell() -> None:

@@ -6,6 +6,8 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from smartshoe.recording import Channel, Recording
 from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, conduct
 from smartshoe.runs.session import _machine_run as machine_run
 from smartshoe.runs.session._checks import AT_THE_END, Pressing, contact, first_fault, other_test
-from smartshoe.runs.session._procedure import _Stream
+from smartshoe.runs.session._procedure import _Pressing, _Stream
 
 
 @pytest.fixture(scope="module")
@@ -199,3 +201,26 @@ def test_a_recording_with_another_tests_log_is_refused_as_input(tmp_path: Path, 
     os.utime(tmp_path / "log.csv", (1.0, 1.0))
     with SessionFolder.begin(tmp_path / "session", plan) as folder, pytest.raises(InputError, match="log of this test"):
         conduct(folder)
+
+
+@pytest.mark.parametrize(("by_hand", "needed_s"), [(False, 12.0), (True, 10.0)])
+def test_a_test_is_over_once_the_stream_covers_it_whenever_its_log_came(by_hand: bool, needed_s: float) -> None:
+    """A machine's log may be there early; the shoe is heard to the test's end, and where nobody waited, past it."""
+
+    class Stream:
+        last_s, has_ended, is_live = 100.0, False, True
+
+        def next(self, name: str, since_s: float) -> object:
+            self.last_s += 0.5
+            return object()
+
+    stream = Stream()
+    folder: Any = SimpleNamespace(plan=SimpleNamespace(tail_s=2.0, wait_s=60.0), keep_log=lambda *_: None)
+    log = object()
+    machine: Any = SimpleNamespace(by_hand=by_hand, columns=(), log=lambda: log if stream.last_s >= 105.0 else None)
+    protocol: Any = SimpleNamespace(name="dynamic", duration_s=10.0)
+    pressing = _Pressing(folder, protocol, 1, machine, stream, SimpleNamespace())  # type: ignore[arg-type]
+    for _ in range(100):
+        if pressing.is_over():
+            break
+    assert stream.last_s - 100.0 == needed_s
