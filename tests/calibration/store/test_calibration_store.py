@@ -269,6 +269,16 @@ def test_of_two_events_of_one_moment_the_one_entered_last_counts(store: Calibrat
     assert store.position_of("A", day(10)) == store.position_of("B", day(10)) == ""
 
 
+def test_an_event_that_is_entered_again_is_the_same_one(store: CalibrationStore) -> None:
+    put(store, 0, "A")
+    first, placed = store.repair("A", day(10), "new tube"), store.place("A", "left_toe", day(11))
+    assert store.repair("A", day(10), "new tube") == first
+    assert store.place("A", "left_toe", day(11)) == placed
+    assert store.events("A") == (first, placed)
+    other = store.repair("A", day(10), "another tube")
+    assert (other.order, other.note) == (3, "another tube")
+
+
 def test_an_event_of_no_unit_is_refused(store: CalibrationStore) -> None:
     with pytest.raises(UsageError, match="serial number"):
         store.repair(" ", day(10))

@@ -15,10 +15,11 @@ from lives import FIRST_DAY, LEFT_TOE, SDS, aged, calibration, day
 from scipy.stats import chi2, linregress
 from scipy.stats import t as student
 
+from smartshoe.calibration import Calibration
 from smartshoe.calibration.store import CalibrationStore
 from smartshoe.calibration.store.compare import Comparison, compare
 from smartshoe.calibration.store.drift import Trend, _trend, drift
-from smartshoe.calibration.store.quantities import quantities
+from smartshoe.calibration.store.quantities import quantities, top_load_n
 from smartshoe.errors import UsageError
 from smartshoe.units import VOLT
 
@@ -109,6 +110,29 @@ def test_an_extended_calibration_compares_by_its_model() -> None:
     found = compare(plain, extended, (200.0,))
     # Two ways to discretise one filter: the bilinear step of 1/800 of the press and the exact one.
     assert abs(found.forces[0].largest_n) < 0.5
+
+
+@pytest.mark.parametrize("rate_n_per_s", [50.0, 800.0])
+def test_an_extended_calibration_without_effects_differs_as_its_coefficients_do(rate_n_per_s: float) -> None:
+    from smartshoe.calibration import extended_calibration
+
+    a1, b0, b1 = LEFT_TOE
+    other = calibration((2.0 * a1, b0, 2.0 * b1))  # relaxes twice as fast
+    extended = extended_calibration(other.model(), load_range_n=(0.0, 800.0))
+    (plain,), (found,) = (compare(calibration(), one, (rate_n_per_s,)).forces for one in (other, extended))
+    assert abs(plain.largest_n) > 5.0
+    assert found.largest_n == pytest.approx(plain.largest_n, rel=0.05)
+    assert found.rms_n == pytest.approx(plain.rms_n, rel=0.05)
+
+
+def test_compared_is_up_to_the_load_that_all_have_seen() -> None:
+    def seen(top_n: float | None) -> Calibration:
+        return replace(calibration(), load_range_n=None if top_n is None else (0.0, top_n))
+
+    assert top_load_n([seen(None), seen(600.0), seen(500.0)]) == 500.0
+    assert top_load_n([seen(0.5), seen(600.0)]) == 0.5
+    assert top_load_n([seen(0.0), seen(600.0)]) == 600.0
+    assert top_load_n([seen(None)]) == top_load_n([]) == 800.0
 
 
 def test_readings_in_different_units_are_not_compared() -> None:
