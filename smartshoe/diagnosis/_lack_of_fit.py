@@ -41,15 +41,13 @@ class LackOfFit:
 
 
 def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> LackOfFit:
-    """Structure that repeats from cycle to cycle."""
-    products: list[float] = []
-    spreads: list[float] = []
-    found, share = repeats(sessions, residuals)
-    for rows in found:
+    """Structure that repeats from cycle to cycle: its power in each kind of cycle, over the record."""
+    power = variance = 0.0
+    pairs = 0
+    for rows, share in repeats(sessions, residuals):
         count = rows.shape[0]
         gram = rows @ rows.T / PLACES
-        upper = np.triu_indices(count, 1)
-        products += list(gram[upper])
+        products = gram[np.triu_indices(count, 1)]
         # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
         noise = rows - rows.mean(axis=0)
         scale = count / (count - 1)
@@ -58,22 +56,22 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> LackOf
             auto += np.correlate(row, row, "full")[PLACES - 1 :] / PLACES
         auto *= scale / count
         fewer = 1 - np.arange(1, auto.size) / auto.size
-        variance = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
-        spreads += [variance] * upper[0].size
-    if not products:
+        spread = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
+        power += share * float(products.mean())
+        variance += share**2 * spread / products.size
+        pairs += products.size
+    if not pairs:
         return LackOfFit(0.0, 0.0, 0)
-    mean = float(np.mean(products))
-    sd = float(np.sqrt(np.sum(spreads))) / len(spreads)
-    return LackOfFit(float(np.sqrt(max(share * mean, 0.0))), mean / max(sd, 1e-300), len(products))
+    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / max(float(np.sqrt(variance)), 1e-300), pairs)
 
 
-def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[list[Array], float]:
-    """The residual over each kind of load cycle: (repeats, PLACES) a kind, while the unit is loaded.
+def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[tuple[Array, float]]:
+    """The residual over each kind of load cycle that comes back: (repeats, PLACES), while the unit is loaded.
 
-    And the share of all samples that are within a load cycle: the rests are taken to hold no structure.
+    And the share of all samples that are within cycles of the kind: elsewhere nothing tells what repeats.
     """
-    found: list[tuple[float, float, Array]] = []
-    inside_cycles = total = 0
+    found: list[tuple[float, float, Array, int]] = []
+    total = 0
     for session, residual in zip(sessions, residuals, strict=True):
         load = session.conditions.load
         total += load.size
@@ -89,11 +87,10 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[li
             span = slice(first, last + 1)
             if session.usable[span].mean() < 0.9:
                 continue
-            inside_cycles += last + 1 - first
             places = np.linspace(0, last - first, PLACES)
             row = np.interp(places, np.arange(last + 1 - first), residual[span])
-            found.append((peak, (last - first) * session.conditions.step_s, row))
-    kinds: list[list[tuple[float, float, Array]]] = []
+            found.append((peak, (last - first) * session.conditions.step_s, row, int(last + 1 - first)))
+    kinds: list[list[tuple[float, float, Array, int]]] = []
     for one in found:
         for kind in kinds:
             if all(abs(a - b) <= ALIKE * abs(b) for a, b in zip(one[:2], kind[0][:2], strict=True)):
@@ -101,8 +98,11 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> tuple[li
                 break
         else:
             kinds.append([one])
-    rows = [np.stack([row for _, _, row in kind]) for kind in kinds if len(kind) > 1]
-    return rows, inside_cycles / max(total, 1)
+    return [
+        (np.stack([row for _, _, row, _ in kind]), sum(size for *_, size in kind) / total)
+        for kind in kinds
+        if len(kind) > 1
+    ]
 
 
 def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float) -> LackOfFit:
