@@ -172,7 +172,7 @@ def test_what_repeats_in_fast_cycles_counts_for_the_time_that_they_take(sessions
         residuals.append(bow + 1e-5 * np.random.default_rng(session.index).standard_normal(bow.size))
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
-    assert 0.0 < square
+    assert square > 0.0
     assert repeating(sessions, residuals).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
 
 
