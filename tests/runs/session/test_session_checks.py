@@ -14,14 +14,17 @@ import pytest
 from bench_sessions import SHORT, bench_plan
 
 from smartshoe.devices import Shoe, open_shoe
+from smartshoe.devices._base import Block
 from smartshoe.errors import InputError, RefusedError
 from smartshoe.files.logs import write
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, conduct
 from smartshoe.runs.session import _machine_run as machine_run
-from smartshoe.runs.session._checks import AT_THE_END, Pressing, contact, first_fault, other_test
+from smartshoe.runs.session._checks import AT_THE_END, Pressing, _share, contact, first_fault, other_test
 from smartshoe.runs.session._procedure import _Pressing, _Stream
+from smartshoe.runs.session.streaming import Seconds
+from smartshoe.units import MILLIBAR
 
 
 @pytest.fixture(scope="module")
@@ -224,3 +227,20 @@ def test_a_test_is_over_once_the_stream_covers_it_whenever_its_log_came(by_hand:
         if pressing.is_over():
             break
     assert stream.last_s - 100.0 == needed_s
+
+
+def test_how_far_a_reading_moves_is_a_share_of_its_range(pressed: Pressing) -> None:
+    span = float(np.ptp(pressed.reading.values))
+    for range_, size in (((0.0, 200.0), 200.0), ((-50.0, 150.0), 200.0), (None, 1.0)):
+        assert _share(replace(pressed.reading, range_=range_)) == pytest.approx(span / size)
+
+
+def test_a_second_of_a_stream_is_told_by_its_least_and_most_beside_names_and_units() -> None:
+    readings = np.array([[1.0, 700.0], [4.0, 90.0], [9.0, 650.0]])
+    missing = np.array([[False, False], [False, True], [True, False]])
+    block = Block(np.array([0.1, 0.2, 0.3]), readings, missing, ("heel", "toe"), MILLIBAR)
+    second = Seconds(block, ["toe"])
+    assert second.heading.split() == ["time", "heel", "mbar", "toe", "N"]
+    second.add(block, {"toe": 0.5 * readings[:, 1]})
+    assert second.report(12.25).split() == ["12.2", "s", "1.0", "to", "4.0", "325.0", "to", "350.0"]
+    assert second.report(13.0).split() == ["13.0", "s", "–", "–"]
