@@ -14,7 +14,7 @@ from smartshoe.models.extended import BASELINE, ExtendedModel
 
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
 _, SHARE, RATE = BASELINE
-# A resolution: neighbours differ by less than fits from them move. Half and twice as many: the same answers.
+# A resolution: a fit starts at the best. All halved or doubled, no name changed in two cases.
 POLES_PER_S = np.geomspace(RATE.lower, RATE.upper, 35)
 
 

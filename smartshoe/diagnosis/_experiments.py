@@ -8,8 +8,7 @@ import numpy as np
 
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
 
-SINE_STEP_S = 0.1
-STEP_S = 0.1
+STEP_S = 0.1  # in which a machine goes from load to load at once; half and twice as long changed no proposal
 
 
 def long_hold(peak_n: float) -> Protocol:
@@ -54,11 +53,11 @@ def multisine(peak_n: float) -> Protocol:
     frequency_hz = np.geomspace(0.02, 2.0, 11)
     order = np.arange(1, 12)
     phase = np.pi * order * (order - 1) / 11
-    time_s = np.arange(0.0, 120.0, SINE_STEP_S)
+    time_s = np.arange(0.0, 120.0, STEP_S)
     wave = np.sum(np.cos(2 * np.pi * np.outer(time_s, frequency_hz) + phase), axis=1)
     load_n = peak_n * (0.5 + 0.45 * wave / np.max(np.abs(wave)))
     segments = [Segment("rest", 0.0, 3.0), Segment("ramp", float(load_n[0]), 2.0)]
-    segments += [Segment("ramp", float(load), SINE_STEP_S) for load in load_n[1:]]
+    segments += [Segment("ramp", float(load), STEP_S) for load in load_n[1:]]
     return Protocol("multisine", (*segments, Segment("ramp", 0.0, 2.0), Segment("rest", 0.0, 5.0)))
 
 

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._sensitivity import nuisances
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.models.extended import ExtendedModel
 
-RESAMPLED = 400
+RESAMPLED = 400  # draws, of which an interval is known to some percent of its width
 
 
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:

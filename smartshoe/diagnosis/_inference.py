@@ -42,9 +42,11 @@ from smartshoe.signals.loading import turning_points
 
 Progress = Callable[[str], None]
 
+# Resolutions: half and twice of each changed no name in two cases. With four steps one measured sensor, of which no
+# equation fits, is left unnamed.
 ROUNDS = 6
 ROUND_STEPS = 6  # of a fit that is linearised anew anyway
-RIVALS = 2
+RIVALS = 2  # that are fitted beside a set that bends
 
 
 @dataclass(frozen=True, eq=False)

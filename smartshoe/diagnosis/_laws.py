@@ -12,7 +12,7 @@ from smartshoe.diagnosis._state import State, state_at
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
 
-SIZES = (0.5, 5.0)  # typical ones of an effect, from which a fit begins
+SIZES = (0.5, 5.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
 
 
 def with_laws(given: State, sessions: Sequence[Session]) -> State:

@@ -14,11 +14,11 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel, Trace
 
+# Resolutions of a fit: half and twice of each changed no name in two cases.
 MOST_STEPS = 25
 FEW_STEPS = 4  # of a fit that only has to be compared with others
 SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
-SHAPE_SD = 1.0  # of a shape's logarithm, or in sizes, about where it was begun
 
 
 class Likelihood:
@@ -84,7 +84,8 @@ class Fit:
 def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -> Fit:
     """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
 
-    Shapes have a wide prior about their start, weights of flexible blocks theirs about null.
+    Shapes have a prior about their start, of one in the logarithm or of their size; weights of flexible blocks have
+    theirs about null.
     """
     owners = start.parameters
     logarithmic = _are_logarithmic(start)
@@ -141,7 +142,7 @@ def _precision(model: ExtendedModel, logarithmic: Mask) -> Array:
         if parameter.prior_sd is not None:
             precision[k] = 1.0 / parameter.prior_sd**2
         elif parameter.null is None and owner != "baseline":
-            precision[k] = 1.0 / (SHAPE_SD if logarithmic[k] else SHAPE_SD * parameter.size) ** 2
+            precision[k] = 1.0 if logarithmic[k] else 1.0 / parameter.size**2
     return precision
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 
-FLOOR = 1e-9
+FLOOR = 1e-9  # share of full scale: what rounding leaves where nothing else is left
 
 
 def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:

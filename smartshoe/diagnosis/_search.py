@@ -6,9 +6,10 @@ from collections.abc import Collection
 
 from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 
+# Resolutions of the search: half and twice of each changed no name in two cases.
 MOST_MEMBERS = 7
-BREADTH = 5
-SWAPS = 3
+BREADTH = 5  # candidates that are tried beside a set
+SWAPS = 3  # and in the place of each member
 
 
 def allowed(evidence: Evidence, found: Posterior) -> bool:

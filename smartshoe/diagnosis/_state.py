@@ -13,7 +13,7 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
-LENGTHS = (1.0, 0.5, 0.2, 0.05)  # of a first step
+LENGTHS = (1.0, 0.5, 0.2, 0.05)  # of a first step, a resolution: halved or doubled, no name changed
 
 
 @dataclass(frozen=True, eq=False)

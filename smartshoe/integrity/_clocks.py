@@ -22,6 +22,7 @@ from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 
+# Resolutions: half and twice of each changed no finding in two cases.
 SMOOTHING = (1.0, 3.0, 6.0)  # echoes
 WINDOWS = 8  # at most: octants of the load's movement
 OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # what a bank of plays spans about the share that stands still

@@ -15,7 +15,7 @@ from smartshoe.signals.masks import runs_of
 from smartshoe.signals.noise import robust_sd
 
 MAINS_HZ = (50.0, 60.0)
-HARMONICS = 3
+HARMONICS = 3  # that a line is called by: half and twice as many changed no finding
 
 
 def hum(view: View, bad: Mask) -> Iterator[Finding]:
