@@ -445,18 +445,6 @@ def _penalised(likelihood: Likelihood, start: ExtendedModel, model: ExtendedMode
     return likelihood.cost(model) + float(moved) ** 2
 
 
-def test_a_fit_ends_where_no_small_step_betters_it(fitted: tuple[Likelihood, ExtendedModel, Fit]) -> None:
-    likelihood, start, found = fitted
-    assert found.cost == pytest.approx(_penalised(likelihood, start, found.model), rel=1e-9)
-    sds = np.sqrt(np.diag(found.covariance))
-    for k, sd in enumerate(sds):
-        for sign in (-1.0, 1.0):
-            theta = found.model.theta.copy()
-            theta[k] += sign * sd
-            assert _penalised(likelihood, start, found.model.at(theta)) > found.cost
-    assert np.abs(found.model.theta - LAGGING.theta) == pytest.approx(0.0, abs=5.0 * float(sds.max()))
-
-
 def test_the_covariance_is_the_inverse_of_half_the_costs_curvature(
     fitted: tuple[Likelihood, ExtendedModel, Fit],
 ) -> None:
@@ -479,6 +467,18 @@ def test_the_covariance_is_the_inverse_of_half_the_costs_curvature(
     # Steps were of so many standard deviations: this is the matrix of correlations.
     expected = np.linalg.inv(0.5 * curvature / 0.3**2)
     assert found.covariance / np.outer(sds, sds) == pytest.approx(expected, abs=0.1)
+
+
+def test_a_fit_ends_where_no_small_step_betters_it(fitted: tuple[Likelihood, ExtendedModel, Fit]) -> None:
+    likelihood, start, found = fitted
+    assert found.cost == pytest.approx(_penalised(likelihood, start, found.model), rel=1e-9)
+    sds = np.sqrt(np.diag(found.covariance))
+    for k, sd in enumerate(sds):
+        for sign in (-1.0, 1.0):
+            theta = found.model.theta.copy()
+            theta[k] += sign * sd
+            assert _penalised(likelihood, start, found.model.at(theta)) > found.cost
+    assert np.abs(found.model.theta - LAGGING.theta) == pytest.approx(0.0, abs=5.0 * float(sds.max()))
 
 
 def test_two_models_are_apart_by_what_they_read_differently(sessions: list[Session]) -> None:
