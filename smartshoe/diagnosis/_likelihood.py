@@ -30,6 +30,8 @@ class Likelihood:
         self.sessions = tuple(session for session in sessions if session.fitted.any())
         self.noise_sd = noise_sd
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
+        self._rows: list[Array] = []  # what is left and its slopes, a session, where they were last asked for
+        self._scales = np.zeros(0)
         self._past: list[Array] = []
         self._inverse: list[Array] = []
         for session in self.sessions:
@@ -55,11 +57,34 @@ class Likelihood:
 
     def normal(self, model: ExtendedModel) -> tuple[float, Array, Array]:
         """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p)."""
-        total = np.zeros((1, 1))
-        known = self._last[1] if self._last is not None and self._last[0] is model else None
+        known = self._known(model)
+        self._rows = []
         for k, session in enumerate(self.sessions):
             reading, slopes = model.sensitivities(session.conditions, None if known is None else known[k])
-            total = total + self._gram(k, np.column_stack([session.reading - reading, slopes]))
+            self._rows.append(np.column_stack([session.reading - reading, slopes]))
+        return self._products()
+
+    def nearly_normal(self, model: ExtendedModel, step: Array) -> tuple[float, Array, Array]:
+        """The same after a ``step`` (p,) from where slopes were last known, these brought up to date by it.
+
+        The least change that agrees with what the step did (Broyden 1965). ``model`` is the last one that was judged.
+        """
+        known = self._known(model)
+        assert known is not None
+        weighed = self._scales * step  # each parameter in units of what it does
+        for rows, session, (reading, _) in zip(self._rows, self.sessions, known, strict=True):
+            left = session.reading - reading
+            missed = rows[:, 0] - left - rows[:, 1:] @ step
+            rows[:, 1:] += np.outer(missed, weighed / max(float(weighed @ step), 1e-300))
+            rows[:, 0] = left
+        return self._products()
+
+    def _known(self, model: ExtendedModel) -> list[Trace] | None:
+        return self._last[1] if self._last is not None and self._last[0] is model else None
+
+    def _products(self) -> tuple[float, Array, Array]:
+        total = np.sum([self._gram(k, rows) for k, rows in enumerate(self._rows)], axis=0)
+        self._scales = np.diag(total)[1:]
         return float(total[0, 0]), total[1:, 0], total[1:, 1:]
 
 
@@ -98,11 +123,12 @@ def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -
 
     cost, right, normal = likelihood.normal(model)
     cost += penalty(model.theta)
-    damping = 1e-4
+    damping, exact, came = 1e-4, True, model.theta
     for taken in range(steps):
         theta = model.theta
         if taken:
-            _, right, normal = likelihood.normal(model)
+            _, right, normal = likelihood.normal(model) if exact else likelihood.nearly_normal(model, theta - came)
+        came = theta
         scale = np.where(logarithmic, theta, 1.0)
         inner = normal * np.outer(scale, scale) + np.diag(precision)
         pull = right * scale - precision * (_stepped(theta, logarithmic) - about)
@@ -117,12 +143,13 @@ def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -
                 damping = max(damping * 0.1, 1e-7)
                 break
             damping = max(damping * 10.0, 1e-4)
-        if best is None:
+        settled = best is None or cost - best[0] < SETTLED
+        if best is not None:
+            cost, model = best
+        if settled and exact:
             break
-        fell = cost - best[0]
-        cost, model = best
-        if fell < SETTLED:
-            break
+        # Every other step goes on with the slopes of the one before, brought up to date by what that did.
+        exact = settled or not exact
     return Fit(model, cost, likelihood)
 
 

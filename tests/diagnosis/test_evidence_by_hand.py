@@ -445,6 +445,25 @@ def _penalised(likelihood: Likelihood, start: ExtendedModel, model: ExtendedMode
     return likelihood.cost(model) + float(moved) ** 2
 
 
+def test_slopes_that_are_brought_up_to_date_are_nearly_those_computed_anew(
+    fitted: tuple[Likelihood, ExtendedModel, Fit],
+) -> None:
+    likelihood, start, found = fitted
+    before = likelihood.normal(start)
+    theta = start.theta + 0.3 * (found.model.theta - start.theta)
+    moved = start.at(theta)
+    likelihood.cost(moved)
+    cost, pull, normal = likelihood.nearly_normal(moved, theta - start.theta)
+    exact = likelihood.normal(moved)
+    assert cost == pytest.approx(exact[0], rel=1e-9)
+    scale = np.sqrt(np.diag(exact[2]))
+    # Nearer than the slopes from before in the one direction that was gone.
+    step = (theta - start.theta) * scale
+    curved = [(one / np.outer(scale, scale)) @ step for one in (normal, before[2], exact[2])]
+    assert np.linalg.norm(curved[0] - curved[2]) < 0.8 * np.linalg.norm(curved[1] - curved[2])
+    assert pull / scale == pytest.approx(exact[1] / scale, abs=0.1 * float(np.linalg.norm(exact[1] / scale)))
+
+
 def test_the_covariance_is_the_inverse_of_half_the_costs_curvature(
     fitted: tuple[Likelihood, ExtendedModel, Fit],
 ) -> None:
