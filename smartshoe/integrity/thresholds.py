@@ -74,10 +74,10 @@ class Thresholds:
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (2.1, -1.0, -1.3),
+        (1.92, -1.04, -0.9),
         "log odds",
         "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure",
-        "logistic regression on 321 cases of two worlds, outside the catalogue too",
+        "logistic regression on 306 cases of two worlds",
     )
     least_confidence: float = threshold(
         0.667,
