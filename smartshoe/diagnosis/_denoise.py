@@ -11,41 +11,40 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import robust_sd
 
-HALF_WIDTHS_S = (0.12, 0.06, 0.03)
-FEWEST = 7  # samples a line is drawn through
-CLIPPED = 4.0  # standard deviations: noise hardly comes by them
-UNLIKELY = 3.0  # standard deviations of a line's residual variance
 
-
-def noise_sd(signal: Array) -> float:
+def noise_sd(signal: Array, thresholds: Thresholds) -> float:
     """White noise's standard deviation from third differences, which no ramp or bend reaches.
 
-    The median finds the scale, the mean square of what lies within `CLIPPED` of it the value: on a converter's
+    The median finds the scale, the mean square of what noise reaches the value: on a converter's
     quantisation grid a median is a whole number of steps.
     """
     if signal.size < 10:
         return 0.0
     third = np.abs(np.diff(signal, 3))
     sd = robust_sd(third)
-    inside = third <= CLIPPED * sd
+    inside = third <= largest_of_noise(third.size, thresholds) * sd
     return float(np.sqrt(np.mean(third[inside] ** 2) / 20.0))
 
 
-def without_noise(load: Array, step_s: float, sd: float) -> tuple[Array, float]:
+def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds) -> tuple[Array, float]:
     """The load (n,) from lines through its neighbourhood, and what is left of its noise's standard deviation ``sd``."""
-    if sd == 0.0 or load.size < 4 * FEWEST:
+    least = thresholds.few + 2  # samples that a line is drawn through: a few more than it has numbers
+    if sd == 0.0 or load.size < thresholds.least_samples:
         return load, sd
     best = load.copy()
     variance = np.ones(load.size)
     squares = load - load.mean()
-    for half_s in HALF_WIDTHS_S:
-        half = max(round(half_s / step_s), (FEWEST - 1) // 2)
+    unlikely = largest_of_noise(1, thresholds)
+    # Within which an echo lies; where corners are near, a half and a quarter of it.
+    for share in (1.0, 0.5, 0.25):
+        half = max(round(share * thresholds.echo_s / step_s), least // 2)
         for first in (-half, -2 * half, 0):
             value, left, leverage = _line(squares, first, first + 2 * half)
             n = 2 * half + 1
-            fits = left <= sd**2 * (1.0 + UNLIKELY * np.sqrt(2.0 / (n - 2)))
+            fits = left <= sd**2 * (1.0 + unlikely * np.sqrt(2.0 / (n - 2)))
             better = fits & (leverage < variance)
             best[better] = value[better] + load.mean()
             variance[better] = leverage

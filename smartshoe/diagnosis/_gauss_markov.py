@@ -19,17 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
-from scipy.special import ndtri
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._session import Session
-
-BLOCK_S = 0.2  # means over it: what forgets within it counts as white
-SLOWEST_S = 5.0  # memory; what seems to remember longer may as well be a drift
-FEWEST = 300  # blocks: below, the tests tell little
-JUMPS = 10.0  # deviations: far more than a model's small errors at corners bring about
-TWO_LEVELS = -1.0  # excess kurtosis: of two levels that lie three standard deviations of the noise apart
-CUT = 9.0  # squares of innovations, in variances: so that one jump is no trend with load
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +32,6 @@ class GaussMarkov:
     ``coloured`` (Kolmogorov's statistic of the innovations' spectrum), ``surprises`` (their kurtosis beyond a normal
     deviate's) and ``follows`` (correlation of their squares with load or its rate, the larger), both in deviations.
     ``flatness`` is the excess kurtosis of the blocks themselves: 0 of noise, -1.5 of a sine, -2 of two levels.
-    ``false_alarm``: chance at which noise fails one of the tests.
     """
 
     rms: float
@@ -48,28 +40,32 @@ class GaussMarkov:
     surprises: float
     follows: float
     flatness: float
-    false_alarm: float
+    thresholds: Thresholds
 
     @property
     def is_noise(self) -> bool:
         """Whether nothing speaks against noise."""
-        return self._is_white and self.tau_s < SLOWEST_S and max(abs(self.surprises), self.follows) < self._deviations
+        # What seems to remember longer may as well be a drift.
+        forgets = self.tau_s < self.thresholds.lasting_s
+        return self._is_white and forgets and max(abs(self.surprises), self.follows) < self._deviations
 
     @property
     def switches(self) -> bool:
         """Whether it stays at one of two levels, leaves it at once, and does so under any load."""
         # A level that switches at random has the spectrum of first-order noise.
         random = self._is_white and self.follows < self._deviations
-        return random and self.surprises > JUMPS and self.flatness < TWO_LEVELS
+        clear = self.thresholds.clear**2
+        two_levels = -2.0 * (clear / (clear + 1.0)) ** 2  # excess kurtosis of two, each clear of their mean by noise
+        return random and self.surprises > self._deviations and self.flatness < two_levels
 
     @property
     def _is_white(self) -> bool:
         """By the tail of Kolmogorov's distribution."""
-        return self.coloured < math.sqrt(-0.5 * math.log(0.5 * self.false_alarm))
+        return self.coloured < math.sqrt(-0.5 * math.log(0.5 * self.thresholds.false_alarm))
 
     @property
     def _deviations(self) -> float:
-        return -float(ndtri(0.5 * self.false_alarm))
+        return largest_of_noise(1, self.thresholds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,18 +82,23 @@ class _Blocks:
     step_s: float
 
 
-def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array], false_alarm: float) -> GaussMarkov | None:
+def gauss_markov_of(
+    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
+) -> GaussMarkov | None:
     """What the slow part of ``residuals``, (n,) a session, is made of; None where there is too little to tell."""
-    blocks = [_blocks(session, residual) for session, residual in zip(sessions, residuals, strict=True)]
+    blocks = [_blocks(session, residual, thresholds) for session, residual in zip(sessions, residuals, strict=True)]
     blocks = [one for one in blocks if one.there.any()]
     if not any(one.residual.any() for one in blocks):
         return None
     there = sum(int(one.there.sum()) for one in blocks)
-    covariance = np.sum([_covariance(one.residual) for one in blocks], axis=0) / there
+    lags = round(thresholds.lasting_s / thresholds.sensor_lag_s)
+    covariance = np.sum([_covariance(one.residual, lags) for one in blocks], axis=0) / there
     weights = _autoregression(covariance, there)
     good = [_past_is_known(one, weights.size) for one in blocks]
     count = sum(int(one.sum()) for one in good)
-    if count < FEWEST:
+    largest = largest_of_noise(1, thresholds)
+    # In fewer blocks chance makes correlations that would be ones of the same kind.
+    if count < (largest / thresholds.same) ** 2:
         return None
     new = [lfilter([1.0, *-weights], [1.0], one.residual) for one in blocks]
     coloured = max(_kolmogorov(np.where(known, one, 0.0)) for one, known in zip(new, good, strict=True))
@@ -108,17 +109,18 @@ def gauss_markov_of(sessions: Sequence[Session], residuals: Sequence[Array], fal
         np.concatenate([one[known] for one, known in zip(drive, good, strict=True)])
         for drive in ([one.load for one in blocks], [one.rate for one in blocks])
     ]
-    follows = max(abs(_correlation(one, np.minimum(square, CUT))) for one in drives) * np.sqrt(count)
+    follows = max(abs(_correlation(one, np.minimum(square, largest**2))) for one in drives) * np.sqrt(count)
     level = np.concatenate([one.residual[one.there] for one in blocks])
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
-    tau_s = _memory_s(weights, float(np.median([one.step_s for one in blocks])))
+    tau_s = _memory_s(weights, lags, float(np.median([one.step_s for one in blocks])))
     tests = coloured, float(kurtosis), float(follows)
-    return GaussMarkov(math.sqrt(_remembered(covariance)), tau_s, *tests, flatness, false_alarm)
+    return GaussMarkov(math.sqrt(_remembered(covariance)), tau_s, *tests, flatness, thresholds)
 
 
-def _blocks(session: Session, residual: Array) -> _Blocks:
+def _blocks(session: Session, residual: Array, thresholds: Thresholds) -> _Blocks:
+    """Means over a sensor's lag: what forgets within it counts as white."""
     step_s = session.conditions.step_s
-    width = max(1, round(BLOCK_S / step_s))
+    width = max(1, round(thresholds.sensor_lag_s / step_s))
     count = residual.size // width
 
     def means(signal: Array) -> Array:
@@ -131,11 +133,10 @@ def _blocks(session: Session, residual: Array) -> _Blocks:
     return _Blocks(level, there, means(session.conditions.load), rate, width * step_s)
 
 
-def _covariance(residual: Array) -> Array:
-    """(lags,) sums of products, up to the slowest memory; of a sequence with its gaps, so that it is positive."""
-    size = round(SLOWEST_S / BLOCK_S) + 1
-    padded = np.concatenate([residual, np.zeros(size)])
-    return np.array([padded[: residual.size] @ padded[k : k + residual.size] for k in range(size)])
+def _covariance(residual: Array, lags: int) -> Array:
+    """(lags + 1,) sums of products, up to the slowest memory; of a sequence with its gaps, so that it is positive."""
+    padded = np.concatenate([residual, np.zeros(lags)])
+    return np.array([padded[: residual.size] @ padded[k : k + residual.size] for k in range(lags + 1)])
 
 
 def _autoregression(covariance: Array, count: int) -> Array:
@@ -158,17 +159,16 @@ def _past_is_known(blocks: _Blocks, order: int) -> Mask:
     return np.asarray(np.convolve(lacking, np.ones(order + 1), "valid") == 0.0)
 
 
-def _memory_s(weights: Array, step_s: float) -> float:
+def _memory_s(weights: Array, lags: int, step_s: float) -> float:
     """After how long what can be foretold of a sample has fallen to exp(-2) of its variance a step before.
 
-    The time constant of first-order noise, white noise beside it or not; infinite beyond `SLOWEST_S`.
+    The time constant of first-order noise, white noise beside it or not; infinite beyond ``lags``.
     """
-    impulse = np.zeros(100 * round(SLOWEST_S / BLOCK_S))
+    impulse = np.zeros(100 * lags)
     impulse[0] = 1.0
     power = np.cumsum(lfilter([1.0], [1.0, *-weights], impulse)[::-1] ** 2)[::-1]  # foretold a step before, and so on
     fallen = np.flatnonzero(power[1:] <= math.exp(-2.0) * power[1])
-    at = float(fallen[0]) * step_s if fallen.size else math.inf
-    return at if at < SLOWEST_S else math.inf
+    return float(fallen[0]) * step_s if fallen.size and fallen[0] < lags else math.inf
 
 
 def _remembered(covariance: Array) -> float:

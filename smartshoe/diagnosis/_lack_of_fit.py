@@ -16,35 +16,41 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._session import Session
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.signals.noise import NORMAL_QUARTILE
 
-FEWEST_BLOCKS = 8
-COLOUR_S = (0.1, 0.2, 0.35, 0.6, 1.0)  # time constants of the noise's coloured part; slower ones count as structure
-NOISE_KNOWN_TO = 0.25
-CUT = 3.0  # medians of the size
+# Resolutions: half and twice of each changed no name in two cases.
+COLOURS = 5  # time constants of the noise's coloured part
 PLACES = 64  # of a cycle, when repeats are laid over each other
-ALIKE = 0.1  # in height and duration
 
 
 @dataclass(frozen=True, slots=True)
 class LackOfFit:
     """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
 
-    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks.
+    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks. ``significant``: noise that is
+    known by so many hardly reaches it (Student's t).
     """
 
     rms: float
     z: float
     pairs: int
+    thresholds: Thresholds
+
+    @property
+    def significant(self) -> bool:
+        return self.pairs > 1 and self.z > -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
 
 
-def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> LackOfFit:
+def repeating(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
     """Structure that repeats from cycle to cycle: its power in each kind of cycle, over the record."""
     power = variance = 0.0
     pairs = 0
-    for rows, share in repeats(sessions, residuals):
+    for rows, share in repeats(sessions, residuals, thresholds.cycle):
         count = rows.shape[0]
         gram = rows @ rows.T / PLACES
         products = gram[np.triu_indices(count, 1)]
@@ -61,13 +67,15 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array]) -> LackOf
         variance += share**2 * spread / products.size
         pairs += products.size
     if not pairs:
-        return LackOfFit(0.0, 0.0, 0)
-    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / max(float(np.sqrt(variance)), 1e-300), pairs)
+        return LackOfFit(0.0, 0.0, 0, thresholds)
+    z = power / max(float(np.sqrt(variance)), 1e-300)
+    return LackOfFit(float(np.sqrt(max(power, 0.0))), z, pairs, thresholds)
 
 
-def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[tuple[Array, float]]:
+def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: float) -> list[tuple[Array, float]]:
     """The residual over each kind of load cycle that comes back: (repeats, PLACES), while the unit is loaded.
 
+    Cycles of a kind differ by a share ``alike`` at most, in height and duration.
     And the share of all samples that are within cycles of the kind: elsewhere nothing tells what repeats.
     """
     found: list[tuple[float, float, Array, int]] = []
@@ -93,7 +101,7 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[tup
     kinds: list[list[tuple[float, float, Array, int]]] = []
     for one in found:
         for kind in kinds:
-            if all(abs(a - b) <= ALIKE * abs(b) for a, b in zip(one[:2], kind[0][:2], strict=True)):
+            if all(abs(a - b) <= alike * abs(b) for a, b in zip(one[:2], kind[0][:2], strict=True)):
                 kind.append(one)
                 break
         else:
@@ -105,31 +113,30 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array]) -> list[tup
     ]
 
 
-def slow(sessions: Sequence[Session], residuals: Sequence[Array], block_s: float) -> LackOfFit:
-    """Structure in the means of blocks of ``block_s``, beyond what the noise of the faster part would leave there."""
+def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
+    """Structure in the means of blocks of ``lasting_s``, beyond what the noise of the faster part would leave there."""
     excess: list[float] = []
     spread = 0.0
     for session, residual in zip(sessions, residuals, strict=True):
         step_s = session.conditions.step_s
-        width = max(4, round(block_s / step_s))
+        width = max(4, round(thresholds.lasting_s / step_s))
         count = residual.size // width
-        if count < FEWEST_BLOCKS:
+        if count < thresholds.few:
             continue
         mask = session.usable[: count * width].reshape(count, width)
         rows = residual[: count * width].reshape(count, width)[mask.all(axis=1)]
-        if rows.shape[0] < FEWEST_BLOCKS:
+        if rows.shape[0] < thresholds.few:
             continue
         means = rows.mean(axis=1)
-        expected = _mean_variance(rows - means[:, None], step_s) * _loudness(rows)
+        expected = _mean_variance(rows - means[:, None], step_s, thresholds) * _loudness(rows, thresholds.clear)
         excess += list(means**2 - expected)
         # The blocks' own scatter, and that the noise is known from them to some percent only.
-        spread += 2.0 * float(expected @ expected) + (NOISE_KNOWN_TO * float(expected.sum())) ** 2
+        spread += 2.0 * float(expected @ expected) + (thresholds.same * float(expected.sum())) ** 2
     if not excess:
-        return LackOfFit(0.0, 0.0, 0)
+        return LackOfFit(0.0, 0.0, 0, thresholds)
     mean = float(np.mean(excess))
-    return LackOfFit(
-        float(np.sqrt(max(mean, 0.0))), mean * len(excess) / max(float(np.sqrt(spread)), 1e-300), len(excess)
-    )
+    z = mean * len(excess) / max(float(np.sqrt(spread)), 1e-300)
+    return LackOfFit(float(np.sqrt(max(mean, 0.0))), z, len(excess), thresholds)
 
 
 def _quiet(rows: Array) -> Mask:
@@ -138,19 +145,19 @@ def _quiet(rows: Array) -> Mask:
     return np.asarray(power <= np.quantile(power, 0.9))
 
 
-def _loudness(rows: Array) -> Array:
+def _loudness(rows: Array, clear: float) -> Array:
     """(blocks,) noise power of each block over that of the quiet ones, by differences of neighbours.
 
     Noise that grows with load or slope is no structure; and structure hardly shows from one sample to the next.
     """
     fast = np.abs(np.diff(rows, axis=1))
-    # One jump in a block is no loud noise.
-    fast = np.mean(np.minimum(fast, CUT * np.median(fast, axis=1, keepdims=True)) ** 2, axis=1)
+    # One jump in a block is no loud noise: as much as is clear of the standard deviation, by the median.
+    fast = np.mean(np.minimum(fast, clear / NORMAL_QUARTILE * np.median(fast, axis=1, keepdims=True)) ** 2, axis=1)
     usual = float(fast[_quiet(rows)].mean())
     return np.asarray(fast / usual) if usual > 0.0 else np.ones(fast.size)
 
 
-def _mean_variance(centred: Array, step_s: float) -> float:
+def _mean_variance(centred: Array, step_s: float, thresholds: Thresholds) -> float:
     """Variance of a block's mean under noise, white and first-order, that fits the ``centred`` (blocks, width).
 
     Taking a block's mean out changes every covariance; so the fit is to covariances that were changed in the same way.
@@ -163,7 +170,8 @@ def _mean_variance(centred: Array, step_s: float) -> float:
     centring = np.eye(width) - 1.0 / width
     white = np.array([float(np.mean(np.diag(centring, int(k)))) for k in lags])
     best: tuple[float, float] | None = None
-    for tau_s in COLOUR_S:
+    # A few of the slowest go into a block: what is slower counts as structure.
+    for tau_s in np.geomspace(thresholds.echo_s, thresholds.lasting_s / thresholds.few, COLOURS):
         covariance = np.exp(-np.abs(place[:, None] - place) * (step_s / tau_s))
         changed = centring @ covariance @ centring
         coloured = np.array([float(np.mean(np.diag(changed, int(k)))) for k in lags])

@@ -178,7 +178,7 @@ def _diagnosed(
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     fitted = [one for one in sessions if one.fitted.any()]  # the others may be of loads that nothing was learnt of
-    memory = gauss_markov_of(fitted, [residual_of(one, extended) for one in fitted], thresholds.false_alarm)
+    memory = gauss_markov_of(fitted, [residual_of(one, extended) for one in fitted], thresholds)
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, memory)
     named = {cause.name for cause in causes}
     parameters, covariance = joint_parameters(found.fit, scale)
@@ -348,7 +348,9 @@ def _zero_cause(
         f"it is {deviations:.3g} standard deviations from nothing",
     )
     sure = (
-        thresholds.least_confidence if zero.alternatives else thresholds.seen_confidence,  # by its model alone, or seen
+        thresholds.least_confidence
+        if zero.alternatives
+        else 1.0 - thresholds.false_name,  # by its model alone, or seen
         1.0 / (1.0 + len(zero.alternatives)),
     )
     evidence = (seen, *_held_out_evidence(zero.size, won))

@@ -14,9 +14,6 @@ from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, slow
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 
-BLOCK_S = 5.0
-SIGNIFICANT_Z = 5.0
-
 
 @dataclass(frozen=True, eq=False)
 class ResidualStructure:
@@ -45,7 +42,7 @@ class ResidualStructure:
     @property
     def how(self) -> str:
         """What the largest part does: it repeats with the load's cycles, or it wanders."""
-        return "repeats" if self.repeating.z > SIGNIFICANT_Z and self.repeating.rms >= self.rms else "wanders"
+        return "repeats" if self.repeating.significant and self.repeating.rms >= self.rms else "wanders"
 
     @property
     def is_noise(self) -> bool:
@@ -55,8 +52,8 @@ class ResidualStructure:
     @property
     def _found(self) -> list[float]:
         if self.memory is not None and self.memory.is_noise:
-            return [self.repeating.rms] if self.repeating.z > SIGNIFICANT_Z else []
-        found = [one.rms for one in (self.repeating, self.slow) if one.z > SIGNIFICANT_Z]
+            return [self.repeating.rms] if self.repeating.significant else []
+        found = [one.rms for one in (self.repeating, self.slow) if one.significant]
         # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
         return found if self.memory is None else [*found, min(self.memory.rms, self.size)]
 
@@ -65,27 +62,27 @@ def residual_structure(
     sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
 ) -> ResidualStructure:
     """Both tests of the residuals, and the place of the largest part."""
-    memory = gauss_markov_of(sessions, residuals, thresholds.false_alarm)
+    memory = gauss_markov_of(sessions, residuals, thresholds)
     says = where(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
     return ResidualStructure(
-        repeating(sessions, residuals),
-        slow(sessions, residuals, BLOCK_S),
+        repeating(sessions, residuals, thresholds),
+        slow(sessions, residuals, thresholds),
         memory,
         says,
-        beyond_noise(sessions, residuals),
+        beyond_noise(sessions, residuals, thresholds),
     )
 
 
-def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array]) -> float:
+def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:
     """Rms of ``residuals``, (n,) a session, over what is fitted beyond white noise, whether it repeats or not."""
     square, white, count = 0.0, 0.0, 0
     for session, whole in zip(sessions, residuals, strict=True):
         if session.fitted.any():
             residual = whole[session.fitted]
             square += float(residual @ residual)
-            white += noise_sd(residual) ** 2 * residual.size
+            white += noise_sd(residual, thresholds) ** 2 * residual.size
             count += residual.size
     return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
 

@@ -24,10 +24,11 @@ from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
 
+# Resolutions, for the sake of speed: half and twice of each changed no name in two cases.
 SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
-MOST_COARSENED = 6.0  # times: for the sake of speed
+MOST_COARSENED = 6.0  # times, beyond what keeps the fastest ramp
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +217,7 @@ def _session(
         time_s = even
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
     weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
-    quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s)
+    quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s, thresholds)
     load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, thresholds.standing)
@@ -253,9 +254,9 @@ def _session(
     )
 
 
-def _quiet(load: Array, reading: Array, step_s: float) -> Quiet:
-    raw = noise_sd(load)
-    quiet, left = without_noise(load, step_s, raw)
+def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> Quiet:
+    raw = noise_sd(load, thresholds)
+    quiet, left = without_noise(load, step_s, raw, thresholds)
     return Quiet(as_sampled(quiet, reading, step_s), raw, left)
 
 

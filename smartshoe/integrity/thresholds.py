@@ -85,7 +85,6 @@ class Thresholds:
         "of the kind; below it no cause is named; of a zero that is never seen",
         "two to one for being right",
     )
-    seen_confidence: float = threshold(0.97, "probability", "of a zero or tare seen at rest", "bank")
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
     memory_s: tuple[float, ...] = threshold(
         (0.3, 3.0, 30.0), "s", "time constants by which a law may follow otherwise", "one a decade of the protocols"

@@ -17,7 +17,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._evidence import Evidence
-from smartshoe.diagnosis._gauss_markov import BLOCK_S, gauss_markov_of
+from smartshoe.diagnosis._gauss_markov import gauss_markov_of
 from smartshoe.diagnosis._inference import independent
 from smartshoe.diagnosis._lack_of_fit import slow
 from smartshoe.diagnosis._residual_structure import where
@@ -88,8 +88,8 @@ def test_what_a_slow_noise_amounts_to_does_not_depend_on_white_noise_beside_it(
         keep = float(np.exp(-step_s / tau_s))
         slow_part = lfilter([1.0], [1.0, -keep], np.sqrt(1 - keep**2) * rng.standard_normal(n + 500))[500:]
         # As large as the slow one in the means that are looked at.
-        residuals.append(rms * slow_part + rms * np.sqrt(BLOCK_S / step_s) * rng.standard_normal(n))
-    found = gauss_markov_of(sessions, residuals, Thresholds().false_alarm)
+        residuals.append(rms * slow_part + rms * np.sqrt(Thresholds().sensor_lag_s / step_s) * rng.standard_normal(n))
+    found = gauss_markov_of(sessions, residuals, Thresholds())
     assert found is not None
     assert found.rms == pytest.approx(rms, rel=0.5)
 
@@ -100,10 +100,10 @@ def test_noise_that_is_louder_in_parts_is_no_structure(sessions: list[Session]) 
     for session in sessions:
         loud = np.where(np.arange(session.reading.size) // 200 % 2 == 0, 1.0, 4.0)
         found.append(0.001 * loud * rng.standard_normal(loud.size))
-    assert abs(slow(sessions, found, 2.0).z) < 4.0
+    assert abs(slow(sessions, found, Thresholds(hold_s=1.0)).z) < 4.0
     sines = [0.002 * np.sin(2 * np.pi * session.conditions.time_s / 20.0) for session in sessions]
     both = [noise + sine for noise, sine in zip(found, sines, strict=True)]
-    assert slow(sessions, both, 2.0).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
+    assert slow(sessions, both, Thresholds(hold_s=1.0)).rms == pytest.approx(0.002 / np.sqrt(2), rel=0.15)
 
 
 def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list[Session]) -> None:

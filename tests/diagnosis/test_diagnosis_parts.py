@@ -107,7 +107,7 @@ def test_noise_is_known_to_five_percent_on_any_lattice(seed: int, steps: float) 
     """Of 20,000 samples a standard deviation is known to 0.5 %; the lattice adds a twelfth of its step's square."""
     rng = np.random.default_rng(seed)
     signal = np.round(steps * rng.standard_normal(20_000) + np.linspace(0.0, 300.0, 20_000))
-    assert_allclose(noise_sd(signal), np.sqrt(steps**2 + 1.0 / 12.0), rtol=0.05)
+    assert_allclose(noise_sd(signal, Thresholds()), np.sqrt(steps**2 + 1.0 / 12.0), rtol=0.05)
 
 
 @given(st.floats(0.0, 0.9), st.integers(0, 99))
@@ -172,8 +172,8 @@ def test_noise_of_any_colour_is_not_taken_for_structure(seed: int, share: float,
     for k in range(1, n):
         coloured[k] = keep * coloured[k - 1] + np.sqrt(1 - keep**2) * rng.standard_normal()
     noise = 0.001 * (np.sqrt(1 - share) * rng.standard_normal(n) + np.sqrt(share) * coloured)
-    assert repeating(sessions, [noise]).z < 5.0
-    assert slow(sessions, [noise], 5.0).z < 5.0
+    assert not repeating(sessions, [noise], Thresholds()).significant
+    assert not slow(sessions, [noise], Thresholds()).significant
 
 
 def test_what_repeats_and_what_wanders_are_seen() -> None:
@@ -182,8 +182,8 @@ def test_what_repeats_and_what_wanders_are_seen() -> None:
     noise = 0.0005 * np.random.default_rng(1).standard_normal(at.load.size)
     bow = 0.002 * at.load * (1 - at.load)
     wander = 0.001 * np.sin(2 * np.pi * at.time_s / 47.0)
-    assert repeating(sessions, [noise + bow]).z > 10.0
-    seen = slow(sessions, [noise + wander], 5.0)
+    assert repeating(sessions, [noise + bow], Thresholds()).z > 10.0
+    seen = slow(sessions, [noise + wander], Thresholds())
     assert seen.z > 5.0
     assert seen.rms == pytest.approx(0.001 / np.sqrt(2), rel=0.2)
 

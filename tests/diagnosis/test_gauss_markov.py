@@ -17,7 +17,6 @@ from smartshoe.diagnosis._session import Session
 
 NOISE = 0.001
 STANDARD = Thresholds()
-ALARM = STANDARD.false_alarm
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +40,7 @@ def noises(sessions: list[Session], seed: int, tau_s: float = 0.0, rms: float = 
 @given(st.integers(0, 999), st.floats(0.3, 2.0), st.floats(0.003, 0.05))
 def test_first_order_noise_is_noise_however_strong(sessions, seed, tau_s, rms):
     residuals = noises(sessions, seed, tau_s, rms)
-    found = gauss_markov_of(sessions, residuals, ALARM)
+    found = gauss_markov_of(sessions, residuals, STANDARD)
     assert found is not None
     assert found.is_noise
     assert found.rms == pytest.approx(rms, rel=0.4)
@@ -71,7 +70,7 @@ def test_noise_of_any_spectrum_is_noise(sessions, drawn, seed, memory_s, rms):
         noise + rms * drawn(rng, noise.size, one.conditions.step_s, memory_s)
         for noise, one in zip(noises(sessions, seed), sessions, strict=True)
     ]
-    found = gauss_markov_of(sessions, residuals, ALARM)
+    found = gauss_markov_of(sessions, residuals, STANDARD)
     assert found is not None
     assert found.is_noise
     assert not residual_structure(sessions, residuals, STANDARD).significant
@@ -94,7 +93,7 @@ def seated(session: Session, rng: np.random.Generator) -> np.ndarray:
 def test_an_unknown_effect_is_no_noise(sessions, unknown):
     rng = np.random.default_rng(4)
     residuals = [noise + 0.01 * unknown(one, rng) for noise, one in zip(noises(sessions, 4), sessions, strict=True)]
-    found, left = gauss_markov_of(sessions, residuals, ALARM), residual_structure(sessions, residuals, STANDARD)
+    found, left = gauss_markov_of(sessions, residuals, STANDARD), residual_structure(sessions, residuals, STANDARD)
     assert found is not None
     assert not found.is_noise
     assert left.significant
@@ -104,8 +103,8 @@ def test_an_unknown_effect_is_no_noise(sessions, unknown):
 
 
 def test_too_little_tells_nothing(sessions):
-    assert gauss_markov_of([], [], ALARM) is None
-    assert gauss_markov_of(sessions, [np.zeros(one.reading.size) for one in sessions], ALARM) is None
+    assert gauss_markov_of([], [], STANDARD) is None
+    assert gauss_markov_of(sessions, [np.zeros(one.reading.size) for one in sessions], STANDARD) is None
 
 
 # -- jitter ------------------------------------------------------------------------------------------------------------

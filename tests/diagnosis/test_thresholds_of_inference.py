@@ -116,9 +116,9 @@ def test_a_zero_is_named_by_its_size_and_how_well_it_is_known(
     assert decides(field, low, high, is_named) == named
 
 
-def test_seen_confidence_is_that_of_an_offset_at_rest() -> None:
+def test_false_name_is_what_lacks_of_the_confidence_in_an_offset_at_rest() -> None:
     runs = [_recording(seed=seed, offset=0.04) for seed in range(3)]
-    found = diagnose(runs[:2], hold_out=runs[2], thresholds=replace(STANDARD, seen_confidence=0.83))
+    found = diagnose(runs[:2], hold_out=runs[2], thresholds=replace(STANDARD, false_name=0.17))
     assert {one.name: one.confidence for one in found.causes} == {"zero_offset": 0.83}
 
 

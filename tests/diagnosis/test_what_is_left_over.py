@@ -29,7 +29,7 @@ from smartshoe.units import MILLIBAR
 Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
-NOTHING = LackOfFit(0.0, 0.0, 0)
+NOTHING = LackOfFit(0.0, 0.0, 0, STANDARD)
 
 
 @pytest.fixture(scope="module")
@@ -152,12 +152,12 @@ def test_what_repeats_is_as_large_as_it_is(sessions: list[Session]) -> None:
         residuals.append(bow + 1e-4 * np.random.default_rng(session.index).standard_normal(load.size))
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
-    found = repeating(sessions, residuals)
+    found = repeating(sessions, residuals, STANDARD)
     assert found.rms == pytest.approx(np.sqrt(square / size), rel=0.1)
     assert found.z > 100.0
     # Nine presses of each of four rates, of which two rates press as long; each with each other one.
     assert found.pairs >= 4 * (9 * 8 // 2)
-    kinds = repeats(sessions, residuals)
+    kinds = repeats(sessions, residuals, STANDARD.cycle)
     assert sum(len(rows) for rows, _ in kinds) == 36
     inside = sum(float(np.mean(session.conditions.load > 0.1)) for session in sessions) / 3
     assert sum(share for _, share in kinds) == pytest.approx(inside, abs=0.05)
@@ -173,13 +173,15 @@ def test_what_repeats_in_fast_cycles_counts_for_the_time_that_they_take(sessions
         square += float(bow @ bow)
     size = sum(session.reading.size for session in sessions)
     assert square > 0.0
-    assert repeating(sessions, residuals).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
+    assert repeating(sessions, residuals, STANDARD).rms == pytest.approx(np.sqrt(square / size), rel=0.15)
 
 
 def test_the_score_of_noise_that_repeats_by_chance_is_a_normal_deviate(sessions: list[Session]) -> None:
     rng = np.random.default_rng(11)
     scores = [
-        repeating(sessions, [lfilter([1.0], [1.0, -0.9], rng.standard_normal(s.reading.size)) for s in sessions]).z
+        repeating(
+            sessions, [lfilter([1.0], [1.0, -0.9], rng.standard_normal(s.reading.size)) for s in sessions], STANDARD
+        ).z
         for _ in range(20)
     ]
     assert np.std(scores) == pytest.approx(1.0, abs=0.5)
@@ -188,24 +190,24 @@ def test_the_score_of_noise_that_repeats_by_chance_is_a_normal_deviate(sessions:
 
 def test_nothing_repeats_without_repeats(sessions: list[Session]) -> None:
     single = replace(sessions[0], cycle=np.zeros(sessions[0].reading.size, dtype=np.intp))
-    assert repeating([single], [np.ones(single.reading.size)]) == NOTHING
+    assert repeating([single], [np.ones(single.reading.size)], STANDARD) == NOTHING
     short = [replace(s, reading=s.reading[:50], usable=s.usable[:50]) for s in sessions]
-    assert slow(short, [np.ones(50) for _ in short], 5.0) == NOTHING
+    assert slow(short, [np.ones(50) for _ in short], STANDARD) == NOTHING
 
 
 def test_cycles_with_lacking_samples_are_left_out(sessions: list[Session]) -> None:
     session = sessions[0]
-    kinds = repeats([session], [session.reading])
+    kinds = repeats([session], [session.reading], STANDARD.cycle)
     usable = session.usable.copy()
     loaded = np.flatnonzero((session.cycle == 4) & (session.conditions.load > 0.3))
     usable[loaded] = False
-    fewer = repeats([replace(session, usable=usable)], [session.reading])
+    fewer = repeats([replace(session, usable=usable)], [session.reading], STANDARD.cycle)
     assert sum(len(rows) for rows, _ in kinds) - sum(len(rows) for rows, _ in fewer) == 1
 
 
 def test_rows_of_a_kind_are_the_residual_along_the_cycle(sessions: list[Session]) -> None:
     session = sessions[0]
-    kinds = repeats([session], [session.conditions.load])
+    kinds = repeats([session], [session.conditions.load], STANDARD.cycle)
     assert len(kinds) == 4
     for kind, _ in kinds:
         assert kind.shape[0] == 3
@@ -218,13 +220,13 @@ def test_rows_of_a_kind_are_the_residual_along_the_cycle(sessions: list[Session]
 def test_means_of_noise_vary_as_its_own_fast_part_says(sessions: list[Session], colour: float) -> None:
     rng = np.random.default_rng(3)
     noise = [lfilter([1.0], [1.0, -colour], rng.standard_normal(s.reading.size)) for s in sessions]
-    assert abs(slow(sessions, noise, 5.0).z) < 3.0
+    assert abs(slow(sessions, noise, STANDARD).z) < 3.0
     sines = [3.0 * np.sin(2 * np.pi * s.conditions.time_s / 60.0) for s in sessions]
     wander = [one + sine for one, sine in zip(noise, sines, strict=True)]
-    found = slow(sessions, wander, 5.0)
+    found = slow(sessions, wander, STANDARD)
     assert found.z > 3.0
     assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=0.25)
-    blocks = sum(int(s.conditions.time_s[-1] / 5.0) for s in sessions)
+    blocks = sum(int(s.conditions.time_s[-1] / STANDARD.lasting_s) for s in sessions)
     assert found.pairs == pytest.approx(blocks, abs=6)
 
 
@@ -232,21 +234,21 @@ def test_a_jump_in_one_block_makes_it_no_loud_noise(sessions: list[Session]) -> 
     session = sessions[0]
     noise = 1e-3 * np.random.default_rng(5).standard_normal(session.reading.size)
     stepped = noise + 0.01 * (session.conditions.time_s > 0.5 * session.conditions.time_s[-1])
-    assert slow([session], [stepped], 5.0).z > 10.0
+    assert slow([session], [stepped], STANDARD).z > 10.0
 
 
 def test_what_is_beyond_white_noise_is_the_rest_of_the_power(sessions: list[Session]) -> None:
     rng = np.random.default_rng(4)
     residuals = [1e-3 * rng.standard_normal(s.reading.size) for s in sessions]
-    assert beyond_noise(sessions, residuals) < 3e-4
+    assert beyond_noise(sessions, residuals, STANDARD) < 3e-4
     tilted = [r + 2e-3 * np.sin(s.conditions.time_s / 3.0) for r, s in zip(residuals, sessions, strict=True)]
-    assert beyond_noise(sessions, tilted) == pytest.approx(2e-3 / np.sqrt(2.0), rel=0.05)
+    assert beyond_noise(sessions, tilted, STANDARD) == pytest.approx(2e-3 / np.sqrt(2.0), rel=0.05)
     held = [replace(s, held_out=np.ones(s.reading.size, dtype=bool)) for s in sessions]
-    assert beyond_noise(held, tilted) == 0.0
+    assert beyond_noise(held, tilted, STANDARD) == 0.0
 
 
 def _memory(**changes: Any) -> GaussMarkov:
-    quiet = GaussMarkov(0.004, 1.0, 0.1, 0.1, 0.1, 0.0, 1e-4)
+    quiet = GaussMarkov(0.004, 1.0, 0.1, 0.1, 0.1, 0.0, STANDARD)
     return replace(quiet, **changes)
 
 
@@ -255,13 +257,13 @@ def test_noise_is_white_gaussian_deaf_to_the_load_and_quick_enough() -> None:
     for off in ({"coloured": 9.0}, {"surprises": 9.0}, {"surprises": -9.0}, {"follows": 9.0}, {"tau_s": 9.0}):
         assert not _memory(**off).is_noise
     assert _memory(surprises=50.0, flatness=-1.8).switches
-    for off in ({"coloured": 9.0}, {"follows": 9.0}, {"flatness": 0.0}, {"surprises": 5.0}):
+    for off in ({"coloured": 9.0}, {"follows": 9.0}, {"flatness": 0.0}, {"surprises": 3.0}):
         assert not _memory(**{"surprises": 50.0, "flatness": -1.8, **off}).switches
 
 
 def test_the_structure_is_the_largest_of_what_stands_out() -> None:
-    repeated, wandering = LackOfFit(0.003, 50.0, 9), LackOfFit(0.002, 50.0, 9)
-    quiet = LackOfFit(0.009, 1.0, 9)
+    repeated, wandering = LackOfFit(0.003, 50.0, 9, STANDARD), LackOfFit(0.002, 50.0, 9, STANDARD)
+    quiet = LackOfFit(0.009, 1.0, 9, STANDARD)
 
     def left(repeats_: LackOfFit, slow_: LackOfFit, memory: GaussMarkov | None = None) -> ResidualStructure:
         return ResidualStructure(repeats_, slow_, memory, "", 0.0035)
@@ -330,8 +332,8 @@ def test_a_memory_is_known_by_its_time_and_size_whatever_the_level(sessions: lis
     rng = np.random.default_rng(6)
     for tau_s in (0.5, 1.5):
         noise = [0.01 * _remembering(s, tau_s, rng) for s in sessions]
-        found = gauss_markov_of(sessions, noise, 1e-4)
-        lifted = gauss_markov_of(sessions, [one + 3.0 for one in noise], 1e-4)
+        found = gauss_markov_of(sessions, noise, STANDARD)
+        lifted = gauss_markov_of(sessions, [one + 3.0 for one in noise], STANDARD)
         assert found is not None
         assert found.tau_s == pytest.approx(tau_s, rel=0.5)
         assert found.rms == pytest.approx(0.01, rel=0.3)
@@ -346,7 +348,7 @@ def test_samples_that_lack_surprise_nobody(sessions: list[Session]) -> None:
     usable = [s.usable & ~((s.conditions.time_s > 40.0) & (s.conditions.time_s < 50.0)) for s in sessions]
     torn = [replace(s, usable=mask) for s, mask in zip(sessions, usable, strict=True)]
     spoilt = [np.where(mask, one, 5.0) for one, mask in zip(noise, usable, strict=True)]
-    found = gauss_markov_of(torn, spoilt, 1e-4)
+    found = gauss_markov_of(torn, spoilt, STANDARD)
     assert found is not None
     assert found.is_noise
     assert found.rms == pytest.approx(0.01, rel=0.3)

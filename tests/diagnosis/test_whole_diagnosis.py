@@ -228,7 +228,7 @@ def test_a_load_that_pulls_as_much_as_it_presses_is_refused_in_newtons(runs: lis
 
 
 def _left(rms: float) -> ResidualStructure:
-    return ResidualStructure(LackOfFit(rms, 50.0, 9), LackOfFit(0.0, 0.0, 0), None, "", rms)
+    return ResidualStructure(LackOfFit(rms, 50.0, 9, Thresholds()), LackOfFit(0.0, 0.0, 0, Thresholds()), None, "", rms)
 
 
 def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:

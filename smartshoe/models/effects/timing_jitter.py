@@ -28,12 +28,25 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000, or by no
     more than a time stamp leaves open: where within its interval a sample lies.
     """
+    found = _found(residual, prediction, sample_time_s)
+    if found is None:
+        return None
+    value, strength, sd_s = found
+    says = f"the noise grows with the slope of the pressure, as from {1e3 * sd_s:.2g} ms of jitter in the sampling"
+    return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
+
+
+def jitter_s(residual: Array, prediction: Array, sample_time_s: float) -> float:
+    """Standard deviation of the sampling time, by the same test; 0 where it finds nothing."""
+    found = _found(residual, prediction, sample_time_s)
+    return found[2] if found is not None else 0.0
+
+
+def _found(residual: Array, prediction: Array, sample_time_s: float) -> tuple[float, float, float] | None:
+    """Score and strength, and the jitter's standard deviation in s; None within what a time stamp leaves open."""
     found = growing_noise(residual, prediction, sample_time_s, SLOPE)
     if found is None:
         return None
     value, strength, local = found
-    jitter_s = strength / sqrt(float(local.slope_squared.max()))
-    if jitter_s < UNIFORM_SD * sample_time_s:
-        return None
-    says = f"the noise grows with the slope of the pressure, as from {1e3 * jitter_s:.2g} ms of jitter in the sampling"
-    return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
+    sd_s = strength / sqrt(float(local.slope_squared.max()))
+    return (value, strength, sd_s) if sd_s >= UNIFORM_SD * sample_time_s else None
