@@ -12,13 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.diagnosis._arms import (
-    arms_of,
-    effect_count,
-    with_an_arm_that_creeps,
-    with_another_pole,
-    with_arm,
-)
+from smartshoe.diagnosis._arms import arms_of, effect_count, with_an_arm_that_creeps, with_another_pole, with_arm
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
@@ -28,13 +22,7 @@ from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions, search
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
-from smartshoe.diagnosis._validation import (
-    apart,
-    error_of,
-    extrapolating,
-    foreseen,
-    worst_member,
-)
+from smartshoe.diagnosis._validation import apart, error_of, extrapolating, foreseen, worst_member
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
@@ -104,9 +92,9 @@ def _judged(
     while (worst := worst_member(evidence, best)) is not None:
         refused.append(given.candidates[worst].name)
         best = search(evidence, tuple(m for m in best.members if m != worst), [*refused, *state.banned])
-    likelihood = state.likelihood(sessions)
+    likelihood, most = state.likelihood(sessions), error_of(sessions, plain.model)
     extended = fit(likelihood, with_members(given, best, extended.model, likelihood))
-    if extended.model.parts and error_of(sessions, extended.model) >= error_of(sessions, plain.model):
+    if extended.model.parts and error_of(sessions, extended.model) >= most:
         # A model that others had bent: from the plain one, each effect at its likeliest shape.
         model = plain.model
         for one in (given.candidates[m].effect for m in best.members):
@@ -116,8 +104,8 @@ def _judged(
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
-    went_astray = error_of(sessions, extended.model) >= error_of(sessions, plain.model)
-    if not extended.model.parts or went_astray or foreseen(evidence, best) < state.thresholds.foreseen:
+    went_astray = not extended.model.parts or error_of(sessions, extended.model) >= most
+    if went_astray or foreseen(evidence, best) < state.thresholds.foreseen:
         extended, best = plain, evidence.posterior(())
     members = members_of(evidence, best, refused, likelihood, extended)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused))

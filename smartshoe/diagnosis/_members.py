@@ -9,9 +9,7 @@ from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available
-from smartshoe.diagnosis._validation import (
-    apart,
-)
+from smartshoe.diagnosis._validation import apart
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 

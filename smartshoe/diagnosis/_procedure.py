@@ -159,7 +159,8 @@ def _diagnosed(
     progress("judging on held-out data")
     extended = found.fit.model
     before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], thresholds)
-    after = residual_structure(sessions, [residual_of(one, extended) for one in sessions], thresholds)
+    residuals = [residual_of(one, extended) for one in sessions]
+    after = residual_structure(sessions, residuals, thresholds)
     left = after.rms if after.significant else 0.0
     everything = max(left, after.size)
     silent = given.is_no_unit or not found.can_validate
@@ -177,8 +178,9 @@ def _diagnosed(
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
-    fitted = [one for one in sessions if one.fitted.any()]  # the others may be of loads that nothing was learnt of
-    memory = gauss_markov_of(fitted, [residual_of(one, extended) for one in fitted], thresholds)
+    # What was not fitted may be of loads that nothing was learnt of.
+    learnt = [k for k, one in enumerate(sessions) if one.fitted.any()]
+    memory = gauss_markov_of([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, memory)
     named = {cause.name for cause in causes}
     parameters, covariance = joint_parameters(found.fit, scale)
