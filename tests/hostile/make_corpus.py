@@ -61,6 +61,11 @@ def hdf5_files(folder: Path) -> None:
     _hdf5(folder / "channels_a_number.h5", _own(channels="5"))
     _hdf5(folder / "name_an_array.h5", _own(name=np.arange(4)))
     whole = (folder / "metadata_a_list.h5").read_bytes()
+    # A driver's block is named where there is none: its length is what stands there, 4 GB.
+    driver = (
+        whole[:48] + struct.pack("<Q", len(whole)) + whole[56:] + b"\0\0\0\0\xff\xff\xff\xffNCSAmult".ljust(64, b"\0")
+    )
+    (folder / "driver_of_four_gigabytes.h5").write_bytes(driver)
     (folder / "truncated.h5").write_bytes(whole[: len(whole) // 2])
 
 

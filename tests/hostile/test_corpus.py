@@ -15,6 +15,7 @@ EXPECTED = {
     "external_link.h5": (3, "another file"),
     "virtual.h5": (3, "another file"),
     "eleven_gigabytes.h5": (3, "declares"),
+    "driver_of_four_gigabytes.h5": (3, "one of several"),
     "metadata_a_list.h5": (3, "write it again|export it again"),
     "metadata_no_json.h5": (3, "export it again"),
     "channels_a_number.h5": (3, "export it again"),

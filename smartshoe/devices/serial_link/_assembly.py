@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, Integers
 from smartshoe.devices._base import Block
 from smartshoe.devices._events import Gap, Restarted, ShoeEvent
+from smartshoe.devices.serial_link._pace import Pace
 from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.devices.wire.clock import DeviceClock, at_once
 from smartshoe.devices.wire.information import Information
@@ -18,8 +19,6 @@ from smartshoe.errors import DeviceError
 from smartshoe.units import Unit
 
 RATED_S = 1.0
-# A step this many times the usual one is a hole; below, a rounded clock's (1 and 2 ms at 700 Hz) count as steps.
-HOLE_STEPS = 2.5
 # Text lines' unit of time is a guess: a clock that seems this much slower than the host's is in another one.
 SLOWEST_CLOCK = 0.1
 WATCHED_S = 3.0
@@ -50,8 +49,8 @@ class Assembler:
         self.unit = to or scaled.unit
         self._apart = apart
         self.clock = DeviceClock(apart)
-        self.rate_hz: float | None = None
         self._counts_samples = counts_samples
+        self._pace: Pace | None = None
         self._steps_s: list[float] = []
         self._is_rated = False
         self._watched_s = [0.0, 0.0]  # of the device's clock, of the host's, while samples flowed
@@ -75,6 +74,11 @@ class Assembler:
             for start, end in zip([0, *ends], ends, strict=False)
         ]
         return joined(blocks), events
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Samples a second as their times say; None before two of them have come."""
+        return None if self._pace is None else 1.0 / self._pace.period_s
 
     def _scaled(self, samples: Samples) -> Samples:
         return samples if self._information is None else self._information.scale(samples)
@@ -105,15 +109,21 @@ class Assembler:
             arrival_s = np.append(self._last[3], arrival_s)
         if time_s.size < 2:
             return
-        steps = self._steps(sequence, time_s)
+        steps_s = np.diff(time_s)
+        if not self._is_rated:
+            self._rate(steps_s / np.diff(sequence))
+        steps = np.diff(sequence) if self._counts_samples or self._pace is None else self._pace.samples(steps_s)
         events += [
             Gap(float(arrival_s[i + 1]), int(steps[i]) - 1, float(time_s[i]), float(time_s[i + 1]))
             for i in np.flatnonzero(steps > 1)
         ]
-        if not self._is_rated:
-            self._steps_s += (np.diff(time_s) / steps).tolist()
-            self._is_rated = sum(self._steps_s) >= RATED_S
-            self.rate_hz = rate_of(np.array(self._steps_s))
+
+    def _rate(self, steps_s: Array) -> None:
+        """Measure the pace over all steps so far, until they are `RATED_S` without their holes."""
+        self._steps_s += steps_s.tolist()
+        so_far_s = np.array(self._steps_s)
+        self._pace = Pace.of(so_far_s)
+        self._is_rated = bool(np.sum(so_far_s / self._pace.samples(so_far_s)) >= RATED_S)
 
     def _require_seconds(self, time_s: float, arrival_s: float) -> None:
         """Raises `DeviceError` where text lines' times go by far slower than the host's clock."""
@@ -127,15 +137,3 @@ class Assembler:
                 f"the shoe's times went on by {device_s:.3g} s in {host_s:.1f} s: say their unit in its address,"
                 " with time=s, time=ms or time=us"
             )
-
-    def _steps(self, sequence: Integers, time_s: Array) -> Integers:
-        """Samples that the device took from each to the next, one at least."""
-        if self._counts_samples or self.rate_hz is None:
-            return np.diff(sequence)
-        return np.maximum(np.rint(np.diff(time_s) * self.rate_hz).astype(np.int64), 1)
-
-
-def rate_of(steps_s: Array) -> float:
-    """Samples a second of a device whose samples are ``steps_s`` (n,) apart, holes left out; n is 1 at least."""
-    usual = steps_s <= HOLE_STEPS * float(np.median(steps_s))
-    return 1.0 / float(steps_s[usual].mean())

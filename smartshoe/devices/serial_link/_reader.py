@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+import numpy as np
+
 from smartshoe.arrays import Array
 from smartshoe.devices._events import Disconnected, EventLog, Reconnected, Silence, ToldLate
 from smartshoe.devices.serial_link._assembly import Assembler
@@ -13,7 +15,7 @@ from smartshoe.devices.serial_link._port import READ_WAIT_S, Port
 from smartshoe.devices.serial_link._settings import SerialSettings
 from smartshoe.devices.serial_link.inbox import Inbox
 from smartshoe.devices.serial_link.reconnect import Backoff
-from smartshoe.devices.wire.samples import Samples
+from smartshoe.devices.wire.samples import Samples, join_samples
 from smartshoe.errors import DeviceError, DeviceTimeoutError
 
 # Reading waits 50 ms, writing 500 ms; only an operating system that hangs in opening a port takes longer.
@@ -59,8 +61,9 @@ class SerialReader:
         self._openings = 0  # since the last valid frame
         self._is_silent = self._is_away = False
         self._reason = "silent"
-        for samples, arrival_s in greeting.first:
-            self._hand_on(samples, arrival_s)
+        # Together: the pace of text lines, by which lost ones are told, is measured over all of them.
+        parts, arrivals_s = zip(*greeting.first, strict=True)
+        self._hand_on(join_samples(parts), np.concatenate(arrivals_s))
         self._thread = threading.Thread(target=self._run, name=f"reader of {name}", daemon=True)
 
     @property

@@ -1,18 +1,15 @@
-"""Text lines as sketches print them, over a pseudo-terminal: their rate, their habits, and what is said of bad ones."""
+"""Text lines as sketches print them: their rate, their habits, and what is said of bad ones."""
 
 from __future__ import annotations
 
-import os
-import threading
 import time
-import tty
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from puppet import STEP_S, within
 
-from smartshoe.devices._events import Silence, ToldLate
+from smartshoe.devices._events import Gap, Silence, ToldLate
 from smartshoe.devices.serial_link._settings import SerialSettings
 from smartshoe.devices.serial_link.shoe import SerialShoe
 from smartshoe.devices.wire.frames import encode_information, encode_samples
@@ -25,37 +22,47 @@ DEVICE = Information("f", "L-0042", 100.0, tuple(ChannelInformation(name, "mbar"
 pytestmark = pytest.mark.wire
 
 
-@contextmanager
-def board(said: Callable[[int], bytes], rate_hz: float) -> Iterator[str]:
-    """The port of a board that says ``said`` of 0, 1, 2, ..., ``rate_hz`` times a second, and hears nothing."""
-    here, there = os.openpty()
-    tty.setraw(there)
-    os.set_blocking(here, False)
-    stop = threading.Event()
-
-    def loop() -> None:
-        begin_s, count = time.perf_counter(), 0
-        while not stop.wait(max(begin_s + count / rate_hz - time.perf_counter(), 0.0)):
-            with suppress(BlockingIOError):  # nobody listens yet, as before a board's port is opened
-                os.write(here, said(count))
-            count += 1
-
-    thread = threading.Thread(target=loop, daemon=True)
-    thread.start()
-    try:
-        yield os.ttyname(there)
-    finally:
-        stop.set()
-        thread.join()
-        os.close(here)
-        os.close(there)
+LINES = 10_000  # fewer than wait in a shoe's buffer
 
 
-@contextmanager
-def sketch(line_of: Callable[[float], str], rate_hz: float) -> Iterator[str]:
-    """The port of a sketch that prints ``line_of`` the seconds since its boot, ``rate_hz`` times a second."""
-    with board(lambda count: f"{line_of(1.0 + count / rate_hz)}\r\n".encode(), rate_hz) as port:
-        yield port
+class Board:
+    """A port behind which a board says ``said`` of 0, 1, 2, ..., ``rate_hz`` times a second, and hears nothing.
+
+    Time goes on only as the port is read, so that no machine is too slow for it; after `LINES` it stands still.
+    """
+
+    def __init__(self, said: Callable[[int], bytes], rate_hz: float) -> None:
+        self.now_s = 0.0
+        self._said, self._rate_hz = said, rate_hz
+        self._count = 0
+
+    def read(self, wait_s: float = 0.05) -> bytes:
+        """See `Port.read`."""
+        if self._count == LINES:
+            time.sleep(0.002)
+            return b""
+        due_s = self._count / self._rate_hz
+        if due_s > self.now_s + wait_s:
+            self.now_s += wait_s
+            return b""
+        self.now_s = max(self.now_s, due_s)
+        self._count += 1
+        return self._said(self._count - 1)
+
+    def write(self, data: bytes) -> None:
+        """See `Port.write`."""
+
+    def close(self) -> None:
+        """See `Port.close`."""
+
+    def shoe(self, **settings: Any) -> SerialShoe:
+        """A shoe at this port, on its clock."""
+        return SerialShoe("board", SerialSettings(**settings), open_port=lambda *_: self, clock=lambda: self.now_s)
+
+
+def sketch(line_of: Callable[[float], str], rate_hz: float, lost: range = range(0)) -> Board:
+    """A board that prints ``line_of`` the seconds since its boot; of the lines ``lost`` nothing comes."""
+    return Board(lambda k: b"" if k in lost else f"{line_of(1.0 + k / rate_hz)}\r\n".encode(), rate_hz)
 
 
 def _millis(time_s: float) -> str:
@@ -74,35 +81,46 @@ def _take(shoe: SerialShoe, samples: int) -> int:
     return within(STEP_S, take)
 
 
-@pytest.mark.parametrize("rate_hz", [20.0, 300.0, 700.0])
+@pytest.mark.parametrize("rate_hz", [20.0, 300.0, 700.0, 800.0, 950.0, 1000.0])
 def test_the_rate_of_lines_is_known_once_the_shoe_is_open(rate_hz: float) -> None:
-    with sketch(_millis, rate_hz) as port, SerialShoe(port, SerialSettings(format="lines")) as shoe:
+    """Though ``millis()`` goes on by 1 and by 2 from line to line, of which none is lost."""
+    with sketch(_millis, rate_hz).shoe(format="lines") as shoe:
         # Times rounded to a millisecond, at both ends of a second.
         assert shoe.sample_rate_hz == pytest.approx(rate_hz, rel=2e-3)
-        _take(shoe, int(0.5 * rate_hz))
+        _take(shoe, int(2.5 * rate_hz))
         assert shoe.events == ()
 
 
+@pytest.mark.parametrize("rate_hz", [100.0, 700.0, 800.0])
+@pytest.mark.parametrize("first", range(2, 9))
+def test_lines_lost_at_the_very_first_are_told_and_leave_the_rate(rate_hz: float, first: int) -> None:
+    """A line's buffer may hold what was sent before the port was opened, and lack what followed."""
+    with sketch(_millis, rate_hz, lost=range(first, first + 30)).shoe(format="lines") as shoe:
+        assert shoe.sample_rate_hz == pytest.approx(rate_hz, rel=2e-3)
+        _take(shoe, int(2.5 * rate_hz))
+        (gap,) = shoe.events
+        assert isinstance(gap, Gap)
+        assert gap.lost == pytest.approx(30, abs=1)
+
+
 def test_a_shoe_that_sends_seldom_is_not_silent() -> None:
-    settings = SerialSettings(format="lines", time="ms", silence_s=0.1, reopen_s=0.3)
-    with sketch(_millis, 4.0) as port, SerialShoe(port, settings) as shoe:
-        _take(shoe, 8)
+    with sketch(_millis, 4.0).shoe(format="lines", time="ms", silence_s=0.1, reopen_s=0.3) as shoe:
+        _take(shoe, 40)
         assert not [event for event in shoe.events if isinstance(event, Silence)]
 
 
 def test_a_separator_behind_the_last_reading_is_no_reading() -> None:
-    with sketch(lambda t: f"{_millis(t)},", 200.0) as port, SerialShoe(port) as shoe:
+    with sketch(lambda t: f"{_millis(t)},", 200.0).shoe() as shoe:
         assert _take(shoe, 50) >= 50
 
 
 def test_a_time_in_another_unit_is_told_not_taken() -> None:
     """Minutes with fractions look like seconds."""
     with (
-        sketch(lambda t: f"{t / 60:.6f},1,2,3,4", 200.0) as port,
-        SerialShoe(port) as shoe,
+        sketch(lambda t: f"{t / 60:.6f},1,2,3,4", 200.0).shoe() as shoe,
         pytest.raises(DeviceError, match="time=s, time=ms or time=us"),
     ):
-        _take(shoe, 10_000)
+        _take(shoe, LINES)
 
 
 @pytest.mark.parametrize(
@@ -113,10 +131,9 @@ def test_a_time_in_another_unit_is_told_not_taken() -> None:
     ],
 )
 def test_lines_without_a_usable_time_are_told_how_to_mend_it(line_of: Callable[[float], str], says: str) -> None:
-    with sketch(line_of, 400.0) as port:
-        shoe = SerialShoe(port, SerialSettings(wait_s=1.0))
-        with pytest.raises(DeviceTimeoutError, match=says):
-            within(STEP_S, shoe.open)
+    shoe = sketch(line_of, 400.0).shoe(wait_s=1.0)
+    with pytest.raises(DeviceTimeoutError, match=says):
+        within(STEP_S, shoe.open)
 
 
 def _frame(count: int, told_at: int) -> bytes:
@@ -126,12 +143,12 @@ def _frame(count: int, told_at: int) -> bytes:
 
 def test_information_that_comes_once_in_two_seconds_is_waited_for() -> None:
     """One telling a second, of which one is lost."""
-    with board(lambda count: _frame(count, 180), 100.0) as port, SerialShoe(port) as shoe:
+    with Board(lambda count: _frame(count, 180), 100.0).shoe() as shoe:
         assert {channel.unit for channel in shoe.describe()} == {MILLIBAR}
 
 
 def test_information_that_comes_too_late_is_told_and_readings_stay_counts() -> None:
-    with board(lambda count: _frame(count, 320), 100.0) as port, SerialShoe(port) as shoe:
+    with Board(lambda count: _frame(count, 320), 100.0).shoe() as shoe:
         _take(shoe, 400)
         assert {channel.unit for channel in shoe.describe()} == {COUNTS}
         assert [event.serial_number for event in shoe.events if isinstance(event, ToldLate)] == ["L-0042"]

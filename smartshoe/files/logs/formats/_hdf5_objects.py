@@ -14,14 +14,41 @@ _DEEPEST = 32
 _OBJECTS_PER_COLUMN = 25  # groups, scales, strings and references beside the columns
 
 
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_FIRST_PLACE = 512  # where a superblock may stand behind another format's header, and at each doubling
+_ADDRESSES_AT = {0: 24, 1: 28}  # of superblocks by version; from 2 on their checksums are checked
+_DRIVER = 3  # its address stands behind those of the base, the free space and the end
+_SUPERBLOCK = 160  # bytes, of the longest addresses; no whole file is shorter
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
     """The `h5py.File` at ``path``, read only; whatever HDF5 raises within the block is a `FormatError`."""
     import h5py
 
     require_regular_file(path)
+    _require_no_driver(path)
     with foreign_code(path, "HDF5 file", "write it again"), h5py.File(path, "r") as file:
         yield file
+
+
+def _require_no_driver(path: Path) -> None:
+    """Raises `FormatError` where the superblock names a driver: one file of several, or 4 GB taken for a wrong length.
+
+    HDF5 file format, II.A. The library takes as much memory as the driver's block says before it reads the block.
+    """
+    with path.open("rb") as file:
+        place, end, start = 0, path.stat().st_size, b""
+        while place < end and not start.startswith(_SIGNATURE):
+            file.seek(place)
+            start = file.read(_SUPERBLOCK)
+            place = 2 * place or _FIRST_PLACE
+    if not start.startswith(_SIGNATURE) or len(start) < _SUPERBLOCK or start[8] not in _ADDRESSES_AT:
+        return  # the library says what is wrong with it, if anything is
+    size = start[13]
+    at = _ADDRESSES_AT[start[8]] + _DRIVER * size
+    if start[at : at + size] != b"\xff" * size:
+        raise FormatError(f"{path} is one of several HDF5 files, or damaged: write it again, as one file")
 
 
 def vectors(path: Path, file: Any, *, deep: bool) -> list[tuple[str, Any]]:
