@@ -190,6 +190,20 @@ def test_an_extension_of_a_set_scores_as_the_set_whose_new_equation_is_exact(
         assert_allclose(strengths, mean[[c - 1 for c in given.candidates[k].columns]], rtol=0.02, atol=1e-5)
 
 
+def test_of_several_strengths_the_departures_are_of_the_likeliest(given: Linearised) -> None:
+    """Under noise so loud that the prior has its say in how far each goes."""
+    twin, evidence = _Twin(given, 0.3), Evidence(given, 0.3)
+    by_noise = np.linalg.solve(twin.white, twin.rows)
+    several = [one.columns for one in given.candidates if len(one.columns) > 1]
+    assert several
+    for columns in several:
+        index = [*range(1, 1 + given.own), *columns]
+        prior = np.diag([OWN_SD] * given.own + [given.thresholds.strength_sd**-2] * len(columns))
+        known = by_noise[:, index].T
+        strengths = np.linalg.solve(known @ twin.rows[:, index] + prior, known @ twin.rows[:, 0])[given.own :]
+        assert_allclose(evidence._direction(columns), strengths / np.linalg.norm(strengths), rtol=0.0, atol=1e-3)
+
+
 def test_odds_are_of_one_effect_among_all_at_one_of_its_shapes(given: Linearised, evidence: Evidence) -> None:
     names = [one.name for one in given.candidates]
     effects, limits = len(set(names)), given.thresholds

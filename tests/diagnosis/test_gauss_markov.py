@@ -47,6 +47,26 @@ def test_first_order_noise_is_noise_however_strong(sessions, seed, tau_s, rms):
     assert not residual_structure(sessions, residuals, STANDARD).significant
 
 
+@pytest.mark.parametrize("tau_s", [0.4, 1.0])
+def test_the_size_of_slow_noise_is_that_of_its_part_which_remembers(sessions, tau_s):
+    """However soon it forgets, and however loud the white noise beside it is."""
+    width = round(STANDARD.sensor_lag_s / sessions[0].conditions.step_s)
+    ratios = []
+    for seed in range(6):
+        residuals = noises(sessions, seed, tau_s, 0.01)
+        white = noises(sessions, seed + 100)
+        found = gauss_markov_of(sessions, residuals, STANDARD)
+        with_white = gauss_markov_of(
+            sessions, [one + 8.0 * more for one, more in zip(residuals, white, strict=True)], STANDARD
+        )
+        assert found is not None
+        assert with_white is not None
+        means = [one[: one.size // width * width].reshape(-1, width).mean(axis=1) for one in residuals]
+        rms = float(np.sqrt(np.mean(np.concatenate(means) ** 2)))
+        ratios.append([found.rms / rms, with_white.rms / rms])
+    assert np.mean(ratios, axis=0) == pytest.approx(1.0, abs=0.1)
+
+
 def averaged(rng: np.random.Generator, size: int, step_s: float, length_s: float) -> np.ndarray:
     """White noise through a running mean, of unit variance."""
     width = round(length_s / step_s)

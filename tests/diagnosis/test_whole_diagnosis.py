@@ -117,6 +117,10 @@ def test_what_is_left_on_data_not_fitted_is_the_noise(found: Diagnosis, runs: li
         assert one.fit_percent == pytest.approx(100.0 * (1.0 - one.rmse / spread), abs=0.01)
         assert one.variance_explained_percent == pytest.approx(100.0 * (1.0 - (one.rmse / spread) ** 2), abs=0.01)
         assert one.unit == "mbar"
+    # All that the baseline leaves beyond the noise is the dead band's, and repeats; the noise itself does not.
+    beyond = float(np.sqrt(found.baseline.rmse**2 - found.extended.rmse**2))
+    assert found.baseline.structure_rms == pytest.approx(beyond, rel=0.3)
+    assert found.extended.structure_rms < 0.5 * found.extended.rmse
 
 
 def test_the_compensated_force_is_wrong_by_the_noise_where_the_baselines_is_wrong_by_the_dead_band(
@@ -250,6 +254,19 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     assert said(causes[:2], large) == ("partly_explained", f"{good}, with dead band and delay to 1 %; {rest}")
     between = 0.5 * (limits.material + limits.tolerable)
     assert said([], between) == ("adequate", f"{good}; {100 * between:.2g} % repeats and is not explained")
+
+
+def test_what_is_left_is_measured_by_what_was_wrong_before() -> None:
+    """An effect departs from its equation by a share of its size: so much of a large one leaves nothing unexplained."""
+    limits = Thresholds()
+    causes: Any = [SimpleNamespace(name="dead_band")]
+    left = 2.0 * max(limits.material, limits.tolerable)
+    large, small = _left(1.5 * left / limits.departure), _left(0.5 * left / limits.departure)
+    chance = replace(large, repeating=replace(large.repeating, z=0.0))
+    assert _verdict(causes, large, _left(left), limits) == "explained"
+    assert _verdict(causes, small, _left(left), limits) == "partly_explained"
+    assert not chance.significant
+    assert _verdict(causes, chance, _left(left), limits) == "partly_explained"
 
 
 def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list[Recording]) -> None:
