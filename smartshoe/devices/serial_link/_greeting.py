@@ -23,6 +23,8 @@ ASK_AGAIN_S = 1.0
 INFORMATION_WAIT_S = 2.2
 # Text lines do not say their rate: times rounded to a millisecond give it within 0.1 % over this long.
 RATED_S = 1.0
+# They may come in bursts: as long is waited for that second, in the device's time.
+RATING_WAIT_S = 3.0
 SNIFFED_BYTES = 4096
 
 Decoder = FrameDecoder | LineDecoder
@@ -49,7 +51,7 @@ class Greeting:
         if self.takes_commands:
             return self.information is not None or waited_s > INFORMATION_WAIT_S
         first, last = self.first[0][0], self.first[-1][0]
-        return waited_s > RATED_S or float(last.device_time_s[-1] - first.device_time_s[0]) >= RATED_S
+        return waited_s > RATING_WAIT_S or float(last.device_time_s[-1] - first.device_time_s[0]) >= RATED_S
 
     def has_other_channels(self, samples: Samples) -> bool:
         """Whether the device has another number of channels than its decoder was made for."""
@@ -85,13 +87,14 @@ def greet(name: str, port: Port, settings: SerialSettings, clock: Callable[[], f
     """Talk until samples come; raises `DeviceTimeoutError`, with what the bytes look like, at ``until_s`` of ``clock``.
 
     Frames are waited for together with the information frame; where samples come without it for `INFORMATION_WAIT_S`,
-    they are taken as counts. Of text lines `RATED_S` are taken, for their rate.
+    they are taken as counts. Of text lines `RATED_S` are taken, for their rate, within `RATING_WAIT_S`. Once samples
+    have come, ``until_s`` counts no more.
     """
     begin_s = clock()
     asked_s = begin_s - ASK_AGAIN_S if settings.format == "frames" else begin_s + LISTEN_S - ASK_AGAIN_S
     seen = b""
     greeting: Greeting | None = None
-    while (now_s := clock()) < until_s:
+    while (now_s := clock()) < until_s or (greeting is not None and greeting.first):
         speaks_lines = greeting is not None and not greeting.takes_commands
         if settings.format != "lines" and not speaks_lines and now_s >= asked_s + ASK_AGAIN_S:
             port.write(hello(settings))

@@ -33,7 +33,7 @@ class Board:
 
     def __init__(self, said: Callable[[int], bytes], rate_hz: float) -> None:
         self.now_s = 0.0
-        self._said, self._rate_hz = said, rate_hz
+        self.said, self._rate_hz = said, rate_hz
         self._count = 0
 
     def read(self, wait_s: float = 0.05) -> bytes:
@@ -47,7 +47,7 @@ class Board:
             return b""
         self.now_s = max(self.now_s, due_s)
         self._count += 1
-        return self._said(self._count - 1)
+        return self.said(self._count - 1)
 
     def write(self, data: bytes) -> None:
         """See `Port.write`."""
@@ -101,6 +101,30 @@ def test_lines_lost_at_the_very_first_are_told_and_leave_the_rate(rate_hz: float
         (gap,) = shoe.events
         assert isinstance(gap, Gap)
         assert gap.lost == pytest.approx(30, abs=1)
+
+
+@pytest.mark.parametrize("pause_s", [0.4, 1.5])
+def test_lines_that_come_in_bursts_have_their_rate(pause_s: float) -> None:
+    """A radio holds lines back and hands them over together: it is their own times that tell."""
+    rate_hz = 700.0
+    burst = int(pause_s * rate_hz)
+    whole = sketch(_millis, rate_hz)
+
+    def held_back(k: int) -> bytes:
+        return b"" if k % burst else b"".join(whole.said(k - earlier) for earlier in range(min(k, burst - 1), -1, -1))
+
+    with Board(held_back, rate_hz).shoe(format="lines") as shoe:
+        assert shoe.sample_rate_hz == pytest.approx(rate_hz, rel=2e-3)
+        _take(shoe, 4 * burst)
+        assert not [event for event in shoe.events if isinstance(event, Gap)]
+
+
+@pytest.mark.parametrize("wait_s", [0.1, 1.0, 2.0])
+def test_a_short_wait_is_for_the_first_line_or_frame_alone(wait_s: float) -> None:
+    with sketch(_millis, 200.0).shoe(wait_s=wait_s) as shoe:
+        assert shoe.sample_rate_hz == pytest.approx(200.0, rel=2e-3)
+    with Board(lambda count: _frame(count, 180), 100.0).shoe(wait_s=wait_s) as shoe:
+        assert {channel.unit for channel in shoe.describe()} == {MILLIBAR}
 
 
 def test_a_shoe_that_sends_seldom_is_not_silent() -> None:
