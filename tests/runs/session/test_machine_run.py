@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 
 import pytest
@@ -58,6 +59,8 @@ def test_a_machine_that_takes_time_does_not_hold_up_the_stream() -> None:
     side = RunMachine(_TakesTime().open())
     side.start(QUICK)
     assert side.log() is None
+    # A program that ends does not wait for a machine that hangs.
+    assert [one.daemon for one in threading.enumerate() if "slow machine runs" in one.name] == [True]
     log = _waited(side)
     assert log.of_role("load")
     assert not log.sensors  # its own log, not the joined recording

@@ -37,7 +37,14 @@ def short_file(tmp_path: Path) -> Path:
 def test_the_units_springs_come_out_of_a_session_within_their_intervals(unit: str, tmp_path: Path) -> None:
     with SessionFolder.begin(tmp_path, bench_plan(unit=unit)) as folder:
         conduct(folder)
-        found = analyse(folder).identification
+        analysis = analyse(folder)
+    found = analysis.identification
+    # What the file says of each experiment is what was found of it, with its error bars, in s and ppm.
+    for told in analysis.to_dict()["experiments"]:
+        clocks, recording = analysis.clocks[told["name"]], analysis.recordings[told["name"]]
+        assert (told["samples"], told["duration_s"]) == (len(recording), recording.duration_s)
+        assert told["join"]["delay_s"] == {"value": clocks.delay_s, "sd": clocks.delay_sd_s}
+        assert told["join"]["rate_ppm"] == pytest.approx({"value": 1e6 * clocks.rate, "sd": 1e6 * clocks.rate_sd})
     for name, true in zip(("k1", "k2"), TABLE_1[unit], strict=True):
         assert found.parameters[name].value == pytest.approx(true, abs=3.0 * found.parameters[name].sd)
     assert found.residual_tests["whiteness"].p_value > 1e-3

@@ -21,7 +21,7 @@ from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, conduct
 from smartshoe.runs.session import _machine_run as machine_run
-from smartshoe.runs.session._checks import AT_THE_END, Pressing, _share, contact, first_fault, other_test
+from smartshoe.runs.session._checks import AT_THE_END, Pressing, _share, contact, first_fault, other_test, wrong_unit
 from smartshoe.runs.session._procedure import _Pressing, _Stream
 from smartshoe.runs.session.streaming import Seconds
 from smartshoe.units import MILLIBAR
@@ -63,6 +63,26 @@ def test_the_unit_that_is_really_pressed_is_named(pressed: Pressing) -> None:
     assert found.kind == "wrong_unit"
     assert "left_toe is pressed, not left_heel" in found.says
     assert _kind(replace(pressed, unit="left_heel", load=None)) == "wrong_unit"
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "is_wrong"),
+    [(0.05, 1.0, True), (0.15, 1.0, False), (0.005, 0.12, False), (1.0, 0.05, False)],
+)
+def test_without_a_load_another_unit_is_pressed_that_moves_ten_times_as_much(
+    pressed: Pressing, own: float, other: float, is_wrong: bool
+) -> None:
+    """And by a tenth of its range at least: a shoe that is only handled reads something everywhere."""
+    stream = pressed.stream
+    shape = pressed.reading.values - pressed.reading.values.min()
+    shape = 150.0 * shape / shape.max()  # of 200 mbar
+    for name, factor in (("left_toe", own), ("left_heel", other)):
+        stream = stream.with_channel(replace(stream[name], values=factor * shape, range_=(0.0, 200.0)))
+    for name in ("left_meta1", "left_meta4"):
+        stream = stream.with_channel(replace(stream[name], values=0.0 * shape))
+    found = wrong_unit(replace(pressed, stream=stream, load=None))
+    assert (found is not None) is is_wrong
+    assert found is None or "left_heel is pressed, not left_toe" in found.says
 
 
 def test_a_unit_that_reads_nothing_has_no_contact(pressed: Pressing) -> None:
@@ -244,3 +264,52 @@ def test_a_second_of_a_stream_is_told_by_its_least_and_most_beside_names_and_uni
     second.add(block, {"toe": 0.5 * readings[:, 1]})
     assert second.report(12.25).split() == ["12.2", "s", "1.0", "to", "4.0", "325.0", "to", "350.0"]
     assert second.report(13.0).split() == ["13.0", "s", "–", "–"]
+
+
+@pytest.mark.parametrize("units", [1, 4, 5, 8, 16])
+def test_a_second_of_many_units_is_told_in_rows_of_a_terminals_width(units: int) -> None:
+    names = tuple(f"unit_{k}" for k in range(units))
+    block = Block(np.zeros(1), np.full((1, units), 999.9), np.zeros((1, units), dtype=bool), names, MILLIBAR)
+    second = Seconds(block, [])
+    second.add(block, {})
+    for told, cell in ((second.heading, "mbar"), (second.report(3599.9), "999.9 to 999.9")):
+        rows = told.split("\n")
+        assert max(map(len, rows)) <= 80
+        assert len(rows) == -(-units // 4)
+        assert sum(row.count(cell) for row in rows) == units
+        # Only the first row has the time.
+        assert {row[:10].strip() for row in rows[1:]} <= {""}
+
+
+@pytest.mark.parametrize(("longest_s", "remembers_s"), [(0.0, 60.0), (20.0, 60.0), (120.0, 6.0)])
+def test_a_unit_rests_until_it_stands_still_and_no_longer_than_the_plan_says(
+    longest_s: float, remembers_s: float
+) -> None:
+    class Resting:
+        """A unit whose reading falls by ``exp(-t / remembers_s)`` from its full range."""
+
+        events = ()
+
+        def describe(self) -> list[Any]:
+            return [SimpleNamespace(name="left_toe", range_=(0.0, 200.0))]
+
+        def blocks(self) -> Any:
+            for time_s in np.arange(100.0, 1000.0, 0.5):
+                reading = np.full((1, 1), 200.0 * np.exp(-(time_s - 100.0) / remembers_s))
+                yield Block(np.array([time_s]), reading, np.zeros((1, 1), dtype=bool), ("left_toe",), MILLIBAR)
+
+    kept: list[Block] = []
+    folder: Any = SimpleNamespace(attempts=tuple, keep=kept.append, note=lambda *_, **__: None)
+    operator: Any = SimpleNamespace(show=lambda *_: None)
+    stream = _Stream(Resting(), folder, operator)  # type: ignore[arg-type]
+    stream.next("dynamic", 0.0)
+    stream.rest("dynamic", "left_toe", longest_s)
+    rested_s = stream.last_s - 100.0
+    if longest_s == 0.0:
+        assert rested_s == 0.0
+    elif remembers_s > longest_s:
+        assert longest_s <= rested_s < longest_s + 6.0  # in stretches of five seconds
+    else:
+        # By then what is left falls by less than a ten-thousandth of the range from one stretch to the next.
+        assert remembers_s * np.log(1e4) - 6.0 < rested_s < remembers_s * np.log(1e4) + 12.0
+    assert [float(block.time_s[0]) for block in kept] == pytest.approx(np.arange(100.0, stream.last_s + 0.1, 0.5))
