@@ -71,6 +71,19 @@ def test_a_frame_is_byte_for_byte_as_specified() -> None:
     assert len(frame) == FRAME
 
 
+def test_65535_says_that_there_is_no_reading_and_any_other_count_is_one() -> None:
+    counts = [[65534.0, 65533.0, 0.0, np.nan], [1.0, 32767.0, 32768.0, 65534.0], [65534.0, 0.0, 1.0, 65533.0]]
+    frames = [encode_samples([k], [5000 * k], [row]) for k, row in enumerate(counts)]
+    payload = cobs.decode(frames[0][:-1])
+    assert payload[7:15] == bytes.fromhex("feff fdff 0000 ffff")
+    got, _ = _feed(b"".join(frames))
+    assert np.array_equal(got.missing, np.isnan(counts))
+    assert got.readings[~got.missing].tolist() == [count for row in counts for count in row if not np.isnan(count)]
+    for count in (-1.0, 65535.0, 1e9):
+        with pytest.raises(UsageError, match="65534"):
+            encode_samples([0], [0], [[0.0, count, 0.0, 0.0]])
+
+
 def test_the_checksum_is_that_of_its_catalogue() -> None:
     assert checksum(b"123456789") == 0x29B1
 

@@ -42,6 +42,22 @@ def test_bytes_are_told(data: bytes, format_: str | None, says: str) -> None:
     assert says in looks_like(data)
 
 
+@pytest.mark.parametrize("whole", [2, 3, 10, 40])
+def test_a_time_that_repeats_in_a_tenth_of_the_lines_is_told(whole: int) -> None:
+    """However few came; the first line may be a half and the last unfinished, and neither is asked."""
+
+    def told(times: list[int]) -> str:
+        lines = b"".join(b"%d,1,2,3,4\n" % time for time in times)
+        return looks_like(b"0,7,7\n" + lines + b"9,8")
+
+    steady = list(range(0, 5 * whole, 5))
+    assert "repeats" not in told(steady)
+    often = [time - 5 * (k % 10 == 1) for k, time in enumerate(steady)]
+    assert "print it finer" in told(often)
+    seldom = [time - 5 * (k % 20 == 1) for k, time in enumerate(steady)]
+    assert ("repeats" in told(seldom)) is (whole < 20)
+
+
 def test_frames_with_another_checksum_are_told() -> None:
     harmed = bytearray(FRAMES)
     harmed[16::19] = bytes(max(byte ^ 0x55, 1) for byte in harmed[16::19])
