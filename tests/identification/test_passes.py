@@ -12,7 +12,9 @@ from smartshoe.identification import fit_coefficients, identify
 from smartshoe.identification._experiment import prepare
 from smartshoe.identification._parametrisation import GREY_FIXED, FreeForm, GreyBox
 from smartshoe.identification._prediction_error import PredictionError, Settings
+from smartshoe.identification._residual_tests import residual_tests
 from smartshoe.identification._solve import Evaluation, minimise
+from smartshoe.identification._uncertainty import inverse_normal
 from smartshoe.recording import Recording
 
 
@@ -108,6 +110,42 @@ def test_scipys_optimum_of_the_papers_problem_is_ours() -> None:
     reference = least_squares(problem.residual, theta * 1.05, problem.jacobian, x_scale="jac", xtol=1e-15, ftol=1e-15)
     sd = np.sqrt(np.diag(found.fit.covariance))
     assert (theta - reference.x) / sd == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_residual_of_nothing_is_white_and_leans_on_no_input() -> None:
+    """Of a recording that its model follows exactly the tests have nothing to say, and no number that is none."""
+    recording = press()
+    problem = PredictionError(prepare([recording])[0], Settings())
+    theta = identify(recording).fit.theta
+    for test in residual_tests(problem, theta, [np.zeros(len(recording))]).values():
+        assert (test.statistic, test.p_value) == (0.0, 1.0)
+        assert test.degrees > 0
+    # The tests judge what stands out, not how large it is.
+    noise = np.random.default_rng(2).standard_normal(len(recording))
+    for one, other in zip(*(residual_tests(problem, theta, [by * noise]).values() for by in (1e-6, 1e3)), strict=True):
+        assert one.statistic == pytest.approx(other.statistic, rel=1e-6)
+        assert 1e-3 < one.p_value <= 1.0
+
+
+@given(st.integers(1, 6), st.integers(0, 999), st.floats(1e-9, 1e9))
+@settings(max_examples=20)
+def test_covariances_are_inverses_in_any_units_and_what_no_data_holds_is_told(
+    size: int, seed: int, unit: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    slopes = rng.standard_normal((40, size)) * unit ** rng.uniform(-1.0, 1.0, size)
+    inverse, is_singular = inverse_normal(slopes.T @ slopes)
+    assert not is_singular
+    scale = np.sqrt(np.einsum("ij,ij->j", slopes, slopes))
+    np.testing.assert_allclose(
+        inverse * np.outer(scale, scale), np.linalg.inv((slopes / scale).T @ (slopes / scale)), rtol=1e-6, atol=1e-9
+    )
+    # A column that the others give, or that is nothing, is held by no data; what is left stays finite.
+    for column in (slopes @ rng.uniform(0.5, 1.5, size) / unit, np.zeros(40)):
+        wide = np.column_stack([slopes, column])
+        again, is_singular = inverse_normal(wide.T @ wide)
+        assert is_singular
+        assert np.isfinite(again).all()
 
 
 def test_a_bank_of_fits_is_identify_many_times() -> None:
