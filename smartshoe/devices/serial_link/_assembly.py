@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array, Integers
 from smartshoe.devices._base import Block
 from smartshoe.devices._events import Gap, Restarted, ShoeEvent
-from smartshoe.devices.serial_link._pace import Pace
+from smartshoe.devices.serial_link._line_pace import LinePace
 from smartshoe.devices.serial_link.inbox import joined
 from smartshoe.devices.wire.clock import DeviceClock, at_once
 from smartshoe.devices.wire.information import Information
@@ -50,7 +50,7 @@ class Assembler:
         self._apart = apart
         self.clock = DeviceClock(apart)
         self._counts_samples = counts_samples
-        self._pace: Pace | None = None
+        self._pace: LinePace | None = None
         self._steps_s: list[float] = []
         self._is_rated = False
         self._watched_s = [0.0, 0.0]  # of the device's clock, of the host's, while samples flowed
@@ -122,7 +122,7 @@ class Assembler:
         """Measure the pace over all steps so far, until they are `RATED_S` without their holes."""
         self._steps_s += steps_s.tolist()
         so_far_s = np.array(self._steps_s)
-        self._pace = Pace.of(so_far_s)
+        self._pace = LinePace.of(so_far_s)
         self._is_rated = bool(np.sum(so_far_s / self._pace.samples(so_far_s)) >= RATED_S)
 
     def _require_seconds(self, time_s: float, arrival_s: float) -> None:

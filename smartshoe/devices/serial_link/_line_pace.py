@@ -19,7 +19,7 @@ EVEN = 0.005  # of a tick: so much longer a period is one of whole ticks, measur
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class LinePace:
     """Samples ``period_s`` apart, whose times may be up to ``longest_s`` apart though none is lost between them.
 
     The clock of a sketch is often as coarse as its period: at 800 Hz ``millis()`` goes on by 1 and by 2 ms.

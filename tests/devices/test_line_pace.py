@@ -8,7 +8,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from smartshoe.arrays import Array, Integers
-from smartshoe.devices.serial_link._pace import Pace
+from smartshoe.devices.serial_link._line_pace import LinePace
 
 TICK_S = 1e-3  # of millis()
 MEASURED_S = 1.2
@@ -16,10 +16,10 @@ rates = st.floats(1.0, 994.0) | st.just(1000.0)
 phases = st.floats(0.0, 1.0)
 
 
-def told(rate_hz: float, phase: float, came: Integers) -> tuple[Pace, Integers]:
+def told(rate_hz: float, phase: float, came: Integers) -> tuple[LinePace, Integers]:
     """The pace of a sketch that prints ``millis()`` with each sample, and what it says of those that came."""
     steps_s = TICK_S * np.diff(np.floor((phase + came / rate_hz) / TICK_S + 1e-6))
-    pace = Pace.of(steps_s)
+    pace = LinePace.of(steps_s)
     return pace, pace.samples(steps_s)
 
 
@@ -61,9 +61,9 @@ def test_a_lost_sample_is_told_where_each_tick_is_a_sample() -> None:
 def test_a_loop_that_is_not_even_loses_nothing(rate_hz: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     steps_s: Array = rng.uniform(0.7, 1.3, int(MEASURED_S * rate_hz) + 2) / rate_hz
-    pace = Pace.of(steps_s)
+    pace = LinePace.of(steps_s)
     assert (pace.samples(steps_s) == 1).all()
     assert 1.0 / pace.period_s == pytest.approx(1.0 / steps_s.mean(), rel=1e-6)
     assume(steps_s.size > 20)
     steps_s[11] *= 40.0
-    assert np.flatnonzero(Pace.of(steps_s).samples(steps_s) > 1).tolist() == [11]
+    assert np.flatnonzero(LinePace.of(steps_s).samples(steps_s) > 1).tolist() == [11]
