@@ -39,8 +39,8 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     if not rates.any() and np.ptp(lags) <= thresholds.same * largest and largest < delay.parameters[0].upper:
         return replace(plain, parts=((delay, np.array([float(np.mean(lags))])),))
     half_s = 0.5 * np.array([recording.duration_s for recording in recordings])
-    begins = lags - rates * half_s
-    if rates.all() and np.max(np.abs(begins)) <= thresholds.same * largest:
+    begins, ends = lags - rates * half_s, lags + rates * half_s
+    if rates.all() and np.max(np.abs(begins)) <= thresholds.same * float(np.max(np.abs(ends))):
         return replace(plain, parts=((effect("clock_drift"), np.array([float(np.mean(lags / half_s))])),))
     made, usable, says = [], [], []
     for recording, mask, offset_s, rate in zip(recordings, integrity.usable, lags, rates, strict=True):

@@ -88,18 +88,20 @@ def _lag_line(view: View) -> tuple[float, float] | None:
         if places.size == 0 or np.max(np.abs(lags)) <= least:
             continue
         offered = []
-        for offset_s, rate in _lines(places - middle, lags, weights):
+        before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
+        for offset_s, rate in _lines(places - middle, lags, weights, 0.5 * duration_s):
             ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
             if np.max(np.abs(ends)) <= least:
                 continue
             shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
             after = _unexplained(grid, shifted, reading, smooth_s, given)
-            if lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given):
+            agreed = lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
+            # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
+            if agreed and (rate == 0.0 or after < before):
                 return offset_s, rate
             offered.append((after, offset_s, rate))
         if not offered:
             continue
-        before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
         after, offset_s, rate = min(offered)
         if after < earned * before:
             return offset_s, rate
@@ -200,11 +202,11 @@ def _correlation(load: Array, reading: Array, most: int) -> Array:
     return out
 
 
-def _lines(places: Array, lags: Array, weights: Array) -> list[tuple[float, float]]:
-    """Offset and rate to try.
+def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tuple[float, float]]:
+    """Offset and rate to try; ``places`` from the middle, ``half_s`` before which both clocks may have been set.
 
     With four windows or more the median of all pairs' slopes (Theil 1950, Sen 1968), where it halves the scatter; then
-    the constant.
+    what grows from nothing, and the constant.
     """
     found = []
     if places.size >= 4:
@@ -214,7 +216,8 @@ def _lines(places: Array, lags: Array, weights: Array) -> list[tuple[float, floa
         left = lags - rate * places
         if np.median(np.abs(left - np.median(left))) < 0.5 * np.median(np.abs(lags - np.median(lags))):
             found.append((_middle(left, weights), rate))
-    return [*found, (_middle(lags, weights), 0.0)]
+    grown = _middle(lags / (places + half_s), weights)
+    return [*found, (grown * half_s, grown), (_middle(lags, weights), 0.0)]
 
 
 def _middle(values: Array, weights: Array) -> float:
