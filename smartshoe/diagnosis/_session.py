@@ -221,6 +221,9 @@ def _session(
     load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
     base = min(low, thresholds.standing)
+    is_gauge = scale.unit.quantity == "pressure"
+    if is_gauge and begins_unloaded(load, scale.share(reading), step_s, thresholds):
+        base = min(low, float(load[0]))
     reach = largest_of_noise(load.size, thresholds) * quiet.raw
     beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
     conditions = Conditions(
@@ -258,6 +261,14 @@ def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -
     raw = noise_sd(load, thresholds)
     quiet, left = without_noise(load, step_s, raw, thresholds)
     return Quiet(as_sampled(quiet, reading, step_s), raw, left)
+
+
+def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> bool:
+    """Whether a recording begins at a load (n,) of which its gauge (n,) reads next to nothing: the load cell's tare."""
+    first = slice(0, max(1, round(thresholds.settled_s / step_s)))
+    load, reading = load[first], reading[first]
+    still = np.ptp(load) < thresholds.standing
+    return bool(still and abs(float(reading.mean())) < thresholds.same * abs(float(load.mean())))
 
 
 def _rests_levelled(load: Array, level: float, reach: float) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import own_of
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._session import Scale, Session, begins_unloaded
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
@@ -62,6 +62,8 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
             full = float(np.max(np.abs(command))) or 1.0
             nothing = np.abs(command[:: session.thinned][: resting.size]) < 1e-3 * full
             resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < thresholds.standing)
+        elif begins_unloaded(load, session.reading, session.conditions.step_s, thresholds):
+            resting = np.abs(load - load[0]) < thresholds.standing
         moved = np.flatnonzero(~resting)
         most = max(1, round(thresholds.hold_s / session.conditions.step_s))  # nothing has crept yet
         first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))

@@ -122,6 +122,15 @@ def test_a_first_rest_is_what_is_commanded_where_a_tare_lifts_the_load() -> None
     assert rests[0, :2] == pytest.approx([load, reading], abs=2e-3)
 
 
+def test_a_load_of_which_a_gauge_reads_nothing_is_its_cells_tare_however_large() -> None:
+    for tare in (0.09, -0.12):
+        found = _zeros(*(_run(tare=tare, seed=seed) for seed in range(3)))
+        assert set(found) == {"load_cell_tare"}
+        assert found["load_cell_tare"].value == pytest.approx(-tare / (1.0 + tare), abs=0.003)
+    # A unit that bears a fixture reads it.
+    assert "load_cell_tare" not in _zeros(*(_run(foot=0.09, seed=seed) for seed in range(3)))
+
+
 def test_what_has_drifted_by_the_first_rest_is_no_zero() -> None:
     sessions, _ = _sessions(_run())
     drifting = MODEL.with_part(effect("zero_drift"), np.array([0.002, 0.0]))
