@@ -211,25 +211,32 @@ def bouc_wen_undone(signal, strength, per_load, z, slope, dead_zone, state, out)
 
 
 @njit(cache=True)
-def sense_of_motion(load, width, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) in [-1, 1]: s with ds = (sgn(df) - s) |df|/width along ``load`` (n,).
+def _sense(before, move, width, fade):  # type: ignore[no-untyped-def]
+    """The sense after a step: ds = (sgn(df) - s) |df|/width - s fade, exact where the load moves evenly."""
+    turned = abs(move) / width
+    total = turned + fade
+    if total == 0.0:
+        return before
+    end = math.copysign(turned / total, move)
+    return end + (before - end) * math.exp(-total)
+
+
+@njit(cache=True)
+def sense_of_motion(load, width, fade, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) in [-1, 1]: s with ds = (sgn(df) - s) |df|/width along ``load`` (n,), that fades by ``fade`` a step.
 
     ``state`` (2,): last load (NO_LOAD before the first sample), last sense.
     """
     last, sense = state
     for k in range(load.size):
-        move = load[k] - last if last < NO_LOAD else 0.0
-        if move > 0.0:
-            sense = 1.0 + (sense - 1.0) * math.exp(-move / width)
-        elif move < 0.0:
-            sense = -1.0 + (sense + 1.0) * math.exp(move / width)
+        sense = _sense(sense, load[k] - last if last < NO_LOAD else 0.0, width, fade)
         last = load[k]
         out[k] = sense
     state[0], state[1] = last, sense
 
 
 @njit(cache=True)
-def sense_undone(signal, strength, width, dead_zone, state, out):  # type: ignore[no-untyped-def]
+def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the sense of the backlash of out.
 
     ``state`` (2,) as in `sense_of_motion`.
@@ -242,13 +249,7 @@ def sense_undone(signal, strength, width, dead_zone, state, out):  # type: ignor
         for _ in range(_BISECTIONS):
             f = 0.5 * (low + high)
             cleaned = f if last >= NO_LOAD else min(max(last, f - dead_zone), f + dead_zone)
-            move = 0.0 if last >= NO_LOAD else cleaned - last
-            if move > 0.0:
-                now = 1.0 + (sense - 1.0) * math.exp(-move / width)
-            elif move < 0.0:
-                now = -1.0 + (sense + 1.0) * math.exp(move / width)
-            else:
-                now = sense
+            now = _sense(sense, 0.0 if last >= NO_LOAD else cleaned - last, width, fade)
             if f * (1.0 - 0.5 * strength * (1.0 - now)) < y:
                 low = f
             else:
@@ -395,23 +396,3 @@ def orifice_undone(signal, step_rate, laminar, state, out):  # type: ignore[no-u
         last = flow
         out[k] = signal[k] + lost
     state[0], state[1] = lost, last
-
-
-@njit(cache=True)
-def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out + set = ``signal`` (n,), set += half (out^m + last out^m) a step, out^m = 0 below zero.
-
-    ``state`` (2,): set, last out^m (negative before the first sample).
-    """
-    total, last = state
-    for k in range(signal.size):
-        p = signal[k]
-        if last >= 0.0:
-            known = p - total - half * last
-            p = known
-            for _ in range(12):  # a contraction: half is far below 1
-                p = known - half * max(p, 0.0) ** exponent
-            total = signal[k] - p
-        last = max(p, 0.0) ** exponent
-        out[k] = p
-    state[0], state[1] = total, last

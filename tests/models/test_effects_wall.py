@@ -20,14 +20,15 @@ NAMES = (
     "second_relaxation", "power_law_creep", "linear_leak", "orifice_leak", "gas_heat", "gas_compression",
     "wall_hardening", "contact_area", "dead_band", "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry",
     "rate_gain", "mullins_softening", "cycle_conditioning", "permanent_set",
-    "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop",
+    "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop", "flexible_set",
+    "flexible_asymmetry", "flexible_heat", "flexible_softening",
 )  # fmt: skip
 EXACT = {  # at common samples, for straight lines between samples: every turning point is one
     "second_relaxation", "power_law_creep", "linear_leak", "gas_heat", "gas_compression", "wall_hardening",
     "contact_area", "dead_band", "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry", "mullins_softening",
-    "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop",
+    "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop", "flexible_heat",
 }  # fmt: skip
-SECOND_ORDER = {"orifice_leak", "permanent_set"}
+SECOND_ORDER = {"orifice_leak", "permanent_set", "flexible_set", "flexible_softening"}
 STEP_S = 0.02
 seeds = st.integers(0, 10_000)
 

@@ -20,7 +20,8 @@ from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect
 EXACT = (
     "gas_compression", "wall_hardening", "contact_area", "orifice_leak", "permanent_set", "mullins_softening",
     "play_hysteresis", "bouc_wen_hysteresis", "load_unload_asymmetry", "cycle_conditioning",
-    "flexible_curve", "flexible_characteristic", "flexible_loop",
+    "flexible_curve", "flexible_characteristic", "flexible_loop", "flexible_set", "flexible_asymmetry",
+    "flexible_softening",
 )  # fmt: skip
 INVERTED = (*EXACT, "dead_band", "rate_gain")
 STEP_S = 0.02

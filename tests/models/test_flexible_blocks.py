@@ -12,7 +12,7 @@ from smartshoe.calibration import ExtendedCompensator
 from smartshoe.models.core import Core, plain
 from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.effects._monotone_curve import KNOTS
-from smartshoe.models.effects.effect import CoreEffect
+from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.flexible_loop import HALF_WIDTHS
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
@@ -29,8 +29,11 @@ seeds = st.integers(0, 10_000)
 def within_bounds(one: Effect, seed: int) -> Array:
     """Any weights that a fit may try, bounds included."""
     rng = np.random.default_rng(seed)
-    drawn = [rng.choice([p.lower, p.upper, rng.uniform(p.lower, p.upper), p.null]) for p in one.parameters]
-    return np.array(drawn, dtype=float)
+
+    def choices(p: EffectParameter) -> list[float]:
+        return [p.lower, p.upper, rng.uniform(p.lower, p.upper), *([] if p.null is None else [p.null])]
+
+    return np.array([rng.choice(choices(p)) for p in one.parameters], dtype=float)
 
 
 def loading(seed: int, count: int = 40) -> Conditions:
@@ -43,7 +46,10 @@ def loading(seed: int, count: int = 40) -> Conditions:
 
 
 def test_blocks_stand_apart_from_the_effects_that_may_be_named() -> None:
-    assert set(NAMES) == {"flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop"}
+    assert set(NAMES) == {
+        "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop", "flexible_set",
+        "flexible_asymmetry", "flexible_heat", "flexible_softening",
+    }  # fmt: skip
     assert not set(NAMES) & set(catalogue())
     assert not any(one.is_flexible for one in catalogue().values())
     families = {one.family for one in catalogue().values()}
@@ -54,18 +60,24 @@ def test_blocks_stand_apart_from_the_effects_that_may_be_named() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_weight_has_a_null_inside_its_bounds_and_a_prior(name: str) -> None:
-    for parameter in effect(name).parameters:
-        assert parameter.null == 0.0
-        assert parameter.lower < 0.0 < parameter.upper
-        assert parameter.prior_sd is not None
-        assert 0.0 < parameter.prior_sd <= 1.0
+    one = effect(name)
+    assert any(parameter.null == 0.0 for parameter in one.parameters)
+    for parameter in one.parameters:
+        if parameter.null is None:  # of its shape
+            assert all(parameter.lower <= shape[parameter.name] <= parameter.upper for shape in one.shapes)
+            continue
+        assert parameter.lower <= 0.0 < parameter.upper
+        assert parameter.prior_sd is None or 0.0 < parameter.prior_sd <= 1.0
 
 
 @pytest.mark.parametrize("name", NAMES)
 @given(seed=seeds)
 @settings(max_examples=15)
 def test_any_weights_within_the_bounds_are_undone(name: str, seed: int) -> None:
-    at, model = loading(seed), BASELINE.with_part(effect(name), within_bounds(effect(name), seed))
+    weights = within_bounds(effect(name), seed)
+    if name == "flexible_asymmetry":  # a gain that unloading has more of: two loads give one reading as the load turns
+        weights = np.abs(weights)
+    at, model = loading(seed), BASELINE.with_part(effect(name), weights)
     force_n = ExtendedCompensator(model, 1.0 / STEP_S).apply(model.reading(at))
     assert np.max(np.abs(force_n / 800.0 - at.load)) < 1e-9
 
@@ -73,7 +85,7 @@ def test_any_weights_within_the_bounds_are_undone(name: str, seed: int) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_twin_presses_what_the_model_reads(name: str) -> None:
     one = effect(name)
-    model = BASELINE.with_part(one, np.array([p.size for p in one.parameters]))
+    model = BASELINE.with_part(one, one.begun(sizes=1.0))
     at = loading(4)
     pressure_pa = TwinBladder(model).press(800.0 * at.load, 1.0 / STEP_S)
     assert pressure_pa == pytest.approx(100.0 * model.reading(at), abs=1e-6)  # mbar
@@ -202,3 +214,83 @@ def test_a_relaxation_creeps_up_where_its_weights_are_positive_and_down_alike_wh
         assert up[1] < 0.0
         assert np.all(np.diff(up[1:]) >= -1e-12)
         assert down == pytest.approx(-up, abs=1e-7)  # second order of the weight
+
+
+def cycles(count: int, level: float, hold_s: float = 0.0) -> Conditions:
+    """``count`` loadings to ``level`` within 1 s and back, ``hold_s`` at the top, 2 s of rest after each."""
+    times = np.cumsum(np.tile([1.0, max(hold_s, STEP_S), 1.0, 2.0], count))
+    loads = np.tile([level, level, 0.0, 0.0], count)
+    time_s = np.arange(0.0, times[-1], STEP_S)
+    return Conditions(time_s, np.interp(time_s, np.append(0.0, times), np.append(0.0, loads)), STEP_S)
+
+
+@pytest.mark.parametrize("exponent", [0.8, 1.0, 2.5])
+def test_a_set_by_strokes_counts_loadings_and_no_time(exponent: float) -> None:
+    values = np.array([0.01, 1.0, exponent, 3000.0])
+    short, long_, twice = (
+        float(effect("flexible_set").apply(at.load, at, values)[-1])
+        for at in (cycles(3, 0.6), cycles(3, 0.6, 20.0), cycles(6, 0.6))
+    )
+    assert short == pytest.approx(3 * 0.01 * 0.6**exponent, rel=0.1)  # the play takes some of each loading
+    assert long_ == pytest.approx(short, rel=1e-6)
+    assert twice == pytest.approx(2.0 * short, rel=0.02)
+
+
+def test_a_set_by_time_is_that_of_the_permanent_set() -> None:
+    at = loading(7)
+    by_time = effect("flexible_set").apply(at.load, at, np.array([0.01, 0.0, 1.5, 3000.0]))
+    np.testing.assert_allclose(by_time, effect("permanent_set").apply(at.load, at, np.array([1e-3, 1.5])), atol=1e-5)
+
+
+def test_what_hardens_grows_by_less_each_time_and_by_half_where_it_has_slowed_to_a_half() -> None:
+    at = cycles(8, 1.0)
+    ends = np.flatnonzero((at.load[1:] == 0.0) & (at.load[:-1] > 0.0)) + 1
+    for name, of in (("flexible_set", lambda out: out), ("flexible_softening", None)):
+        out = effect(name).apply(at.load, at, np.array([0.01, 1.0, 1.0, 4.0]))
+        if of is None:  # a gain: seen at the peaks
+            peaks = np.flatnonzero((at.load == 1.0) & np.append(at.load[1:] < 1.0, False))
+            grown = out[peaks] - 1.0
+        else:
+            grown = out[ends]
+        by = np.diff(np.append(0.0, grown))
+        assert np.all(np.diff(by) < 0.0)
+        assert by[0] == pytest.approx(0.01 * 4.0 * np.log(5.0 / 4.0), rel=0.05)
+        assert by[4] / by[0] == pytest.approx(0.55, abs=0.05)
+
+
+def test_noise_of_a_load_is_no_stroke() -> None:
+    rng = np.random.default_rng(3)
+    load = 0.5 + 0.002 * rng.standard_normal(20_000)
+    at = Conditions(STEP_S * np.arange(load.size), load, STEP_S, 0.002)
+    moved = effect("flexible_set").apply(load, at, np.array([0.01, 1.0, 1.0, 300.0])) - load
+    assert np.max(np.abs(moved)) < 1e-4
+
+
+def test_a_sense_that_never_fades_is_that_of_the_law() -> None:
+    at = loading(5)
+    out = effect("flexible_asymmetry").apply(at.load, at, np.array([0.02, 0.005, 1e9]))
+    law = effect("load_unload_asymmetry").apply(at.load, at, np.array([0.02, 0.005]))
+    np.testing.assert_allclose(out[1:], law[1:], atol=1e-3)  # one begins at rest, the other loading
+    np.testing.assert_allclose(out[at.load.size // 2 :], law[at.load.size // 2 :], atol=1e-8)
+
+
+@given(rate=st.floats(0.01, 2.0), turn=st.floats(0.003, 0.05), memory_s=st.floats(0.1, 3.0))
+@settings(max_examples=25)
+def test_on_a_ramp_the_sense_goes_by_the_rate_and_it_fades_in_a_hold(rate: float, turn: float, memory_s: float) -> None:
+    time_s = np.linspace(0.0, 1.0 / rate + 20.0 * memory_s, 20_001)
+    load = np.minimum(rate * time_s, 1.0)
+    at = Conditions(time_s, load, float(time_s[1]))
+    out = effect("flexible_asymmetry").apply(load, at, np.array([0.1, turn, memory_s]))
+    top = int(np.argmax(load >= 1.0)) - 1
+    sense = 1.0 - 2.0 * (1.0 - out / np.maximum(load, 1e-9)) / 0.1
+    settled = 1.0 - np.exp(-(rate / turn + 1.0 / memory_s) / rate)
+    assert sense[top] == pytest.approx(settled * rate / (rate + turn / memory_s), abs=0.02)
+    assert sense[-1] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_heat_that_leaves_in_one_time_is_that_of_the_law() -> None:
+    at = loading(6)
+    one = effect("flexible_heat").apply(at.load, at, np.array([0.05, 2.0, 0.0, 8.0]))
+    np.testing.assert_allclose(one, effect("gas_heat").apply(at.load, at, np.array([0.05, 2.0, 0.0])), atol=1e-10)
+    slowly = effect("flexible_heat").apply(at.load, at, np.array([0.05, 16.0, 0.9, 8.0]))
+    assert np.max(np.abs(slowly - one)) < 0.3 * np.max(np.abs(one - at.load))  # nine tenths leave at 2 1/s too

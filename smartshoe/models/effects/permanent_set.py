@@ -51,7 +51,7 @@ class PermanentSet(Effect):
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Subtract the set; exact, the dose being of what comes out."""
-        from smartshoe.kernels.memory import set_undone
+        from smartshoe.kernels.dose import set_undone
 
         half, exponent = 0.5 * float(values[0]) * step_s, float(values[1])
 

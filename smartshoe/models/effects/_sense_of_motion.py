@@ -1,0 +1,73 @@
+"""A gain that goes by the sense of motion: what the laws and the flexible block of asymmetries share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.models.effects._sensor_inverse import c_number
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
+from smartshoe.models.effects.effect import Conditions
+
+
+def by_sense(signal: Array, conditions: Conditions, lost: float, turn: float, fade: float) -> Array:
+    """``signal`` (n,) times 1 - ``lost`` (1 - s)/2; the sense s turns over within ``turn`` and fades by ``fade``."""
+    if lost == 0.0:
+        return signal.copy()
+    from smartshoe.kernels.memory import sense_of_motion
+
+    out = np.empty(signal.size)
+    sense_of_motion(cleaned_load(conditions), turn, fade, _start(fade), out)
+    return signal * (1.0 - 0.5 * lost * (1.0 - out))
+
+
+def undone_by_sense(lost: float, turn: float, fade: float) -> Undone:
+    """The load whose own sense gives the output, by bisection; exact for a load without noise."""
+    from smartshoe.kernels.memory import sense_undone
+
+    def body(of: Mapping[str, str]) -> str:
+        zone = c_number(LEAST_DEAD_ZONE)
+        return f"""{{
+    const double other = x / {c_number(1.0 - lost)};
+    double low = x < other ? x : other, high = x < other ? other : x;
+    double v = x, sense = {of["sense"]}, cleaned = {of["last"]};
+    int k;
+    for (k = 0; k <= 50; k++) {{
+        double move = 0.0, turned, total;
+        v = 0.5 * (low + high);
+        cleaned = v;
+        sense = {of["sense"]};
+        if ({of["last"]} < {NO_LOAD}) {{
+            cleaned = {of["last"]};
+            cleaned = cleaned < v - {zone} ? v - {zone} : cleaned;
+            cleaned = cleaned > v + {zone} ? v + {zone} : cleaned;
+            move = cleaned - {of["last"]};
+        }}
+        turned = (move < 0.0 ? -move : move) / {c_number(turn)};
+        total = turned + {c_number(fade)};
+        if (total > 0.0) {{
+            const double end = (move < 0.0 ? -turned : turned) / total;
+            sense = end + (sense - end) * exp(-total);
+        }}
+        if (k == 50) {{
+            break;
+        }}
+        if (v * (1.0 - {c_number(0.5 * lost)} * (1.0 - sense)) < x) {{
+            low = v;
+        }} else {{
+            high = v;
+        }}
+    }}
+    x = v;
+    {of["sense"]} = sense;
+    {of["last"]} = cleaned;
+}}"""
+
+    return Undone(sense_undone, (lost, turn, fade, LEAST_DEAD_ZONE), _start(fade), ("last", "sense"), body)
+
+
+def _start(fade: float) -> Array:
+    """No load yet, and that of loading; none where it has faded at rest."""
+    return np.array([NO_LOAD, 0.0 if fade > 0.0 else 1.0])
