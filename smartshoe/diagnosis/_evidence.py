@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -29,7 +29,6 @@ from smartshoe.diagnosis._sensitivity import (
     Linearised,
     departures,
     directions,
-    marginal,
     nuisance_precision,
     nuisances,
 )
@@ -230,43 +229,6 @@ class Evidence:
             extra += range(first, first + self._directions)
             spread += [max(share * amount, 1e-7)] * self._directions
         return np.concatenate([index, np.array(extra, dtype=np.intp)]), np.concatenate([prior, spread])
-
-    def left_out_errors(self, members: Members) -> Array:
-        """(folds,) squared errors of each recording when the set is fitted to all others.
-
-        A single recording is cut into its cycles. Its nuisances are marginalised over the recording.
-        """
-        given, limits = self.given, self.thresholds
-        columns = [*range(1, 1 + given.own), *(c for m in members for c in given.candidates[m].columns)]
-        # What the rest says little of is taken for nothing there, rather than for anything up to the largest effect.
-        sds = [max(float(abs(s)), limits.material) for part in self.posterior(members).strengths for s in part]
-        precision = np.array([1.0] * given.own + [sd**-2 for sd in sds])
-        raw = self._folds
-        errors = np.zeros(len(raw))
-        total = sum(raw)
-        noise = self.noise_sd**2
-        for k, fold in enumerate(raw):
-            rest = total - fold
-            a = rest[np.ix_(columns, columns)] + noise * np.diag(precision)
-            found = np.linalg.solve(a, rest[columns, 0])
-            errors[k] = fold[0, 0] - 2 * found @ fold[columns, 0] + found @ fold[np.ix_(columns, columns)] @ found
-        return errors
-
-    @cached_property
-    def _folds(self) -> list[Array]:
-        """Inner products of each fold."""
-        given = self.given
-        if len(given.sessions) > 1:
-            return list(given.gram.sessions)
-        session = given.sessions[0]
-        return [
-            marginal(
-                given.rows[0],
-                replace(session, usable=session.usable & (session.cycle == cycle)),
-                given.model,
-            )
-            for cycle in np.unique(session.cycle[session.fitted])
-        ]
 
     def _amplitudes(self, mean: Array, members: Members) -> list[float]:
         columns = [self.given.candidates[member].columns for member in members]

@@ -19,10 +19,10 @@ from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_la
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._search import BREADTH, additions, search
+from smartshoe.diagnosis._search import BREADTH, MOST_MEMBERS, additions
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
-from smartshoe.diagnosis._validation import apart, error_of, extrapolating, foreseen, worst_member
+from smartshoe.diagnosis._validation import LeftOut, apart, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
@@ -78,7 +78,7 @@ def infer(
     progress("weighing alternatives")
     found = _judged(state, plain, sessions, screening)
     while laws := likelier_laws(found.members, state.banned):
-        state = with_likelier_laws(state, laws, sessions)
+        state = with_likelier_laws(state, found.fit.model, laws, sessions)
         found = _judged(state, plain, sessions, screening)
     return found
 
@@ -88,12 +88,12 @@ def _judged(
 ) -> Inference:
     """What of a state's effects predicts what is left out, fitted at last, each weighed against its alternatives."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
-    refused: list[str] = []
-    while (worst := worst_member(evidence, best)) is not None:
-        refused.append(given.candidates[worst].name)
-        best = search(evidence, tuple(m for m in best.members if m != worst), [*refused, *state.banned])
     likelihood, most = state.likelihood(sessions), error_of(sessions, plain.model)
-    extended = fit(likelihood, with_members(given, best, extended.model, likelihood))
+    left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
+    whole = fit(likelihood, with_members(given, best, extended.model, likelihood))
+    extended = left_out.following(whole)
+    refused = [name for name in whole.model.names if name not in extended.model.names]
+    best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name not in refused))
     if extended.model.parts and error_of(sessions, extended.model) >= most:
         # A model that others had bent: from the plain one, each effect at its likeliest shape.
         model = plain.model
@@ -105,7 +105,7 @@ def _judged(
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
     went_astray = not extended.model.parts or error_of(sessions, extended.model) >= most
-    if went_astray or foreseen(evidence, best) < state.thresholds.foreseen:
+    if went_astray or not left_out.stands(extended.model, plain.model):
         extended, best = plain, evidence.posterior(())
     members = members_of(evidence, best, refused, likelihood, extended)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused))
@@ -167,9 +167,9 @@ def _promising(state: State) -> list[Posterior]:
 
     A large effect bends the model that its rivals were linearised about, so that fits of the best few decide.
     """
-    if not state.bends:
-        return [state.best]
     start = state.start
+    if not state.bends or len(start) >= MOST_MEMBERS:
+        return [state.best]
     taken = {state.given.candidates[m].slot for m in start}
     flexible = [
         k

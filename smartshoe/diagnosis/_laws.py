@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with
-from smartshoe.diagnosis._sensitivity import Candidate
+from smartshoe.diagnosis._sensitivity import Candidate, available
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, state_at
 from smartshoe.models.effects import Effect, blocks, catalogue
@@ -16,24 +16,27 @@ SIZES = (0.5, 5.0)  # typical ones, from which a fit begins, a resolution: halve
 
 
 def with_laws(given: State, sessions: Sequence[Session]) -> State:
-    """``given`` with a law in the place of a flexible curve, where one follows nearly as well.
+    """``given`` with a law in the place of a flexible block, where one follows nearly as well.
 
-    No law is exact: one that leaves less than the square of the usual departure, of what the flexible curve explains,
+    No law is exact: one that leaves less than the square of the usual departure, of what the flexible block explains,
     is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
     One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
     is, so that only fits of the whole model compare them fairly.
     """
     state = given
-    curves = tuple(one.name for family in blocks().values() for one in family if one.is_memoryless)
-    for block in state.chosen:
-        if not (block.effect.is_flexible and block.effect.is_memoryless):
-            continue
+    for block in (one for one in given.chosen if one.effect.is_flexible):
         found = _law_of(block, state, state.likelihood(sessions))
         if found is not None:
             missed, law = found
-            banned = curves if missed < state.thresholds.departure**2 else ()
-            state = state_at(law, sessions, state.thresholds, banned)
+            banned = _replaced_with(block.effect) if missed < state.thresholds.departure**2 else ()
+            state = state_at(law, sessions, state.thresholds, (*state.banned, *banned))
     return state
+
+
+def _replaced_with(block: Effect) -> tuple[str, ...]:
+    """A block, and for a curve all of them, which follow the same."""
+    curves = [one.name for family in blocks().values() for one in family if one.is_memoryless]
+    return tuple(curves) if block.is_memoryless else (block.name,)
 
 
 def likelier_laws(members: Sequence[Member], banned: Sequence[str]) -> dict[str, str]:
@@ -49,26 +52,30 @@ def likelier_laws(members: Sequence[Member], banned: Sequence[str]) -> dict[str,
     }
 
 
-def with_likelier_laws(state: State, laws: Mapping[str, str], sessions: Sequence[Session]) -> State:
-    """``state`` with each of ``laws`` in the place of its member, and not the other way round again."""
-    likelihood, model = state.likelihood(sessions), state.fit.model
+def with_likelier_laws(
+    state: State, model: ExtendedModel, laws: Mapping[str, str], sessions: Sequence[Session]
+) -> State:
+    """``state`` at ``model`` with each of ``laws`` in its member's place, and not the other way round again."""
+    likelihood = state.likelihood(sessions)
     for name, law in laws.items():
         model = begun_with(catalogue()[law], model.without(name), likelihood)
     return state_at(fit(likelihood, model), sessions, state.thresholds, (*state.banned, *laws))
 
 
 def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[float, Fit] | None:
-    """The law that follows nearly as well as a flexible curve, and the share of what that explains which it misses."""
-    thresholds = state.thresholds
+    """The law that follows nearly as well as a flexible block, and the share of what that explains which it misses."""
+    thresholds, is_curve = state.thresholds, block.effect.is_memoryless
     bare = state.fit.model.without(block.name)
     for part in bare.parts:
-        if part.effect.is_memoryless:
+        if is_curve and part.effect.is_memoryless:
             bare = bare.without(part.name)
     nothing = fit(likelihood, bare, FEW_STEPS)
     flexible = likelihood.cost(state.fit.model)
     misses: list[tuple[float, Fit]] = []
-    for law in (e for e in catalogue().values() if e.is_memoryless):
-        one = _curved(law, nothing.model, likelihood)
+    for law in available(likelihood.sessions):
+        if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
+            continue
+        one = _begun(law, nothing.model, likelihood)
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
         most = thresholds.departure if _is_stretched(one.model) else thresholds.law_departure
@@ -78,8 +85,8 @@ def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[flo
     return min(misses, key=lambda pair: pair[0]) if misses else None
 
 
-def _curved(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
-    """``model`` with a memoryless law: the best of fits from all its shapes, small and large.
+def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
+    """``model`` with a law: the best of fits from all its shapes, small and large.
 
     A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
     """

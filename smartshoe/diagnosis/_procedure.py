@@ -174,7 +174,8 @@ def _diagnosed(
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
-    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds)
+    follows = not any(name.kind_only for name in names)
+    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds, follows)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
@@ -225,12 +226,17 @@ def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[R
 
 
 def _verdict(
-    causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure, thresholds: Thresholds
+    causes: Sequence[Cause],
+    before: ResidualStructure,
+    after: ResidualStructure,
+    thresholds: Thresholds,
+    follows: bool = True,
 ) -> Verdict:
+    """``follows``: every cause has a law, so that what is left may be what laws usually depart by."""
     left = after.rms if after.significant else 0.0
     if causes:
         wrong = before.rms if before.significant else 0.0
-        least = max(thresholds.material, thresholds.tolerable, thresholds.departure * wrong)
+        least = max(thresholds.material, thresholds.tolerable, thresholds.departure * wrong if follows else 0.0)
         return "partly_explained" if left > least else "explained"
     return "unexplained" if left > max(thresholds.material, thresholds.tolerable) else "adequate"
 

@@ -4,36 +4,97 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
+MOST_FOLDS = 6  # of a single recording, a resolution
 
-def worst_member(evidence: Evidence, best: Posterior) -> int | None:
-    """The member without which data that is left out is followed better; None where there is none.
 
-    Each recording in turn (each block of a single one) is predicted from the others, with and without the member; its
-    gain over them must lie above zero by most of a standard error.
+class LeftOut:
+    """Each fitted recording in turn, predicted by fits to the others; of a single one, its load cycles in blocks.
+
+    A fit begins where that of all of them ended, so that few steps lead to its end.
     """
-    whole = evidence.left_out_errors(best.members)
-    gains = {
-        member: _in_standard_errors(evidence.left_out_errors(tuple(m for m in best.members if m != member)) - whole)
-        for member in best.members
-    }
-    worst = min(gains, key=lambda member: gains[member], default=None)
-    return worst if worst is not None and gains[worst] < evidence.thresholds.validated else None
+
+    def __init__(
+        self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
+    ) -> None:
+        self.thresholds = thresholds
+        self._folds = _folds(sessions)
+        self._rest = [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in self._folds]
+
+    def errors(self, model: ExtendedModel) -> Array:
+        """(folds,) squared errors of what is left out."""
+        found = []
+        for fold, rest in zip(self._folds, self._rest, strict=True):
+            residual = residual_of(fold.seen, fit(rest, model, FEW_STEPS).model)[fold.left_out]
+            found.append(float(residual @ residual))
+        return np.array(found)
+
+    def following(self, found: Fit) -> Fit:
+        """``found``, fitted again without the effects without which what is left out is followed better.
+
+        An effect's gain over what is left out must lie above zero by most of a standard error. Of several of which it
+        does not, and which may stand in for one another, that one goes without which the error is least.
+        """
+        failing = list(found.model.names)
+        while failing:
+            whole = self.errors(found.model)
+            without = {name: self.errors(found.model.without(name)) for name in failing}
+            failing = [
+                name for name in failing if _in_standard_errors(without[name] - whole) < self.thresholds.validated
+            ]
+            if failing:
+                worst = min(failing, key=lambda name: float(without[name].sum()))
+                failing.remove(worst)
+                found = fit(found.likelihood, found.model.without(worst))
+        return found
+
+    def stands(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
+        """Whether ``model`` does away with enough of the plain model's squared error where recordings are left out.
+
+        With `foreseen` of it, and with nearly the share that it does away with where it was fitted: what fits by
+        chance, or only these loads, does not.
+        """
+        left_out = 1.0 - float(self.errors(model).sum()) / max(float(self.errors(plain).sum()), 1e-300)
+        fitted = 1.0 - self._fitted_errors(model) / max(self._fitted_errors(plain), 1e-300)
+        return left_out >= max(self.thresholds.foreseen, (1.0 - self.thresholds.same) * fitted)
+
+    def _fitted_errors(self, model: ExtendedModel) -> float:
+        residuals = [residual_of(fold.whole, model)[fold.left_out] for fold in self._folds]
+        return sum(float(residual @ residual) for residual in residuals)
 
 
-def foreseen(evidence: Evidence, best: Posterior) -> float:
-    """The share of the baseline's squared error over what is left out in turn that the set does away with."""
-    nothing = float(evidence.left_out_errors(()).sum())
-    return 1.0 - float(evidence.left_out_errors(best.members).sum()) / nothing if nothing > 0.0 else 0.0
+@dataclass(frozen=True, eq=False)
+class _Fold:
+    """``rest`` is fitted; ``left_out`` (n,) of ``whole`` is predicted, and ``seen`` is what may be known of that."""
+
+    rest: list[Session]
+    whole: Session
+    seen: Session
+    left_out: Mask
+
+
+def _folds(sessions: Sequence[Session]) -> list[_Fold]:
+    fitted = [session for session in sessions if session.fitted.any()]
+    if len(fitted) > 1:
+        return [_Fold([one for one in fitted if one is not this], this, this, this.fitted) for this in fitted]
+    (session,) = fitted
+    folds = []
+    for cycles in np.array_split(np.unique(session.cycle[session.fitted]), MOST_FOLDS):
+        mask = np.isin(session.cycle, cycles) & session.fitted
+        rest = replace(session, held_out=session.held_out | mask)
+        if mask.any() and rest.fitted.any():
+            folds.append(_Fold([rest], session, rest, mask))
+    return folds
 
 
 def extrapolating(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:

@@ -56,7 +56,7 @@ class Thresholds:
         "an order of magnitude",
     )
     validated: float = threshold(
-        0.8, "standard errors", "by which an effect must better what is left out", "four to one, one-sided"
+        0.5, "standard errors", "by which an effect must better what is left out", "two to one, one-sided"
     )
     foreseen: float = threshold(
         0.25,

@@ -1,4 +1,4 @@
-"""Evidence, left-out errors, fits and expected margins against slow twins that write their matrices out."""
+"""Evidence, fits and expected margins against slow twins that write their matrices out."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._next_experiment import expected_margin
 from smartshoe.diagnosis._search import additions, allowed, search, step
 from smartshoe.diagnosis._sensitivity import Linearised, departures, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import Scale, Session, kernel, prepare, smoothed
+from smartshoe.diagnosis._session import Scale, Session, prepare
 from smartshoe.diagnosis._state import searched, state_at, with_members
-from smartshoe.diagnosis._validation import apart, error_of, foreseen, worst_member
+from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol, Segment
@@ -212,70 +212,6 @@ def test_odds_are_of_one_effect_among_all_at_one_of_its_shapes(given: Linearised
         assert evidence.odds_of((k,)) == pytest.approx(2.0 * np.log(against))
     assert evidence.odds_of((0, 7)) == pytest.approx(evidence.odds_of((0,)) + evidence.odds_of((7,)))
     assert evidence.odds_of(()) == 0.0
-
-
-def test_a_recording_that_is_left_out_is_foreseen_from_the_others(given: Linearised, evidence: Evidence) -> None:
-    """By hand: ridge regression on the other one, own parameters nearly free, an effect's about its found size."""
-    right = _number(given, "gas_compression")
-    (column,) = given.candidates[right].columns
-    strength = max(float(abs(evidence.posterior((right,)).strengths[0][0])), given.thresholds.material)
-    free = []
-    for session, rows in zip(given.sessions, given.rows, strict=True):
-        past = nuisances(session, given.model.relaxation_rate_per_s)
-        kept = session.fitted
-        part = rows[kept][:, [0, 1, 2, 3, column]]
-        free.append(part - past[kept] @ np.linalg.lstsq(past[kept], part, rcond=None)[0])
-    errors = []
-    for k in range(2):
-        rest, own = free[1 - k], free[k]
-        shrink = np.diag([SD] * 3 + [SD / strength])
-        wide = np.concatenate([rest[:, 1:], shrink])
-        found = np.linalg.lstsq(wide, np.concatenate([rest[:, 0], np.zeros(4)]), rcond=None)[0]
-        errors.append(float(np.sum((own[:, 0] - own[:, 1:] @ found) ** 2)))
-    assert_allclose(evidence.left_out_errors((right,)), errors, rtol=1e-4)
-    assert foreseen(evidence, evidence.posterior((right,))) == pytest.approx(
-        1.0 - sum(errors) / float(evidence.left_out_errors(()).sum()), rel=1e-3
-    )
-
-
-def test_cycles_of_a_single_recording_are_left_out_one_by_one() -> None:
-    sessions = _sessions(TRUTH, 1)
-    evidence = Evidence(linearised(MODEL, sessions, STANDARD), SD)
-    right = _number(evidence.given, "gas_compression")
-    errors = evidence.left_out_errors((right,))
-    assert errors.size == np.unique(sessions[0].cycle).size
-    # With the effect noise is all that is left, in each cycle as much as it has samples; but for what is fitted to it.
-    counts = np.bincount(sessions[0].cycle[sessions[0].fitted])
-    thinned = SD * np.std(_noise_seen(sessions[0]))
-    assert float(errors.sum()) == pytest.approx(thinned**2 * counts.sum(), rel=0.3)
-    assert float(evidence.left_out_errors(()).sum()) > 3.0 * float(errors.sum())
-
-
-def _noise_seen(session: Session) -> Array:
-    """What smoothing leaves of white noise of one, by the same means."""
-    noise = np.random.default_rng(9).standard_normal(session.reading.size * session.thinned)
-    return smoothed(noise, kernel(session.thinned), session.thinned)
-
-
-def test_the_worst_member_is_the_one_whose_gain_is_least_sure() -> None:
-    """Gains over what is left out, in standard errors of their mean."""
-    given = linearised(MODEL, _sessions(TRUTH, 3), STANDARD)
-    evidence = Evidence(given, SD)
-    right, idle = _number(given, "gas_compression"), _number(given, "delay")
-    both = evidence.posterior((right, idle))
-    assert worst_member(evidence, evidence.posterior(())) is None
-
-    def gain_in_errors(without: int) -> float:
-        gains = evidence.left_out_errors(tuple(m for m in both.members if m != without)) - evidence.left_out_errors(
-            both.members
-        )
-        return float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(gains.size)))
-
-    sure = {member: gain_in_errors(member) for member in both.members}
-    assert sure[idle] < sure[right]
-    for validated, worst in ((sure[idle] + 0.01, idle), (sure[idle] - 0.01, None)):
-        strict = Evidence(replace(given, thresholds=replace(STANDARD, validated=validated)), SD)
-        assert worst_member(strict, strict.posterior(both.members)) == worst
 
 
 # -- search ---------------------------------------------------------------------------------------------------------

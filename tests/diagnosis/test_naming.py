@@ -263,7 +263,7 @@ def test_without_that_package_another_name_is_given_or_none(breathing: Effect) -
         assert "breathing" not in {cause.name for cause in diagnose(runs[:2], hold_out=runs[2:]).causes}
 
 
-CURVED = MODEL.with_part(effect("gas_compression"), np.array([0.1]))
+CURVED = MODEL.with_part(effect("gas_compression"), np.array([0.15]))
 
 
 def test_where_laws_stay_open_an_experiment_is_proposed_that_parts_them() -> None:

@@ -15,11 +15,12 @@ from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._procedure import _is_within_a_sample, _verdict
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
-from smartshoe.diagnosis._validation import extrapolating, worst_member
+from smartshoe.diagnosis._validation import LeftOut, extrapolating
 from smartshoe.diagnosis._zero import zeros_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -66,11 +67,12 @@ def test_strength_sd_is_how_large_an_effect_may_be(curved: Linearised) -> None:
 
 
 def test_validated_is_how_sure_a_gain_over_what_is_left_out_must_be(curved: Linearised) -> None:
-    def refused(thresholds: Thresholds) -> bool:
-        evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
-        return worst_member(evidence, evidence.posterior((_curve(curved),))) is not None
+    found = fit(Likelihood(curved.sessions, 0.002, CURVED, STANDARD), CURVED)
 
-    assert decides("validated", 0.8, 1e6, refused) == (False, True)
+    def refused(thresholds: Thresholds) -> bool:
+        return not LeftOut(curved.sessions, 0.002, found.model, thresholds).following(found).model.parts
+
+    assert decides("validated", 0.5, 1e6, refused) == (False, True)
 
 
 def test_foreseen_is_how_much_of_what_is_left_out_an_extension_must_do_away_with() -> None:

@@ -31,7 +31,7 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
                 values[k] = shape if law.name == "dead_band" else 0.5 * (parameter.lower + parameter.upper)
         return SimpleNamespace(model=model.with_part(law, values), cost=cost, law=law.name)
 
-    monkeypatch.setattr(_laws, "_curved", curved)
+    monkeypatch.setattr(_laws, "_begun", curved)
     monkeypatch.setattr(_laws, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model, cost=NOTHING_COST))
     return told
 
@@ -43,7 +43,7 @@ def _law_of(odds: float = 10.0) -> tuple[float, str] | None:
         fit=SimpleNamespace(model=MODEL.with_part(block)),
         evidence=SimpleNamespace(odds=odds),
     )
-    likelihood: Any = SimpleNamespace(cost=lambda model: FLEXIBLE_COST)
+    likelihood: Any = SimpleNamespace(cost=lambda model: FLEXIBLE_COST, sessions=())
     found = _laws._law_of(SimpleNamespace(effect=block, name=block.name), state, likelihood)  # type: ignore[arg-type]
     return None if found is None else (found[0], found[1].law)  # type: ignore[attr-defined]
 
@@ -109,7 +109,7 @@ def test_a_curve_is_begun_from_every_shape_at_both_sizes(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(_laws, "fit", fitted)
     law = effect("dead_band")
-    found: Any = _laws._curved(law, MODEL, None)  # type: ignore[arg-type]
+    found: Any = _laws._begun(law, MODEL, None)  # type: ignore[arg-type]
     sizes = {size for size, _ in begun}
     assert {shape for _, shape in begun} == {one["softness"] for one in law.shapes}
     assert len(sizes) == 2

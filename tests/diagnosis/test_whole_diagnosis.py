@@ -252,6 +252,11 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     rest = f"{100 * large:.2g} % repeats and is not explained"
     assert said([], large) == ("unexplained", f"{good}; {rest}, and no effect of the catalogue accounts for it")
     assert said(causes[:2], large) == ("partly_explained", f"{good}, with dead band and delay to 1 %; {rest}")
+    # What laws usually depart by may be left, but not where no law of the kind follows.
+    usual = 0.9 * limits.departure * large
+    assert usual > limits.tolerable
+    assert _verdict(causes[:1], _left(large), _left(usual), limits) == "explained"
+    assert _verdict(causes[:1], _left(large), _left(usual), limits, follows=False) == "partly_explained"
     between = 0.5 * (limits.material + limits.tolerable)
     assert said([], between) == ("adequate", f"{good}; {100 * between:.2g} % repeats and is not explained")
 

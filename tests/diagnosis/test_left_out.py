@@ -1,0 +1,138 @@
+"""What is left out in turn is predicted by fits to the rest, and effects that do not follow it are taken out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from smartshoe.diagnosis import Thresholds, _validation
+from smartshoe.diagnosis._held_out import residual_of
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._session import Session, full_scale, prepare
+from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+STEP_S, SD = 0.05, 0.002
+STANDARD = Thresholds()
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
+TIME_S = np.arange(0.0, 80.0, STEP_S)
+
+
+def _run(model: ExtendedModel, seed: int) -> Recording:
+    """Cycles to other peaks in each recording."""
+    rng = np.random.default_rng([seed, 5])
+    corners = np.zeros(17)
+    corners[1::2] = rng.uniform(0.4, 1.0, 8)
+    corners[1] = 1.0
+    load = np.interp(TIME_S, 5.0 * np.arange(17), corners)
+    share = model.simulate(Conditions(TIME_S, load, STEP_S)) + SD * rng.standard_normal(TIME_S.size)
+    return Recording.from_arrays(time_s=TIME_S, force_n=800.0 * load, pressure_mbar=140.0 * share, name=f"run_{seed}")
+
+
+def _sessions(truths: list[ExtendedModel]) -> list[Session]:
+    runs = [_run(truth, seed) for seed, truth in enumerate(truths)]
+    usable = [one.sensor.present for one in runs]
+    return prepare(runs, usable, [False] * len(runs), full_scale(runs, usable, STANDARD), 1, STANDARD)
+
+
+def _curved(amount: float) -> ExtendedModel:
+    return MODEL.with_part(effect("gas_compression"), np.array([amount]))
+
+
+def _fitted(sessions: list[Session], *names: str) -> ExtendedModel:
+    model = MODEL
+    for name in names:
+        model = model.with_part(effect(name), effect(name).begun())
+    return fit(Likelihood(sessions, SD, MODEL, STANDARD), model).model
+
+
+def _left_out(sessions: list[Session], thresholds: Thresholds = STANDARD) -> LeftOut:
+    return LeftOut(sessions, SD, MODEL, thresholds)
+
+
+def test_a_recording_is_predicted_by_a_fit_to_the_others() -> None:
+    """By hand: SciPy's least squares on the others, each with an offset of its own."""
+    sessions = _sessions([_curved(0.08)] * 3)
+    model = _fitted(sessions, "gas_compression")
+    errors = _left_out(sessions).errors(model)
+    for k, session in enumerate(sessions):
+        rest = [one for one in sessions if one is not session]
+
+        def residuals(theta: Array, rest: list[Session] = rest) -> Array:
+            return np.concatenate([residual_of(one, model.at(theta)) for one in rest])
+
+        slow = model.at(least_squares(residuals, model.theta, x_scale="jac").x)
+        assert errors[k] == pytest.approx(float(np.sum(residual_of(session, slow) ** 2)), rel=0.02)
+
+
+def test_of_a_single_recording_blocks_of_its_cycles_are_left_out() -> None:
+    sessions = _sessions([_curved(0.08)])
+    errors = _left_out(sessions).errors(_fitted(sessions, "gas_compression"))
+    assert errors.size == min(MOST_FOLDS, np.unique(sessions[0].cycle).size)
+    noise = residual_of(sessions[0], _fitted(sessions, "gas_compression"))
+    assert float(noise @ noise) < float(errors.sum())  # every sample once, and none of it was fitted
+    assert float(errors.sum()) < 0.5 * float(_left_out(sessions).errors(_fitted(sessions)).sum())
+
+
+def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
+    sessions = _sessions([_curved(0.1)] * 3)
+    left_out, plain = _left_out(sessions), _fitted(sessions)
+    assert left_out.stands(_fitted(sessions, "gas_compression"), plain)
+    assert not left_out.stands(_fitted(sessions, "load_unload_asymmetry"), plain)
+    assert not left_out.stands(plain, plain)
+    # Two recordings that a drift of the gain happens to fit, each in its own way.
+    rising, falling = (MODEL.with_part(effect("gain_drift"), np.array([slope, 0.0])) for slope in (0.002, -0.0004))
+    chance = _sessions([rising, falling])
+    model, bare = _fitted(chance, "gain_drift"), _fitted(chance)
+    errors = [float(_left_out(chance).errors(one).sum()) for one in (model, bare)]
+    assert _left_out(chance).stands(model, bare) == (errors[0] < (1.0 - STANDARD.foreseen) * errors[1])
+    assert not _left_out(chance).stands(model, bare)
+
+
+def _following(sessions: list[Session], model: ExtendedModel, thresholds: Thresholds = STANDARD) -> tuple[str, ...]:
+    found = fit(Likelihood(sessions, SD, MODEL, thresholds), model)
+    return _left_out(sessions, thresholds).following(found).model.names
+
+
+def test_an_effect_that_is_not_there_is_taken_out_and_one_that_is_stays() -> None:
+    there, gone = _sessions([_curved(0.1)] * 4), _sessions([_curved(0.0)] * 4)
+    assert _following(there, _fitted(there, "gas_compression")) == ("gas_compression",)
+    assert _following(gone, _fitted(gone, "gas_compression")) == ()
+    assert _following(there, MODEL) == ()
+
+
+def test_an_effect_of_another_size_in_each_recording_must_gain_more_than_chance() -> None:
+    """It fits all of them at its mean, and says little of the next."""
+    changing = _sessions([_curved(0.1), MODEL, _curved(0.1), MODEL])
+    model = _fitted(changing, "gas_compression")
+    errors = [_left_out(changing).errors(one) for one in (model.without("gas_compression"), model)]
+    gains = errors[0] - errors[1]
+    sure = float(np.mean(gains) / (np.std(gains, ddof=1) / np.sqrt(gains.size)))
+    for validated, names in ((sure - 0.01, ("gas_compression",)), (sure + 0.01, ())):
+        assert _following(changing, model, replace(STANDARD, validated=validated)) == names
+
+
+def test_of_two_that_fail_that_one_goes_first_without_which_the_error_is_least(monkeypatch: pytest.MonkeyPatch) -> None:
+    sessions = _sessions([_curved(0.1)] * 3)
+    model = _fitted(sessions, "gas_compression", "delay")
+    impossible = _left_out(sessions, replace(STANDARD, validated=1e9))
+    without = {name: float(impossible.errors(model.without(name)).sum()) for name in model.names}
+    assert without["delay"] < without["gas_compression"]
+    fitted: list[tuple[str, ...]] = []
+
+    def kept(likelihood: Likelihood, start: ExtendedModel, steps: int = 25) -> Fit:
+        if steps > FEW_STEPS:
+            fitted.append(start.names)
+        return fit(likelihood, start, steps)
+
+    monkeypatch.setattr(_validation, "fit", kept)
+    impossible.following(fit(Likelihood(sessions, SD, MODEL, STANDARD), model))
+    assert fitted == [("gas_compression",), ()]
