@@ -50,3 +50,13 @@ def test_a_drift_of_the_clock_in_all_recordings_is_one_cause_and_none_is_moved()
     assert values[0] == pytest.approx(0.004, rel=0.15)
     assert found.recordings == runs
     assert not found.says
+
+
+def test_a_drift_that_is_too_small_to_be_seen_in_a_short_recording_is_one_all_the_same() -> None:
+    runs = [staircase(11, 3.0, 0.1, drift=0.003), staircase(3, 3.0, 0.1, drift=0.003, seed=2)]
+    integrity = examine(runs, Thresholds())
+    assert integrity.clock_rate[0] > 0.0
+    assert integrity.clock_rate[1] == 0.0
+    ((effect, values),) = aligned(runs, integrity, Thresholds()).parts
+    assert effect.name == "clock_drift"
+    assert values[0] == pytest.approx(0.003, rel=0.2)
