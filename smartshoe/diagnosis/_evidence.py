@@ -74,7 +74,7 @@ class Evidence:
         self.gram = self._products(self._rows, self._rows)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
-        raw = given.gram.whole
+        raw = given.gram
         inverse = np.linalg.pinv(raw[own, own], rcond=1e-10, hermitian=True)
         self._absorbed = inverse @ raw[own]
         visible = raw - raw[:, own] @ self._absorbed

@@ -94,21 +94,6 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
 
 
 @dataclass(frozen=True, eq=False)
-class Gram:
-    """Inner products of the target and all columns, nuisances marginalised, in order: target, then columns.
-
-    ``sessions``: one matrix (m, m) a session; ``whole`` their sum.
-    """
-
-    sessions: tuple[Array, ...]
-
-    @property
-    def whole(self) -> Array:
-        """(m, m) over all sessions."""
-        return np.asarray(sum(self.sessions))
-
-
-@dataclass(frozen=True, eq=False)
 class Linearised:
     """A model's columns over what may be fitted.
 
@@ -131,13 +116,14 @@ class Linearised:
         return Counter(one.name for one in self.candidates)
 
     @cached_property
-    def gram(self) -> Gram:
-        """Inner products with flat nuisances."""
-        return Gram(tuple(marginal(rows, one, self.model) for rows, one in zip(self.rows, self.sessions, strict=True)))
+    def gram(self) -> Array:
+        """(m, m) inner products of the target and all columns, in order, over all sessions; flat nuisances are out."""
+        parts = zip(self.rows, self.sessions, strict=True)
+        return np.asarray(sum(marginal(rows, session, self.model) for rows, session in parts))
 
     def noise_sd(self) -> float:
         """Standard deviation of what no column reaches, noise or structure, each correlation time counted once."""
-        whole = self.gram.whole
+        whole = self.gram
         part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
         found = np.linalg.solve(part, whole[1:, 0])
         left = []

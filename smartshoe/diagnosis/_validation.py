@@ -27,7 +27,7 @@ class LeftOut:
     def __init__(
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
-        self.thresholds = thresholds
+        self.sessions, self.thresholds = sessions, thresholds
         self._folds = _folds(sessions)
         self._rest = [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in self._folds]
 
@@ -65,20 +65,15 @@ class LeftOut:
         chance, or only these loads, does not.
         """
         left_out = 1.0 - float(self.errors(model).sum()) / max(float(self.errors(plain).sum()), 1e-300)
-        fitted = 1.0 - self._fitted_errors(model) / max(self._fitted_errors(plain), 1e-300)
+        fitted = 1.0 - (error_of(self.sessions, model) / max(error_of(self.sessions, plain), 1e-300)) ** 2
         return left_out >= max(self.thresholds.foreseen, (1.0 - self.thresholds.same) * fitted)
-
-    def _fitted_errors(self, model: ExtendedModel) -> float:
-        residuals = [residual_of(fold.whole, model)[fold.left_out] for fold in self._folds]
-        return sum(float(residual @ residual) for residual in residuals)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fold:
-    """``rest`` is fitted; ``left_out`` (n,) of ``whole`` is predicted, and ``seen`` is what may be known of that."""
+    """``rest`` is fitted, and ``left_out`` (n,) predicted of the recording of which no more than ``seen`` is known."""
 
     rest: list[Session]
-    whole: Session
     seen: Session
     left_out: Mask
 
@@ -86,14 +81,14 @@ class _Fold:
 def _folds(sessions: Sequence[Session]) -> list[_Fold]:
     fitted = [session for session in sessions if session.fitted.any()]
     if len(fitted) > 1:
-        return [_Fold([one for one in fitted if one is not this], this, this, this.fitted) for this in fitted]
+        return [_Fold([one for one in fitted if one is not this], this, this.fitted) for this in fitted]
     (session,) = fitted
     folds = []
     for cycles in np.array_split(np.unique(session.cycle[session.fitted]), MOST_FOLDS):
         mask = np.isin(session.cycle, cycles) & session.fitted
         rest = replace(session, held_out=session.held_out | mask)
         if mask.any() and rest.fitted.any():
-            folds.append(_Fold([rest], session, rest, mask))
+            folds.append(_Fold([rest], rest, mask))
     return folds
 
 

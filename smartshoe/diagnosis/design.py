@@ -132,7 +132,7 @@ def _commanded(protocol: Protocol, unit: ExtendedModel, peak_n: float, sample_ra
 
 
 def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:
-    gram = columns.gram.whole[1:, 1:] / sd**2
+    gram = columns.gram[1:, 1:] / sd**2
     own = np.arange(columns.own)
     left = gram - gram[:, own] @ np.linalg.pinv(gram[np.ix_(own, own)], rcond=1e-10, hermitian=True) @ gram[own]
     laws = [one for one in columns.candidates if not one.effect.is_flexible]

@@ -88,19 +88,19 @@ def _lag_line(view: View) -> tuple[float, float] | None:
         if places.size == 0 or np.max(np.abs(lags)) <= least:
             continue
         offered = []
-        before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
         for offset_s, rate in _lines(places - middle, lags, weights, 0.5 * duration_s):
             ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
             if np.max(np.abs(ends)) <= least:
                 continue
             shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
+            before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
             after = _unexplained(grid, shifted, reading, smooth_s, given)
             agreed = lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
             # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
             if agreed and (rate == 0.0 or after < before):
                 return offset_s, rate
             offered.append((after, offset_s, rate))
-        if not offered:
+        if before is None or not offered:
             continue
         after, offset_s, rate = min(offered)
         if after < earned * before:
