@@ -25,6 +25,7 @@ from typing import Any, Protocol
 
 WALL = 30.0  # times the processor time that is let pass by the clock, for tests that wait and a machine that is busy
 LEAST_S, SLOWER = 4.0, 4.0  # a test hangs that takes this many times its usual processor time, and never less
+LEAST_WALL_S = 120.0  # by the clock: a test that waits so long for what never comes hangs too
 Costs = dict[str, float]  # by test, processor time in s
 NOT_SWAPPED, UNDECIDED = "not swapped", "undecided"
 
@@ -47,8 +48,9 @@ class Bug(Protocol):
 class Ended:
     """How the tests ended, the first that failed, and their processor time in s.
 
-    ``outcome`` is "killed", "survived", "hung" (they ended their process, or its processor time was over), `UNDECIDED`
-    (the clock ran out, which a busy machine brings about as well) or `NOT_SWAPPED`.
+    ``outcome`` is "killed", "survived", "hung" (they ended their process, or a test took or waited far too long),
+    `UNDECIDED` (the clock ran out for all of them together, which a busy machine brings about as well) or
+    `NOT_SWAPPED`.
     """
 
     outcome: str
@@ -64,7 +66,9 @@ class Watch:
         self._costs = costs
 
     def pytest_runtest_logstart(self, nodeid: str, location: object) -> None:
-        signal.setitimer(signal.ITIMER_PROF, LEAST_S + SLOWER * self._costs.get(nodeid, 0.0))
+        cost_s = self._costs.get(nodeid, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, LEAST_S + SLOWER * cost_s)
+        signal.setitimer(signal.ITIMER_REAL, LEAST_WALL_S + WALL * SLOWER * cost_s)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         if report.failed and not self.failed:
@@ -127,9 +131,11 @@ def in_child(work: Callable[[], object], wall_s: float) -> tuple[Any, float]:
         try:
             os.close(mine)
             os.setsid()
-            signal.signal(signal.SIGPROF, signal.SIG_DFL)
+            for ended_by in (signal.SIGPROF, signal.SIGALRM):
+                signal.signal(ended_by, signal.SIG_DFL)
             said = json.dumps(work()).encode()
             signal.setitimer(signal.ITIMER_PROF, 0.0)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
             with os.fdopen(its, "wb") as file:
                 file.write(said)
         except BaseException:

@@ -142,7 +142,7 @@ def other_test(pressing: Pressing) -> PressingFault | None:
             " log of this test",
         )
     if pressing.alignment is None:
-        follows = pressing.correlations.get(pressing.unit, 0.0)
+        follows = pressing.correlations[pressing.unit]
         return PressingFault(
             "other_test",
             f"{pressing.load.label} does not match what {pressing.unit} read (correlation {follows:.2f}): give the"

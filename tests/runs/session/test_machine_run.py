@@ -65,6 +65,7 @@ def test_a_machine_that_takes_time_does_not_hold_up_the_stream() -> None:
     assert log.of_role("load")
     assert not log.sensors  # its own log, not the joined recording
     side.close()
+    assert not side.machine.is_open
 
 
 def test_a_machine_that_fails_says_so_in_the_sessions_own_thread() -> None:
