@@ -323,8 +323,9 @@ def segment(events: Sequence[HistoryEvent], at: datetime) -> tuple[datetime | No
 
 
 def _says(entry: Entry, at: datetime) -> str:
-    days = days_between(entry.date, at)
-    when = "of the same day" if abs(days) < 1.0 else f"{abs(days):.0f} days {'before' if days > 0 else 'after'} that"
+    days = (at.date() - entry.date.date()).days
+    size = f"{abs(days)} day{'s' * (abs(days) > 1)}"
+    when = f"{size} {'before' if days > 0 else 'after'} that" if days else "of the same day"
     said = f"calibration {entry.name} of unit {entry.serial_number}, {when}"
     if entry.is_expired(at):
         said += f", has expired: it holds for {entry.valid_for_days:g} days"

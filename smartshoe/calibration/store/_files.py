@@ -47,7 +47,7 @@ def folder_name(serial_number: str) -> str:
 def fingerprint(calibration: Mapping[str, Any]) -> str:
     """sha256 of a calibration's object, whatever the store says of it."""
     bare = {key: value for key, value in calibration.items() if key != "store"}
-    return hashlib.sha256(json.dumps(bare, sort_keys=True, allow_nan=False).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(bare, sort_keys=True).encode()).hexdigest()
 
 
 def _write_named(folder: Path, date: str, content: Mapping[str, Any]) -> Path:

@@ -223,7 +223,7 @@ def _extended(first: Calibration, second: Calibration, time_s: Array, load_n: Ar
     """The difference (n,) where one of the two has effects: the first's reading through both filters."""
     bare = [_without_zero(calibration) for calibration in (first, second)]
     model = bare[0].model()
-    step_s = float(time_s[1] - time_s[0])
+    step_s = float(time_s[1])  # from 0
     reading = model.reading(Conditions(time_s, load_n / model.full_scale_load_n, step_s))
     ours, theirs = (calibration.compensator(1.0 / step_s).apply(reading) for calibration in bare)
     return np.asarray(theirs - ours)
@@ -236,4 +236,4 @@ def _without_zero(calibration: Calibration) -> Calibration:
     for part in bare.parts:
         if part.effect.shifts == "reading":
             bare = bare.without(part.name)
-    return replace(calibration, offset=0.0, extended=bare)
+    return replace(calibration, extended=bare)

@@ -177,10 +177,11 @@ def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
     """
     known = bool(np.isfinite(sds).all() and (sds > 0.0).all())
     weight = 1.0 / sds if known else np.ones(values.size)
-    size = np.linalg.norm(design * weight[:, None], axis=0)
-    if not (size > 0.0).all() or np.linalg.matrix_rank(design * weight[:, None] / size) < design.shape[1]:
+    weighted = design * weight[:, None]
+    size = np.linalg.norm(weighted, axis=0)
+    scaled = weighted / np.where(size > 0.0, size, 1.0)
+    if np.linalg.matrix_rank(scaled) < design.shape[1]:
         return None
-    scaled = design * weight[:, None] / size
     theta = np.linalg.lstsq(scaled, values * weight, rcond=None)[0]
     left = values * weight - scaled @ theta
     freedom = values.size - design.shape[1]
