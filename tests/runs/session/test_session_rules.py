@@ -18,7 +18,16 @@ from smartshoe.errors import InputError, LimitError, ScenarioError
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.runs.session import SessionFolder, SessionPlan, Unattended, analyse, conduct, protocols_named
-from smartshoe.runs.session._checks import AT_THE_END, Pressing, contact, first_fault, saturation, zero_drift
+from smartshoe.runs.session._checks import (
+    AT_THE_END,
+    Pressing,
+    contact,
+    first_fault,
+    other_test,
+    saturation,
+    stream_too_short,
+    zero_drift,
+)
 from smartshoe.units import MILLIBAR
 
 RATE_HZ = 100.0
@@ -93,6 +102,18 @@ def test_what_is_looked_for_in_a_log_is_nowhere_without_one() -> None:
     assert first_fault(AT_THE_END, alone) is None
     assert alone.alignment is None
     assert alone.correlations == {}
+
+
+def test_a_log_that_does_not_match_is_told_alone_and_not_judged_by_its_clock() -> None:
+    good = pressed(2.0, 5.0)
+    assert good.load is not None
+    steps = 400.0 * np.abs(np.sin(np.cumsum(np.random.default_rng(5).normal(0.0, 0.1, len(good.load)))))
+    other = replace(good, load=Recording.from_arrays(time_s=good.load.time_s, force_n=800.0 / steps.max() * steps))
+    assert other.alignment is None
+    assert first_fault((stream_too_short, zero_drift), other) is None
+    found = first_fault((other_test,), other)
+    assert found is not None
+    assert f"(correlation {other.correlations['left_toe']:.2f})" in found.says
 
 
 # -- what is recorded, and what is said --------------------------------------------------------------------------
