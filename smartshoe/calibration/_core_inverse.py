@@ -43,7 +43,7 @@ class CoreInverse(Inverse):
 
     def _smallest_eigenvalue(self) -> float:
         own = np.linalg.eigvals(self.transition - np.outer(self.drive, self.read) / self.direct)
-        return float(np.min(np.real(own), initial=1.0))
+        return float(np.min(np.real(own), initial=np.inf))
 
     def reset(self) -> None:
         """Start in the steady state of the next pressure, nothing leaked."""
@@ -52,7 +52,7 @@ class CoreInverse(Inverse):
     def push(self, signal: Array, time_s: Array) -> Array:
         """Load (n,) from pressure (n,), shares of full scale."""
         if self._push is None:
-            return signal / self.direct
+            return signal  # a spring alone: pressure and load are one share
         if not signal.size:
             return signal.copy()
         if self._state is None:

@@ -41,6 +41,8 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(
             dir=folder, prefix=f".{named.stem[:_LONGEST_STEM]}.", suffix=f".partial{named.suffix[:_LONGEST_ENDING]}"
         )
+    except UsageError:
+        raise
     except (OSError, RuntimeError, ValueError) as error:
         raise _unwritable(path, error) from error
     os.close(handle)
@@ -72,8 +74,6 @@ def replacing(path: Path | str, durable: bool = True) -> Iterator[Path]:
 
 
 def _unwritable(path: Path | str, error: Exception) -> UsageError:
-    if isinstance(error, SmartShoeError):
-        return error if isinstance(error, UsageError) else UsageError(str(error))
     reason = getattr(error, "strerror", None) or str(error)
     mends: dict[int | None, str] = {
         errno.ENOSPC: "free some space",

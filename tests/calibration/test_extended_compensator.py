@@ -43,6 +43,13 @@ def test_the_baseline_is_undone_exactly(gain: float, share: float, rate: float, 
     assert np.max(np.abs(error)) < EXACT_TOLERANCE
 
 
+@pytest.mark.parametrize("hz", [1.0, 500.0])
+def test_a_spring_alone_is_undone_exactly(hz: float) -> None:
+    model = ExtendedModel(0.5, 0.0, 1.0, 800.0, 180.0, "mbar")
+    assert np.max(np.abs(_error(model, some_conditions(3, 6, 1.0 / hz)))) < EXACT_TOLERANCE
+    assert ExtendedCompensator(model, hz).core.is_exact
+
+
 @pytest.mark.parametrize("name", EXACT)
 @given(seed=seeds)
 @settings(max_examples=4, deadline=None)

@@ -110,3 +110,29 @@ def test_values_of_a_unit_that_is_not_known_stay_as_they_are() -> None:
     assert furlongs.convert([2.5], declared("furlong"))[0] == 2.5
     with pytest.raises(UnitError, match="furlong"):
         furlongs.convert([2.5], unit("m"))
+
+
+@given(st.sampled_from(_TABLE), st.sampled_from(_TABLE), st.floats(-1e3, 1e3))
+def test_any_unit_converts_to_any_other_of_its_quantity_by_way_of_si(
+    one: tuple[str, ...], other: tuple[str, ...], value: float
+) -> None:
+    ours, theirs = unit(one[0]), unit(other[0])
+    if ours.quantity != theirs.quantity:
+        with pytest.raises(UnitError, match="cannot be expressed"):
+            ours.convert([value], theirs)
+        return
+    there = ours.convert([value], theirs)
+    assert there[0] == pytest.approx(theirs.from_si(ours.to_si([value]))[0], rel=1e-12, abs=1e-9)
+    assert theirs.to_si(there)[0] == pytest.approx(ours.to_si([value])[0], rel=1e-12, abs=1e-9)
+
+
+def test_a_pressure_converts_to_each_other_pressure() -> None:
+    pressures = [unit(row[0]) for row in _TABLE if row[2] == "pressure"]
+    for ours in pressures:
+        for theirs in pressures:
+            assert ours.convert([2.0], theirs)[0] == pytest.approx(2.0 * ours.scale / theirs.scale)
+
+
+@pytest.mark.parametrize(("symbol", "suffix"), [(" Big Blobs ", "big_blobs"), ("", "1"), ("  ", "1")])
+def test_a_unit_that_is_not_known_has_an_ending_for_its_column(symbol: str, suffix: str) -> None:
+    assert (declared(symbol).symbol, declared(symbol).suffix) == (symbol, suffix)

@@ -10,9 +10,11 @@ import stat
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from hypothesis import given, settings
@@ -102,6 +104,26 @@ def test_a_pipe_gets_the_whole_text_and_without_a_reader_a_refusal(tmp_path: Pat
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 
+def test_a_pipe_whose_reader_is_slow_is_waited_for(tmp_path: Path) -> None:
+    pipe, text = tmp_path / "pipe", "0123456789" * 40_000  # many times what a pipe holds
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    os.set_blocking(reader, True)
+    got = []
+
+    def read() -> None:
+        time.sleep(0.05)
+        while piece := os.read(reader, 50_000):
+            got.append(piece)
+
+    reading = Thread(target=read, daemon=True)
+    reading.start()
+    write_text(pipe, text)
+    reading.join(30.0)
+    os.close(reader)
+    assert b"".join(got).decode() == text
+
+
 def test_a_link_stays_and_the_file_that_it_leads_to_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "far").mkdir()
     target, link = tmp_path / "far" / "result.json", tmp_path / "result.json"
@@ -131,6 +153,14 @@ def test_a_strangers_link_in_a_folder_of_everybody_is_not_followed(tmp_path: Pat
     with pytest.raises(UsageError, match="somebody else"):
         write_text(shared / "result.json", "new")
     assert (tmp_path / "mine").read_text() == "old"
+    # One's own link there, and anybody's in a folder of one's own, are.
+    (shared / "own.json").symlink_to(tmp_path / "mine")
+    write_text(shared / "own.json", "new")
+    assert (tmp_path / "mine").read_text() == "new"
+    (tmp_path / "theirs.json").symlink_to(tmp_path / "mine")
+    os.lchown(tmp_path / "theirs.json", 12345, 12345)
+    write_text(tmp_path / "theirs.json", "newer")
+    assert (tmp_path / "mine").read_text() == "newer"
 
 
 @pytest.mark.parametrize("name", ["n" * 250 + ".csv", "m" * 300 + ".csv", "a\0b"])
@@ -163,7 +193,8 @@ def test_json_is_a_line_of_text_that_reads_back_and_holds_no_nan() -> None:
     result = {"unit": "linke Ferse", "value": 0.1 + 0.2}
     assert json.loads(json_text(result)) == result
     assert json_text(result).endswith("}\n")
-    assert "\n" in json_text(result).strip()  # a person may read it
+    # A person may read it, and its bytes stay what they are: files are named by them.
+    assert json_text({"unit": "Füße", "value": [1, 0.5]}) == '{\n "unit": "Füße",\n "value": [\n  1,\n  0.5\n ]\n}\n'
     with pytest.raises(ValueError, match="nan"):
         json_text({"value": math.nan})
 
