@@ -219,10 +219,9 @@ def _plain_cost(fit: ParameterFit) -> float:
 
 def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array, spread: float) -> None:
     """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself."""
-    static = values[2] / values[0]
     gain_sd = float(np.sqrt(max(fit.covariance[fit.problem.shape_size - 1, fit.problem.shape_size - 1], 0.0)))
     loose = gain_sd > WORST_RELATIVE_GAIN_SD * abs(fit.theta[fit.problem.shape_size - 1])
-    if static == 0.0 or (fit.cost > 0.5 * spread and (fit.degenerate or loose)):
+    if values[2] == 0.0 or (fit.cost > 0.5 * spread and (fit.degenerate or loose)):
         raise NotIdentifiableError(
             f"{where}: the reading does not follow the load, so that no gain can be found: record a load that rises and"
             " falls well above the noise"

@@ -9,8 +9,11 @@ from typing import Literal, cast
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.errors import NotIdentifiableError
+from smartshoe.identification._experiment import Direction
 from smartshoe.identification._instruments import Instruments, Source, solve_instrumental
 from smartshoe.identification._noise import MATTERS, input_noise_bias, noise_sds, output_variance
+from smartshoe.identification._parametrisation import FreeForm
 from smartshoe.identification._prediction_error import EDGE_SAMPLES, PredictionError
 from smartshoe.identification._solve import Evaluation, Minimum, Solver, minimise
 from smartshoe.identification._srivc import srivc
@@ -21,7 +24,6 @@ from smartshoe.recording import Recording
 Estimator = Literal["auto", "output_error", "errors_in_variables", "command", "cycles"]
 RATIO_ROUNDS = 4  # of fit and variance; the ratio enters weakly
 MOST_RATIO = 1e8
-DELAYS_TRIED = (-2.0, -1.0, 0.0, 1.0, 2.0)
 WEAK = 4.0  # standard errors by instruments over those of the plain fit
 
 
@@ -73,7 +75,7 @@ def estimate(
         return fit
     known = _noise(problem, noise)
     fit = replace(fit, noise=known)
-    input_sd = known["reading"] if problem.settings.direction == "inverse" else known["load"]
+    input_sd = known[_input_and_output(problem)[0]]
     chosen = estimator
     if estimator in ("auto", "output_error"):
         concern = _concern(fit, input_sd)
@@ -81,6 +83,7 @@ def estimate(
             return replace(fit, notes=(*fit.notes, f"{concern}: choose another estimator")) if concern else fit
         chosen = "command" if _has_command(problem) else "errors_in_variables"
         fit = replace(fit, notes=(*fit.notes, f"{concern}: {_WHY[chosen]}"))
+    fit = _with_better_start(fit, prefilter_rad_s)
     if chosen in ("command", "cycles"):
         instrumental = _instrumental(fit, chosen, recordings, limits)
         if estimator != "auto" or (instrumental.converged and not _is_weak(instrumental, fit)):
@@ -162,9 +165,8 @@ def _concern(fit: ParameterFit, input_sd: float) -> str:
     sd = np.sqrt(np.maximum(np.diag(slope @ fit.covariance[shape, shape] @ slope.T), 1e-300))
     if np.max(np.abs(moved) / sd) < MATTERS:
         return ""
-    signal = "reading" if problem.settings.direction == "inverse" else "load"
     return (
-        f"the {signal} is noisy as well (about {input_sd:.3g}), which would move a1 by"
+        f"the {_input_and_output(problem)[0]} is noisy as well (about {input_sd:.3g}), which would move a1 by"
         f" {100 * moved[0] / values[0]:.2g} % of itself in a fit that takes it for exact"
     )
 
@@ -179,28 +181,47 @@ def _has_command(problem: PredictionError) -> bool:
     return True
 
 
+def _with_better_start(fit: ParameterFit, prefilter_rad_s: float) -> ParameterFit:
+    """The plain ``fit``, or that of the other direction where it is the likelier with noise on both signals.
+
+    A fit that takes a loud input for exact smooths it: its optimum is a delay of tenths of a second with a pole to
+    match, from which no likelihood leads back. In the other direction that noise is the output's.
+    """
+    problem = fit.problem
+    direction: Direction = "forward" if problem.settings.direction == "inverse" else "inverse"
+    turned = PredictionError(problem.experiments, replace(problem.settings, direction=direction), None, problem.masks)
+    try:
+        found = minimise(turned, start(turned, prefilter_rad_s), "trf", tolerance=1e-6, max_iterations=100).theta
+    except NotIdentifiableError:
+        return fit
+    ln_alpha, p1, p2 = FreeForm(problem.settings.direction).from_coefficients(*turned.coefficients(found)[0])
+    if not np.isfinite([ln_alpha, p1, p2]).all():
+        return fit
+    theta = theta_at(problem, float(np.exp(ln_alpha)), float(p1), float(p2), turned.delay_s(found), exact=True)
+    input_sd, output_sd = (fit.noise[signal] for signal in _input_and_output(problem))
+    noisy = problem.with_noise_ratio(_noise_ratio(input_sd, output_sd**2))
+    if not noisy.evaluate(theta).cost < noisy.evaluate(fit.theta).cost:
+        return fit
+    better = _settle(problem, theta, problem.evaluate(theta), fit.iterations, fit.converged, fit.estimator)
+    return replace(better, noise=fit.noise, notes=fit.notes)
+
+
 def _errors_in_variables(
     fit: ParameterFit, method: str, noise: Mapping[str, float | None], limits: Termination
 ) -> ParameterFit:
-    problem, inverse = fit.problem, fit.problem.settings.direction == "inverse"
-    input_sd, output_sd = (fit.noise["reading"], noise["load"]) if inverse else (fit.noise["load"], noise["reading"])
+    problem = fit.problem
+    input_, output_ = _input_and_output(problem)
+    input_sd, output_sd = fit.noise[input_], noise[output_]
     theta, iterations, converged = fit.theta.copy(), 0, fit.converged
     # Means of neighbours first: they hold a fraction of the noise, above all of that in the delay's gradient.
     for level in [problem.coarse(COARSE_SAMPLES), problem]:
         factor = problem.count / max(level.count, 1)
-        for number in range(1 if output_sd else RATIO_ROUNDS):
+        for _ in range(1 if output_sd else RATIO_ROUNDS):
             # What the input's noise does not explain is the output's, model errors included: to call them input noise
             # would overcorrect.
             variance = factor * _mean_square(level, theta)
             output = output_sd**2 if output_sd else output_variance(problem, theta, variance, input_sd)
-            ratio = min(input_sd**2 / output, MOST_RATIO) if output > 0 else MOST_RATIO
-            level, before = level.with_noise_ratio(ratio), theta
-            if number == 0:
-                # The likelihood may have several optima along the delay: every method sets out from the same one.
-                if level.settings.delay_s is None and iterations == 0:
-                    theta = _best_delay(level, theta, problem.experiments[0].sample_time_s)
-                else:
-                    theta = minimise(level, theta, "trf", tolerance=1e-6, max_iterations=100).theta
+            level, before = level.with_noise_ratio(_noise_ratio(input_sd, output)), theta
             found = _minimise(level, theta, method, limits)
             iterations, converged = iterations + found.iterations, found.converged
             moved = float(np.max(np.abs(found.theta - before) / (np.sqrt(np.diag(fit.covariance)) + 1e-300)))
@@ -216,19 +237,13 @@ def _errors_in_variables(
     return replace(settled, covariance=covariance, noise=fit.noise, notes=fit.notes)
 
 
-def _best_delay(problem: PredictionError, theta: Array, sample_time_s: float) -> Array:
-    """The best of the optima about ``theta`` and a few samples of delay to either side.
+def _input_and_output(problem: PredictionError) -> tuple[str, str]:
+    """Which signal is which, by the names that ``noise`` has them under."""
+    return ("reading", "load") if problem.settings.direction == "inverse" else ("load", "reading")
 
-    Below a sample a plain fit's delay may be the noise's, and every method should set out from one place.
-    """
-    found = []
-    for samples in DELAYS_TRIED:
-        trial = theta.copy()
-        trial[problem.delay_at] = samples * sample_time_s + (
-            theta[problem.delay_at] if abs(theta[problem.delay_at]) > sample_time_s else 0.0
-        )
-        found.append(minimise(problem, trial, "trf", tolerance=1e-6, max_iterations=30))
-    return min(found, key=lambda minimum: minimum.evaluation.cost).theta
+
+def _noise_ratio(input_sd: float, output_variance: float) -> float:
+    return min(input_sd**2 / output_variance, MOST_RATIO) if output_variance > 0 else MOST_RATIO
 
 
 def _is_weak(instrumental: ParameterFit, fit: ParameterFit) -> bool:

@@ -100,7 +100,6 @@ def minimise(problem: Problem, theta: Array, method: Solver, *, tolerance: float
             # The step is worth taking, a new look at the data is not.
             last = np.minimum(np.maximum(theta - newton, problem.lower), problem.upper)
             return Minimum(last, now, iteration, True)
-        accepted = False
         for _ in range(60):
             step = walk.step(now, newton, free)
             trial = walk.keep_inside(theta - step, problem)

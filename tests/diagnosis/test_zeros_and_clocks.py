@@ -241,3 +241,22 @@ def test_clocks_that_part_from_the_start_on_are_a_drift() -> None:
     assert np.sqrt(np.mean((drifted - plain) ** 2)) < 5e-3
     # Clocks that were apart at the start too are moved one by one.
     assert _told((0.5 + rate * half_s, 0.5 + rate * half_s), (rate, rate), [_run(), _run()]).parts == ()
+
+
+@pytest.mark.parametrize(("short_s", "is_one_cause"), [(20.0, True), (60.0, False)])
+def test_a_drift_is_one_cause_where_it_cannot_be_seen_in_the_others(short_s: float, is_one_cause: bool) -> None:
+    """In a short one two clocks part by less than is told; one as long as the first would have shown it."""
+    rate = 0.01
+    half_s = 0.5 * float(TIME_S[-1] - TIME_S[0])
+    whole = _run()
+    count = round(short_s / STEP_S)
+    short = Recording.from_arrays(
+        time_s=TIME_S[:count], force_n=whole.force_n[:count], pressure_mbar=whole.sensor.values[:count], name="short"
+    )
+    assert (rate * short_s < STANDARD.settled_s) is is_one_cause
+    found = _told((rate * half_s, 0.0), (rate, 0.0), [whole, short])
+    assert [one.name for one, _ in found.parts] == ["clock_drift"] * is_one_cause
+    if is_one_cause:
+        assert found.parts[0][1] == pytest.approx([rate], rel=0.01)
+    else:
+        assert found.recordings[1] is short

@@ -63,6 +63,27 @@ def test_auto_allows_for_the_readings_noise_and_says_why(command: bool, chosen: 
     assert abs(found.parameters["a1"].value - A1) < 5 * found.parameters["a1"].sd
 
 
+@pytest.mark.parametrize(
+    ("direction", "noise", "command"),
+    [
+        ("inverse", {"load_noise": 2.23, "reading_noise": 20.0}, False),
+        ("inverse", {"load_noise": 2.23, "reading_noise": 20.0}, True),
+        ("forward", {"load_noise": 40.0, "reading_noise": 1.0}, False),
+    ],
+)
+def test_a_loud_input_is_not_smoothed_by_a_delay_and_a_pole_of_its_own(
+    direction: str, noise: dict[str, float], command: bool
+) -> None:
+    """At 4 % of full scale a plain fit ends a tenth of a second away, at fifty times the pole."""
+    found = identify(press(**noise, offset=4.0, command=command), direction=direction)
+    assert found.estimator == ("command" if command else "errors_in_variables")
+    for name, truth in zip(("a1", "b0", "b1"), coefficients(*TOE), strict=True):
+        one = found.parameters[name]
+        assert abs(one.value - truth) < 4.0 * one.sd
+        assert one.sd < 0.3 * one.value
+    assert abs(found.delay_s.value) < 0.01
+
+
 def test_either_direction_gives_one_answer_when_both_are_noisy() -> None:
     noisy = press(load_noise=2.23, reading_noise=2.0)
     inverse, forward = (
