@@ -92,7 +92,7 @@ def input_independence(problem: PredictionError, theta: Array, errors: Sequence[
             delayed[:lag], delayed[lag:] = u[0], u[: u.size - lag]
         row *= inside
         rows.append(row)
-        residuals.append((block_means(error, factor) if factor > 1 else error) * inside)
+        residuals.append(block_means(error, factor) * inside)
     # Beside each other: what the fit has used, then the delayed inputs.
     both, error = np.concatenate(rows, axis=1), np.concatenate(residuals)
     lagged = both[size:]

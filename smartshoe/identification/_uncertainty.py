@@ -68,7 +68,7 @@ def _profile_end(
         left = ceiling - (now.cost - float(now.gradient @ centre))
         reach = np.sqrt(max(left, 0.0) / max(float(gradient @ along), 1e-300))
         step = -centre + sign * reach * along
-        longest = float(np.max(np.abs(step[0])))
+        longest = abs(float(step[0]))
         if longest > 0.5:  # half a unit of ln alpha: further the quadratic is not to be trusted
             step = step * (0.5 / longest)
         following = np.clip(at + step, problem.lower, problem.upper)

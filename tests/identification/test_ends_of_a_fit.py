@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from presses import FIXED, TOE, coefficients, press
+from presses import FIXED, TOE, coefficients, press, pressed
 
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.identification import fit_coefficients, identify
 from smartshoe.identification._cycles import averaged_reading
-from smartshoe.identification._estimator import Instruments
 from smartshoe.identification._experiment import _largest_rises, prepare
-from smartshoe.identification._instruments import solve_instrumental
+from smartshoe.identification._instruments import Instruments, solve_instrumental
 from smartshoe.identification._prediction_error import PredictionError, Settings
 from smartshoe.identification._residual_tests import input_independence
 from smartshoe.models.first_order import HALF_WIDTH
@@ -188,3 +187,32 @@ def test_the_curvature_of_a_noisy_problem_is_that_of_its_signals(direction: str)
     assert seen.normal / np.outer(scale, scale) == pytest.approx(expected / np.outer(scale, scale), abs=0.1)
     full = PredictionError(noisy, options).jacobian(theta)
     assert np.diag(full.T @ full)[3] > 2.0 * expected[3, 3]  # of the delay far more noise than signal
+
+
+# -- what a user must be told ----------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("delay_s", "is_told"), [(-0.6, True), (0.2, False)])
+def test_a_delay_that_ran_to_its_limit_is_told(delay_s: float, is_told: bool) -> None:
+    found = identify(press(load_noise=1.0, delay_s=delay_s), initial_state="steady")
+    assert any("delay ran to its limit" in note for note in found.notes) is is_told
+    if is_told:
+        assert found.delay_s.value == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(("a1", "b1", "leads"), [(1.0, 2.0, True), (2.0, 1.0, False)])
+def test_a_reading_that_leads_its_load_is_told(a1: float, b1: float, leads: bool) -> None:
+    """The filter (s + b1)/(s + a1) of the reading gives the load: a solid's is larger at high frequency."""
+    clean = press()
+    reading = pressed(([1.0, a1], [1.0, b1]), clean.force_n, 0.01)
+    found = identify(Recording.from_arrays(time_s=clean.time_s, force_n=clean.force_n, pressure_mbar=reading), **FIXED)
+    assert found.parameters["a1"].value == pytest.approx(a1, rel=0.01)
+    assert (found.parameters["k2"].value < 0.0) is leads
+    assert any("k2 is negative" in note for note in found.notes) is leads
+
+
+def test_a_reading_that_turns_as_it_settles_is_no_stable_model() -> None:
+    clean = press()
+    slow = pressed(([0.5], [1.0, 0.5]), clean.force_n, 0.01)
+    reading = clean.force_n - 1.4 * slow
+    upside_down = Recording.from_arrays(time_s=clean.time_s, force_n=clean.force_n, pressure_mbar=reading)
+    with pytest.raises(NotIdentifiableError, match="no stable model"):
+        identify(upside_down, direction="forward", **FIXED)
