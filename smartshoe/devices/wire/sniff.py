@@ -79,7 +79,7 @@ def _repeats(lines: list[str]) -> bool:
     """Whether a tenth and more of the lines begin as the line before does."""
     firsts = [split_fields(line)[0] for line in lines]
     same = sum(before == here for before, here in pairwise(firsts))
-    return 10 * same >= len(firsts) > 1
+    return 10 * same >= len(firsts)
 
 
 def _lines(data: bytes) -> list[str]:
