@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from smartshoe.errors import InputError, UsageError
 from smartshoe.gait import Contacts, Coverage
 from smartshoe.gait._coverage import POINTS, learn_coverage
-from smartshoe.gait._force_sums import _FootSums
+from smartshoe.gait._force_sums import ForceSums, _FootSums
 from smartshoe.gait._strides import MOST_MISSING, Stride
 from smartshoe.gait._sums import BlockMeans, Moments, StrideSums, weighted_mean
 from smartshoe.gait._total import TotalForce, above_floor, standing_spans, total_of, whole_strides
@@ -96,6 +96,25 @@ def test_floors_in_parts_are_the_floors_of_the_whole(floors: list[float], cut: i
     few = _FootSums(1)
     few.add_floors(contacts([], [], floors[:3]))  # two steps tell no spread
     assert few.floor_variance == 0.0
+
+
+def test_what_the_floors_leave_open_of_a_weight_grows_as_the_units_bear_less_of_it() -> None:
+    floors = [0.0, 3.0, 1.0, 4.0, -1.0]
+    alone = _FootSums(1)
+    alone.add_floors(contacts([], [], floors))
+    for coverage in (1.0, 0.5):
+        unit: Any = SimpleNamespace(gain_sd=0.0)
+        made: Any = SimpleNamespace(units=(unit,), rate_hz=RATE_HZ, is_force=True)
+        sums = ForceSums({"left": made, "right": made}, coverage)
+        for name in ("left", "right"):
+            sums.add_floors(name, contacts([], [], floors))
+        steady = sums._strides[True]
+        steady.means.add([700.0, 700.0])
+        steady.impulse_n_s, steady.lasting_s = 1400.0, 2.0
+        weight = sums.forces(None).body_weight
+        assert weight is not None
+        assert (weight.value, weight.source) == (700.0, "strides")
+        assert weight.sd == pytest.approx(np.sqrt(2.0 * alone.floor_variance) / coverage)
 
 
 @pytest.mark.parametrize("feet", [("left",), ("left", "right")])
