@@ -31,6 +31,7 @@ from smartshoe.runs.session import PressingFault, SessionFolder, Unattended, ana
 from smartshoe.runs.session import _machine_run as machine_run
 from smartshoe.runs.session import _procedure as procedure
 from smartshoe.runs.session import _samples as samples
+from smartshoe.runs.session._analysis import joined
 from smartshoe.runs.session._folder import writing_to_disk
 from smartshoe.runs.session._machine_run import LogByHand, machine_at
 from smartshoe.runs.session._procedure import _Pressing, _Stream
@@ -293,6 +294,24 @@ def test_the_page_tells_which_attempt_was_accepted_and_what_was_wrong_before(
         (2, "accepted", []),
     ]
     assert told["attempts"][1]["samples"] == result.attempts[1].samples > len(result.recordings["quick"])
+
+
+@pytest.mark.parametrize(("every", "to_fit_hz"), [(1, 200.0), (4, 50.0)])
+def test_what_is_fitted_is_read_as_often_as_the_slower_of_the_two(every: int, to_fit_hz: float, tmp_path: Path) -> None:
+    with SessionFolder.begin(tmp_path, bench_plan(protocols=(QUICK,))) as folder:
+        conduct(folder)
+        (attempt,) = folder.attempts()
+        stream, load = attempt.stream(), attempt.load()
+        plan = folder.plan
+    at_200 = np.arange(load.time_s[0], load.time_s[-1], 0.005)
+    fine = Recording.from_arrays(time_s=at_200, force_n=np.interp(at_200, load.time_s, load.force_n))
+    thinned = fine.taken(np.arange(len(fine)) % every == 0)
+    pressing: Any = SimpleNamespace(stream=lambda: stream, load=lambda: thinned, experiment="quick", number=1)
+    for to_fit, rate_hz in ((False, 200.0), (True, to_fit_hz)):
+        found, _ = joined(plan, pressing, to_fit=to_fit)
+        assert found.sample_rate_hz == pytest.approx(rate_hz, rel=1e-3)
+        assert [channel.name for channel in found.sensors] == ["left_toe"]
+        assert (found.name, found.unit, found.source) == ("quick", "left_toe", "quick, attempt 1")
 
 
 # -- the folder --------------------------------------------------------------------------------------------------
