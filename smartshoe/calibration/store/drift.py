@@ -187,7 +187,7 @@ def _fit(design: Array, values: Array, sds: Array) -> _TrendFit | None:
     freedom = values.size - design.shape[1]
     rounding = ROUNDING * float(np.abs(values * weight).max())  # what is exact is known no better than its digits
     spread = max(math.sqrt(float(left @ left) / freedom), rounding) if freedom > 0 else math.nan
-    widen = max(spread, 1.0) if known and freedom > 0 else spread if freedom > 0 else 1.0
+    widen = max(spread, 1.0) if known else spread
     covariance = widen**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(size, size)
     return _TrendFit(theta / size, covariance, freedom, spread if known else math.nan)
 

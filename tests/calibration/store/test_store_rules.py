@@ -20,6 +20,7 @@ from smartshoe.calibration.store.dates import days_between, iso, moment
 from smartshoe.calibration.store.drift import Trend, _trend, drift
 from smartshoe.calibration.store.quantities import coefficient_covariance, quantities
 from smartshoe.errors import UsageError
+from smartshoe.models.effects import effect
 from smartshoe.models.parameter import Parameter
 
 
@@ -72,6 +73,17 @@ def test_an_index_that_holds_spares_the_reading_of_the_files(
     second = store.add(calibration(created=day(9)))
     assert store.entries() == (entry, second)
     assert read == [second.path.relative_to(store.folder).as_posix()]
+
+
+def test_an_index_of_another_kind_is_not_believed(store: CalibrationStore) -> None:
+    entry = store.add(calibration(), note="first")
+    assert store.entries() == (entry,)
+    index = store.folder / "index.json"
+    said = index.read_text().replace('"first"', '"other"')
+    index.write_text(said)
+    assert store.entries()[0].note == "other"  # of its own kind it is: that is what it is for
+    index.write_text(said.replace("index/1", "index/2"))
+    assert store.entries() == (entry,)
 
 
 def test_a_file_that_is_being_written_is_none_of_the_stores_yet(store: CalibrationStore) -> None:
@@ -173,6 +185,23 @@ def test_zeros_stand_apart_from_the_forces(offset: float, is_extended: bool) -> 
     found = compare(with_zero(0.0), with_zero(offset), (200.0,))
     assert max(abs(item.largest_n) for item in found.forces) < 0.5
     assert found.zero_difference_n == pytest.approx(offset * LEFT_TOE[2] / LEFT_TOE[0], rel=1e-6)
+
+
+def test_an_effect_beside_the_same_coefficients_is_a_difference() -> None:
+    plain = calibration()
+    model = plain.model().with_part(effect("dead_band"), np.array([0.02, 0.03]))
+    other = extended_calibration(model, load_range_n=(0.0, 800.0))
+    assert (other.a1, other.b0, other.b1) == pytest.approx((plain.a1, plain.b0, plain.b1))
+    for pair, sign in (((plain, other), 1.0), ((other, plain), -1.0)):
+        (found,) = compare(*pair, (200.0,)).forces
+        assert sign * found.largest_n == pytest.approx(16.0, rel=1e-3)  # of 800 N
+        assert math.isnan(found.sd_n)
+
+
+@pytest.mark.parametrize("theta", [(0.2, 9.9, 0.0), (0.2, 9.9, -2.0)])
+def test_coefficients_of_no_passive_solid_are_not_compared(theta: tuple[float, ...]) -> None:
+    with pytest.raises(UsageError, match="no passive solid"):
+        compare(calibration(theta), calibration())
 
 
 def test_a_comparison_is_said_with_its_size_rate_and_chance() -> None:
@@ -283,6 +312,14 @@ def test_a_life_of_straight_pieces_is_fitted_exactly() -> None:
     assert found.per_year is not None
     assert found.per_year.value == pytest.approx(-0.002 * 365.25)
     assert found.per_year.unit == "N/mbar/year"
+
+
+def test_a_trend_that_cannot_be_told_is_said_so() -> None:
+    two, none = np.array([9.0, 9.1]), np.full(2, 0.01)
+    assert trend_of(two, none).says == "static gain: 1.22 N/mbar/year, from too few calibrations for an interval"
+    parted = trend_of(two, none, [0, 1])
+    assert parted.says == "static gain: no trend can be distinguished from the repairs"
+    assert parted.repairs[0].says.startswith("static gain changed by 0.1 N/mbar at the repair of")
 
 
 @pytest.mark.parametrize(("per_year", "verb"), [(0.02, "rises"), (-0.02, "falls"), (0.0, "shows no trend")])
