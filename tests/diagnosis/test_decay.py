@@ -71,6 +71,9 @@ def test_too_small_a_loss_tells_no_law() -> None:
     assert decay.order is None
     assert decay.tau_s == pytest.approx(5000.0, rel=0.05)
     assert "too little is lost" in decay.says
+    # Nor where it began: it is a straight line from the first sample on.
+    assert decay.from_start_s == decay.tau_s
+    assert " from " not in decay.says
 
 
 @pytest.mark.parametrize(

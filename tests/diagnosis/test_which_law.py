@@ -117,3 +117,11 @@ def test_a_curve_is_begun_from_every_shape_at_both_sizes(monkeypatch: pytest.Mon
     best = min(sizes, key=lambda size: abs(size - 0.05))
     assert found.model.parts[-1].values[0] == best
     assert np.isfinite(found.cost)
+
+
+def test_a_curve_that_gave_way_to_a_law_does_not_come_back_as_another_curve() -> None:
+    flexible = [block for family in blocks().values() for block in family]
+    curves = {block.name for block in flexible if block.is_memoryless}
+    assert curves
+    for block in flexible:
+        assert set(_laws._replaced_with(block)) == (curves if block.name in curves else {block.name})
