@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,9 +16,11 @@ from smartshoe.errors import InputError, UsageError
 from smartshoe.gait import Contacts, Coverage
 from smartshoe.gait._coverage import POINTS, learn_coverage
 from smartshoe.gait._force_sums import ForceSums, _FootSums
-from smartshoe.gait._strides import MOST_MISSING, Stride
+from smartshoe.gait._strides import MOST_MISSING, Stride, loading_rate
 from smartshoe.gait._sums import BlockMeans, Moments, StrideSums, weighted_mean
 from smartshoe.gait._total import TotalForce, above_floor, standing_spans, total_of, whole_strides
+from smartshoe.gait.indices import POINTS as INDEX_POINTS
+from smartshoe.gait.indices import overlaid, pattern
 from smartshoe.gait.summary import activity_by_time, both_down, steps_of
 
 RATE_HZ = 200.0
@@ -218,8 +221,34 @@ def test_a_stride_is_whole_where_three_tenths_at_most_are_missing(start: int, sh
     inside = stride(float(time_s[0]))
     assert whole_strides(total, [inside]) == [inside] * is_whole
     assert whole_strides(TotalForce(time_s, total.force_n, np.zeros(400, dtype=bool)), [inside]) == [inside]
+    last = stride(float(time_s[-1]) - 0.75, 0.75)
+    last = replace(last, end_s=float(time_s[-1]))
+    assert whole_strides(total, [last]) == [last]  # to the very last sample
     outside = [stride(float(time_s[0]) - 0.001), stride(float(time_s[-1]) - 0.999)]
     assert whole_strides(total, [*outside, stride(float(time_s[210]), 0.5, gap=True)]) == []
+
+
+def test_a_load_that_is_there_within_a_sample_has_its_rate() -> None:
+    stance_n = np.concatenate([[0.0, 600.0], np.linspace(590.0, 0.0, 60)])
+    assert loading_rate(stance_n, 200.0) == pytest.approx(600.0 * 200.0)
+    assert loading_rate(stance_n[1:], 200.0) is loading_rate(-stance_n, 200.0) is None
+
+
+def test_a_pattern_does_not_know_the_unit_of_the_loads() -> None:
+    mean = np.abs(np.sin(np.linspace(0.0, np.pi, INDEX_POINTS)))[:, None] * np.array([0.6, 0.4])
+    for scale in (1e-3, 1.0, 800.0):
+        assert pattern(scale * mean) == pytest.approx(mean, rel=1e-3)
+    assert pattern(0.0 * mean) is None
+
+
+def test_strides_laid_over_each_other_are_read_at_each_hundredth() -> None:
+    time_s = np.arange(800) / RATE_HZ
+    loads = np.column_stack([time_s, time_s**2])
+    strides = [stride(0.5), stride(1.5, 1.2)]
+    each = overlaid(strides, time_s, loads)
+    assert each.shape == (2, INDEX_POINTS, 2)
+    assert each[1, :, 0] == pytest.approx(np.linspace(1.5, 2.7, INDEX_POINTS))
+    assert overlaid(strides, time_s, loads[:, 1]) == pytest.approx(each[:, :, 1])
 
 
 def test_loads_stand_on_a_line_from_floor_to_floor() -> None:

@@ -214,6 +214,18 @@ def test_a_trial_that_steps_or_stands_has_moved(made: Callable[[], Trial] | None
     assert sums.moved == moves
 
 
+def test_a_stride_belongs_to_the_window_in_which_it_begins() -> None:
+    feet, _ = feet_of([walked().recording], ())
+    contacts = {name: ContactDetector(foot.rate_hz, foot.regions).apply(foot.load) for name, foot in feet.items()}
+    whole = analyse_window(feet, contacts, Coverage(0.8), None).strides
+    cut_s = whole[len(whole) // 2].start_s
+    parts = [
+        analyse_window(feet, contacts, Coverage(0.8), None, start_s=start_s, end_s=end_s).strides
+        for start_s, end_s in ((-np.inf, cut_s), (cut_s, np.inf))
+    ]
+    assert parts[0] + parts[1] == whole
+
+
 def test_shoes_that_nobody_wore_are_refused() -> None:
     time_s = np.arange(0.0, 10.0, 1.0 / RATE_HZ)
     with pytest.raises(RefusedError, match="no stance is found and no foot is loaded"):
