@@ -47,7 +47,8 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     begins, ends = (lags - rates * half_s)[shown], (lags + rates * half_s)[shown]
     one_way = abs(float(np.sum(np.sign(rates)))) == np.sum(shown)
     if one_way and hidden and np.max(np.abs(begins)) <= thresholds.same * float(np.max(np.abs(ends))):
-        return replace(plain, parts=((effect("clock_drift"), np.array([rate])),))
+        # They may have parted for a while before a recording begins, by as much in each.
+        return replace(plain, parts=((effect("clock_drift"), np.array([rate])), (delay, delay.start())))
     made, usable, says = [], [], []
     for recording, mask, offset_s, rate in zip(recordings, integrity.usable, lags, rates, strict=True):
         if offset_s or rate:

@@ -104,9 +104,11 @@ def _judged(
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
-    went_astray = not extended.model.parts or error_of(sessions, extended.model) >= most
+    went_astray = extended.model.names == plain.model.names or error_of(sessions, extended.model) >= most
     if went_astray or not left_out.stands(extended.model, plain.model):
-        extended, best = plain, evidence.posterior(())
+        # What the baseline itself holds, two clocks, was told before any model.
+        own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
+        extended, best = plain, evidence.posterior(own)
     members = members_of(evidence, best, refused, likelihood, extended)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused))
 
