@@ -10,8 +10,12 @@ With the reading's residual y, in standard deviations of what counts as noise, a
 * w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
   directions in which equations of its kind depart (Kennedy and O'Hagan 2001).
 
--2 log p(y | S) = y'y - g' A^-1 g + log det A + sum log(prior variances) + const, A = Z'Z + prior precisions, g = Z'y.
-Everything is computed from inner products that are taken once, so that a set costs one small factorisation.
+With C0 the covariance of y for no effect, and U the columns x_e and Phi_e of S, of which S adds the prior variances D,
+
+    -2 log p(y | S) = y' C0^-1 y + log det C0 - q' D (I + R D)^-1 q + log det(I + R D),
+
+R = U' C0^-1 U and q = U' C0^-1 y. Both are taken once for all columns, so that a set costs a factorisation of its own
+few.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_solve, cholesky, solve_triangular
 
 from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis._sensitivity import (
@@ -69,8 +73,6 @@ class Evidence:
             self._rows.append(rows[seen] / noise_sd)
             self._past.append(past)
             self._root.append(np.asarray(np.linalg.cholesky(inner), dtype=np.float64))
-        self._room = [np.asfortranarray(rows) for rows in self._rows]  # grows as departures are asked for
-        self._rows = list(self._room)
         self.gram = self._products(self._rows, self._rows)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
@@ -80,12 +82,26 @@ class Evidence:
         visible = raw - raw[:, own] @ self._absorbed
         count = sum(int(s.fitted.sum()) for s in given.sessions)
         self.raw = visible / count
+        # What is there without any effect: the baseline's own changes, and what is immaterial.
+        self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.material)
+        self._sds[: given.own] = 1.0
+        inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
+        inner[np.diag_indices_from(inner)] += 1.0
+        self._factor = _factor(inner)
+        self._half = self._taken_out(self.gram)
+        self._reduced = self.gram - self._half.T @ self._half
+        self._nothing = float(self._reduced[0, 0]) + 2.0 * float(np.sum(np.log(np.diag(self._factor))))
+        self._room = [np.asfortranarray(rows) for rows in self._rows]  # grows as departures are asked for
+        self._rows = list(self._room)
         self._departures: dict[int, int] = {}
         self._directions = directions(self.thresholds)
-        self._last = 1 + given.own + sum(len(one.columns) for one in given.candidates)
-        self._amounts: dict[Members, list[float]] = {}
         effects = {one.name for one in given.candidates}
         self.odds = 2.0 * math.log(len(effects) / self.thresholds.false_name)
+
+    def _taken_out(self, cross: Array) -> Array:
+        """(p, k) of inner products (1 + p, k) with target and p columns: its square is what these account for."""
+        inside = self._sds[:, None] * cross[1:]
+        return np.asarray(solve_triangular(self._factor, inside, lower=True, check_finite=False))
 
     def _products(self, left: Sequence[Array], right: Sequence[Array]) -> Array:
         total = np.zeros((left[0].shape[1], right[0].shape[1]))
@@ -117,10 +133,13 @@ class Evidence:
             signatures.append(signature)
         made = departures(given, signatures)
         white = [part[s.fitted] / self.noise_sd for part, s in zip(made, given.sessions, strict=True)]
-        first = int(self.gram.shape[0])
+        first = int(self._reduced.shape[0])
         cross = self._products(self._rows, white)
-        inner = self._products(white, white)
-        self.gram = np.block([[self.gram, cross], [cross.T, inner]])
+        half = self._taken_out(cross[: self._sds.size + 1])
+        cross -= self._half.T @ half
+        inner = self._products(white, white) - half.T @ half
+        self._reduced = np.block([[self._reduced, cross], [cross.T, inner]])
+        self._half = np.column_stack([self._half, half])
         for k, part in enumerate(white):
             if self._room[k].shape[1] < first + part.shape[1]:
                 grown = np.empty((part.shape[0], 2 * self._room[k].shape[1] + part.shape[1]), order="F")
@@ -144,54 +163,75 @@ class Evidence:
         """The evidence of the set ``members`` (numbers of candidates); cached."""
         members = tuple(sorted(members))
         if members not in self._seen:
+            found = self.exact(members)
             # How far an equation departs goes with its size, which is first found as if it were exact.
-            exact = self.exact(members)
-            self._amounts[members] = [float(np.linalg.norm(strengths)) for strengths in exact.strengths]
-            self._seen[members] = self._solved(members, True) if members else exact
+            for _ in range(2 if members else 0):
+                found = self._solved(members, found.strengths)
+            self._seen[members] = found
         return self._seen[members]
 
     def exact(self, members: Members) -> Posterior:
         """The evidence of a set whose equations are taken for exact."""
-        return self._solved(members, False)
+        return self._solved(members, None)
 
-    def _solved(self, members: Members, departing: bool) -> Posterior:
-        given = self.given
-        amounts = self._amounts.get(members) or [self.thresholds.strength_sd] * len(members)
-        for _ in range(2 if departing and members else 1):
-            index, sds = self._prior(members, amounts, departing)
-            mean, cost, _ = self._cost(index, sds)
-            amounts = self._amplitudes(mean, members)
-        strengths = tuple(mean[[c - 1 for c in given.candidates[m].columns]] for m in members)
-        sizes = tuple(self.visible_rms(given.candidates[m].columns, s) for m, s in zip(members, strengths, strict=True))
-        departed = []
-        for k, _ in enumerate(members):
-            at = self._last - 1 + k * self._directions
-            of = slice(at, at + self._directions)
-            departed.append(float(np.sqrt(np.mean((mean[of] / sds[of]) ** 2))) if departing else 0.0)
-        columns = [c for m in members for c in given.candidates[m].columns]
-        together = self.visible_rms(columns, np.concatenate(strengths)) if members else 0.0
-        return Posterior(members, cost + self.odds_of(members), strengths, sizes, tuple(departed), together)
+    def _solved(self, members: Members, strengths: Sequence[Array] | None) -> Posterior:
+        if not members:
+            return Posterior((), self._nothing, (), (), ())
+        index, sds = self._widened(members, strengths)
+        _, pull, fall = self._moved(index, sds)
+        columns = [self.given.candidates[m].columns for m in members]
+        ends = np.cumsum([len(own) for own in columns], dtype=np.intp)
+        found = self.thresholds.strength_sd * pull[: ends[-1]]
+        each = tuple(np.split(found, ends[:-1]))
+        sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
+        beyond = pull[ends[-1] :].reshape(len(members), -1)
+        departed = tuple(float(np.sqrt(np.mean(one**2))) if one.size else 0.0 for one in beyond)
+        together = self.visible_rms([c for own in columns for c in own], found)
+        return Posterior(members, self._nothing - fall + self.odds_of(members), each, sizes, departed, together)
+
+    def _widened(self, members: Members, strengths: Sequence[Array] | None) -> tuple[Index, Array]:
+        """A set's columns, and the standard deviations (k,) of their coefficients.
+
+        Its strengths' first, then each member's departures in proportion to ``strengths``, where they are known.
+        """
+        index = [c for m in members for c in self.given.candidates[m].columns]
+        sds = [self.thresholds.strength_sd] * len(index)
+        share = self.thresholds.departure / math.sqrt(self._directions)
+        for member, own in zip(members, strengths, strict=True) if strengths is not None else ():
+            first = self._departure_of(member)
+            index += range(first, first + self._directions)
+            sds += [max(share * float(np.linalg.norm(own)), 1e-7)] * self._directions
+        return np.array(index, dtype=np.intp), np.array(sds)
+
+    def _moved(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
+        """Factor of I + D R, its solution (k,) of D q, and by how much -2 log evidence falls; D by halves each side."""
+        inner = self._reduced[np.ix_(index, index)] * np.outer(sds, sds)
+        inner[np.diag_indices_from(inner)] += 1.0
+        factor = _factor(inner)
+        asked = sds * self._reduced[index, 0]
+        pull = np.asarray(cho_solve((factor, True), asked, check_finite=False)) if index.size else asked
+        return factor, pull, float(asked @ pull) - 2.0 * float(np.sum(np.log(np.diag(factor))))
 
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
         """For each candidate the score of ``members`` with it, its equation taken for exact, and its strengths (k,).
 
-        All follow from one factorisation: giving columns x a wider prior, by d, changes -2 log evidence by
-        log det(I + d S) - d q'(I + d S)^-1 q, with S = x'C^-1 x and q = x'C^-1 y of the present covariance C.
+        All follow from one factorisation, that of what ``members`` widen.
         """
         best = self.posterior(members)
-        amounts = [float(np.linalg.norm(strengths)) for strengths in best.strengths]
-        index, sds = self._prior(best.members, amounts, True)
-        mean, _, factor = self._cost(index, sds)
-        covariance = cho_solve(factor, np.eye(index.size), check_finite=False) * np.outer(sds, sds)
-        narrow, wide = self.thresholds.material**2, self.thresholds.strength_sd**2
+        index, sds = self._widened(best.members, best.strengths)
+        factor, pull, _ = self._moved(index, sds)
+        beside = sds[:, None] * self._reduced[index, : self._sds.size + 1]
+        half = solve_triangular(factor, beside, lower=True, check_finite=False) if index.size else beside
+        asked = self._reduced[: self._sds.size + 1, 0] - beside.T @ pull
+        wide = self.thresholds.strength_sd**2
         found = []
         for numbers, columns in self._alike:
-            at, unit = columns - 1, np.eye(columns.shape[1])
-            S = (narrow * unit - covariance[at[:, :, None], at[:, None, :]]) / narrow**2
-            q = mean[at] / narrow
-            inner = unit + (wide - narrow) * S
+            taken = half[:, columns]
+            S = self._reduced[columns[:, :, None], columns[:, None, :]] - np.einsum("mgk,mgl->gkl", taken, taken)
+            q = asked[columns]
+            inner = np.eye(columns.shape[1]) + wide * S
             solved = np.linalg.solve(inner, q[:, :, None])[:, :, 0]
-            fall = (wide - narrow) * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
+            fall = wide * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
             found += [
                 (best.score - float(fell) + self.odds_of((k,)), k, wide * strengths)
                 for k, fell, strengths in zip(numbers, fall, solved, strict=True)
@@ -212,37 +252,11 @@ class Evidence:
         shapes = self.given.shapes
         return sum(self.odds + 2.0 * math.log(shapes[self.given.candidates[m].name]) for m in members)
 
-    def _prior(self, members: Members, amounts: Sequence[float], departing: bool) -> tuple[Index, Array]:
-        """Columns that take part, and the standard deviations (p,) of their coefficients."""
-        prior = np.full(self._last - 1, self.thresholds.material)
-        prior[: self.given.own] = 1.0
-        for member in members:
-            prior[[c - 1 for c in self.given.candidates[member].columns]] = self.thresholds.strength_sd
-        index = np.arange(1, self._last, dtype=np.intp)
-        if not (departing and members):
-            return index, prior
-        share = self.thresholds.departure / math.sqrt(self._directions)
-        extra: list[int] = []
-        spread: list[float] = []
-        for member, amount in zip(members, amounts, strict=True):
-            first = self._departure_of(member)
-            extra += range(first, first + self._directions)
-            spread += [max(share * amount, 1e-7)] * self._directions
-        return np.concatenate([index, np.array(extra, dtype=np.intp)]), np.concatenate([prior, spread])
 
-    def _amplitudes(self, mean: Array, members: Members) -> list[float]:
-        columns = [self.given.candidates[member].columns for member in members]
-        return [float(np.linalg.norm(mean[[c - 1 for c in own]])) for own in columns]
-
-    def _cost(self, index: Index, sds: Array) -> tuple[Array, float, tuple[Array, bool]]:
-        a = self.gram[np.ix_(index, index)] * np.outer(sds, sds)
-        a[np.diag_indices_from(a)] += 1.0
-        g = self.gram[index, 0] * sds
-        try:
-            factor = cho_factor(a, lower=True, check_finite=False)
-        except LinAlgError:
-            a[np.diag_indices_from(a)] *= 1.0 + 1e-9
-            factor = cho_factor(a, lower=True, check_finite=False)
-        found = cho_solve(factor, g, check_finite=False)
-        cost = float(self.gram[0, 0] - g @ found + 2.0 * np.sum(np.log(np.diag(factor[0]))))
-        return sds * found, cost, factor
+def _factor(matrix: Array) -> Array:
+    """The lower Cholesky factor; where rounding has made it indefinite, with a billionth more on the diagonal."""
+    try:
+        return np.asarray(cholesky(matrix, lower=True, check_finite=False))
+    except LinAlgError:
+        matrix[np.diag_indices_from(matrix)] *= 1.0 + 1e-9
+        return np.asarray(cholesky(matrix, lower=True, check_finite=False))

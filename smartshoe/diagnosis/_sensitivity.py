@@ -121,6 +121,11 @@ class Linearised:
         parts = zip(self.rows, self.sessions, strict=True)
         return np.asarray(sum(marginal(rows, session, self.model) for rows, session in parts))
 
+    @cached_property
+    def factors(self) -> tuple[Array, ...]:
+        """(n, 6) a session: smooth functions of load, direction, rate and time, on which a size may depend."""
+        return tuple(_factors(session, self.thresholds) for session in self.sessions)
+
     def noise_sd(self) -> float:
         """Standard deviation of what no column reaches, noise or structure, each correlation time counted once."""
         whole = self.gram
@@ -197,21 +202,24 @@ def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
     these, and its lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
     """
     out = []
-    for session, own in zip(given.sessions, column, strict=True):
-        load, rate = session.conditions.load, session.conditions.rate_per_s
-        time_s, step_s = session.conditions.time_s, session.conditions.step_s
-        still = given.thresholds.still_per_s
-        linear = 2.0 * load - 1.0
-        direction = rate / np.sqrt(rate**2 + still**2)
-        speed = np.log10(1.0 + np.abs(rate) / still) - 1.0
-        elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
-        factors = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5]
-        lags = [_lag(own, step_s, tau_s) - own for tau_s in given.thresholds.memory_s]
-        out.append(np.column_stack([*(own * factor for factor in factors), *lags]))
+    for session, factors, own in zip(given.sessions, given.factors, column, strict=True):
+        lags = [_lag(own, session.conditions.step_s, tau_s) - own for tau_s in given.thresholds.memory_s]
+        out.append(np.column_stack([own[:, None] * factors, *lags]))
     power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(out, given.sessions, strict=True))
     size = sum(float(np.sum(own[s.fitted] ** 2)) for own, s in zip(column, given.sessions, strict=True))
     ratio = np.sqrt(size / np.maximum(np.asarray(power), 1e-300))
     return [part * np.minimum(ratio, 1e6) for part in out]
+
+
+def _factors(session: Session, thresholds: Thresholds) -> Array:
+    load, rate = session.conditions.load, session.conditions.rate_per_s
+    time_s, step_s = session.conditions.time_s, session.conditions.step_s
+    still = thresholds.still_per_s
+    linear = 2.0 * load - 1.0
+    direction = rate / np.sqrt(rate**2 + still**2)
+    speed = np.log10(1.0 + np.abs(rate) / still) - 1.0
+    elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
+    return np.column_stack([linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5])
 
 
 def _lag(signal: Array, step_s: float, tau_s: float) -> Array:

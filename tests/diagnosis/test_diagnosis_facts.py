@@ -70,11 +70,11 @@ def test_evidence_is_that_of_gaussian_data(seed: int, members: int) -> None:
     columns, y, sds = rng.standard_normal((30, 6)), rng.standard_normal(30), rng.uniform(0.1, 3.0, members)
     index = rng.permutation(6)[:members]
     together = np.column_stack([y, columns])
-    known = SimpleNamespace(gram=together.T @ together, _last=members + 1)  # none of them a departure
-    _, cost, _ = Evidence._cost(known, index + 1, sds)  # type: ignore[arg-type]
+    known = SimpleNamespace(_reduced=together.T @ together)
+    _, _, fall = Evidence._moved(known, index + 1, sds)  # type: ignore[arg-type]
     own = columns[:, index] * sds
     covariance = np.eye(30) + own @ own.T
-    assert cost == pytest.approx(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert y @ y - fall == pytest.approx(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1], rel=1e-9)
 
 
 @settings(max_examples=6)
