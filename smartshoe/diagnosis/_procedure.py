@@ -162,7 +162,10 @@ def _diagnosed(
     residuals = [residual_of(one, extended) for one in sessions]
     after = residual_structure(sessions, residuals, thresholds)
     left = after.rms if after.significant else 0.0
-    everything = max(left, after.size)
+    # What is held out decides over no name; it may be of loads that nothing was learnt of.
+    learnt = [k for k, one in enumerate(sessions) if one.fitted.any()]
+    within = residual_structure([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
+    everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
     names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
@@ -179,10 +182,7 @@ def _diagnosed(
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
-    # What was not fitted may be of loads that nothing was learnt of.
-    learnt = [k for k, one in enumerate(sessions) if one.fitted.any()]
-    memory = gauss_markov_of([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
-    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, memory)
+    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
     named = {cause.name for cause in causes}
     parameters, covariance = joint_parameters(found.fit, scale)
     force = force_rmse_n(fine, extended)
