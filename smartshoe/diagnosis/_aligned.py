@@ -38,17 +38,10 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     delay = effect("delay")
     if not rates.any() and np.ptp(lags) <= thresholds.same * largest and largest < delay.parameters[0].upper:
         return replace(plain, parts=((delay, np.array([float(np.mean(lags))])),))
-    half_s = 0.5 * np.array([recording.duration_s for recording in recordings])
-    # One pair of clocks: where some recordings show that they part, from nothing on, they part in all; in the others
-    # by less than a sensor's own lag would hide.
-    shown = (lags != 0.0) | (rates != 0.0)
-    rate = float(np.mean((lags / half_s)[shown]))
-    hidden = bool(np.all(2.0 * half_s[~shown] * abs(rate) < thresholds.settled_s))
-    begins, ends = (lags - rates * half_s)[shown], (lags + rates * half_s)[shown]
-    one_way = abs(float(np.sum(np.sign(rates)))) == np.sum(shown)
-    if one_way and hidden and np.max(np.abs(begins)) <= thresholds.same * float(np.max(np.abs(ends))):
-        # They may have parted for a while before a recording begins, by as much in each.
-        return replace(plain, parts=((effect("clock_drift"), np.array([rate])), (delay, delay.start())))
+    shared = _one_pair(lags, rates, np.array([recording.duration_s for recording in recordings]), thresholds)
+    if shared is not None and abs(shared[0]) < delay.parameters[0].upper:
+        before_s, rate = shared
+        return replace(plain, parts=((effect("clock_drift"), np.array([rate])), (delay, np.array([before_s]))))
     made, usable, says = [], [], []
     for recording, mask, offset_s, rate in zip(recordings, integrity.usable, lags, rates, strict=True):
         if offset_s or rate:
@@ -61,6 +54,24 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
         made.append(recording)
         usable.append(mask)
     return Aligned(made, usable, (), tuple(says))
+
+
+def _one_pair(lags_s: Array, rates: Array, duration_s: Array, thresholds: Thresholds) -> tuple[float, float] | None:
+    """The lag in s at the beginning of each recording, and its growth in s per s, where one line fits them all.
+
+    One pair of clocks: where some recordings show that they part, they part in all; in the others by less than a
+    sensor's own lag would hide.
+    """
+    shown = (lags_s != 0.0) | (rates != 0.0)
+    if abs(float(np.sum(np.sign(rates)))) < np.sum(shown):
+        return None
+    grown = 0.5 * rates * duration_s
+    places = np.concatenate([0.0 * duration_s[shown], duration_s[shown]])
+    seen = np.concatenate([(lags_s - grown)[shown], (lags_s + grown)[shown]])
+    rate, before_s = (float(one) for one in np.polyfit(places, seen, 1))
+    hidden = np.abs(before_s + rate * duration_s[~shown]) < thresholds.settled_s
+    fits = np.abs(seen - before_s - rate * places) <= thresholds.same * np.max(np.abs(seen))
+    return (before_s, rate) if hidden.all() and fits.all() else None
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:

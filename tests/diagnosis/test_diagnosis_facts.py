@@ -74,7 +74,9 @@ def test_evidence_is_that_of_gaussian_data(seed: int, members: int) -> None:
     _, _, fall = Evidence._moved(known, index + 1, sds)  # type: ignore[arg-type]
     own = columns[:, index] * sds
     covariance = np.eye(30) + own @ own.T
-    assert y @ y - fall == pytest.approx(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert y @ y - fall == pytest.approx(
+        y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1], rel=1e-9
+    )
 
 
 @settings(max_examples=6)

@@ -231,7 +231,7 @@ def test_clocks_that_part_from_the_start_on_are_a_drift() -> None:
     rate = 0.002
     half_s = 0.5 * float(TIME_S[-1] - TIME_S[0])
     found = _told((rate * half_s, rate * half_s), (rate, rate), [_run(), _run()])
-    ((one, value),) = found.parts
+    (one, value), _ = found.parts
     assert one.name == "clock_drift"
     assert value == pytest.approx([rate], rel=0.01)
     # It is what such a clock makes of a reading.
@@ -239,8 +239,15 @@ def test_clocks_that_part_from_the_start_on_are_a_drift() -> None:
     late = _late(rate * half_s, rate).sensor.values / FULL_MBAR
     plain = MODEL.simulate(Conditions(TIME_S, late, STEP_S))
     assert np.sqrt(np.mean((drifted - plain) ** 2)) < 5e-3
-    # Clocks that were apart at the start too are moved one by one.
-    assert _told((0.5 + rate * half_s, 0.5 + rate * half_s), (rate, rate), [_run(), _run()]).parts == ()
+    # They may have been apart at the start, by as much in each; else the recordings are moved one by one.
+    for before_s in (0.5, -0.5):
+        both = _told((before_s + rate * half_s,) * 2, (rate, rate), [_run(), _run()]).parts
+        assert [(one.name, float(value[0])) for one, value in both] == [
+            ("clock_drift", pytest.approx(rate)),
+            ("delay", pytest.approx(before_s)),
+        ]
+    assert _told((0.5 + rate * half_s, 2.0 + rate * half_s), (rate, rate), [_run(), _run()]).parts == ()
+    assert _told((7.0 + rate * half_s,) * 2, (rate, rate), [_run(), _run()]).parts == ()  # longer than any delay
 
 
 @pytest.mark.parametrize(("short_s", "is_one_cause"), [(20.0, True), (60.0, False)])
@@ -255,7 +262,7 @@ def test_a_drift_is_one_cause_where_it_cannot_be_seen_in_the_others(short_s: flo
     )
     assert (rate * short_s < STANDARD.settled_s) is is_one_cause
     found = _told((rate * half_s, 0.0), (rate, 0.0), [whole, short])
-    assert [one.name for one, _ in found.parts] == ["clock_drift"] * is_one_cause
+    assert [one.name for one, _ in found.parts] == ["clock_drift", "delay"] * is_one_cause
     if is_one_cause:
         assert found.parts[0][1] == pytest.approx([rate], rel=0.01)
     else:
