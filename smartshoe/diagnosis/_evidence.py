@@ -63,7 +63,7 @@ class Evidence:
         self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
         self._seen: dict[Members, Posterior] = {}
         self._rows: list[Array] = []
-        self._root: list[Array] = []
+        self._inner: list[Array] = []
         self._past: list[Array] = []
         for session, rows in zip(given.sessions, given.rows, strict=True):
             seen = session.fitted
@@ -72,7 +72,7 @@ class Evidence:
             inner += 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(2)
             self._rows.append(rows[seen] / noise_sd)
             self._past.append(past)
-            self._root.append(np.asarray(np.linalg.cholesky(inner), dtype=np.float64))
+            self._inner.append(inner)
         self.gram = self._products(self._rows, self._rows)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
@@ -104,11 +104,10 @@ class Evidence:
         return np.asarray(solve_triangular(self._factor, inside, lower=True, check_finite=False))
 
     def _products(self, left: Sequence[Array], right: Sequence[Array]) -> Array:
+        """Inner products (l, r) with what the recordings' nuisances follow taken out."""
         total = np.zeros((left[0].shape[1], right[0].shape[1]))
-        for a, b, past, root in zip(left, right, self._past, self._root, strict=True):
-            ha = np.linalg.solve(root, past.T @ a)
-            hb = ha if a is b else np.linalg.solve(root, past.T @ b)
-            total += a.T @ b - ha.T @ hb
+        for a, b, past, inner in zip(left, right, self._past, self._inner, strict=True):
+            total += a.T @ (b - past @ np.linalg.solve(inner, past.T @ b))
         return total
 
     def visible_rms(self, columns: Sequence[int], strengths: Array) -> float:
