@@ -62,11 +62,14 @@ class LeftOut:
         """Whether ``model`` does away with enough of the plain model's squared error where recordings are left out.
 
         With `foreseen` of it, and with nearly the share that it does away with where it was fitted: what fits by
-        chance, or only these loads, does not.
+        chance, or only these loads, does not. Where it follows what was fitted as nearly as a law does, the former is
+        enough: fewer recordings may not hold all that an effect needs, and what is wrong follows all of them less well.
         """
         left_out = 1.0 - float(self.errors(model).sum()) / max(float(self.errors(plain).sum()), 1e-300)
         fitted = 1.0 - (error_of(self.sessions, model) / max(error_of(self.sessions, plain), 1e-300)) ** 2
-        return left_out >= max(self.thresholds.foreseen, (1.0 - self.thresholds.same) * fitted)
+        given = self.thresholds
+        nearly = (1.0 - given.same) * fitted if fitted < 1.0 - given.law_departure**2 else 0.0
+        return left_out >= max(given.foreseen, nearly)
 
 
 @dataclass(frozen=True, eq=False)
