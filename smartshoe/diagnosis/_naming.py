@@ -33,10 +33,10 @@ def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> 
     A flexible block is named by the law of its family that comes nearest.
     """
     likely = ((one, probability_of_kind(one, left, thresholds)) for one in members if one.size >= thresholds.material)
-    return tuple(_named(one, kind, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
+    return tuple(_named(one, kind, left, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
 
 
-def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
+def _named(one: Member, kind: float, left: float, thresholds: Thresholds) -> Name:
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents)
@@ -44,19 +44,20 @@ def _named(one: Member, kind: float, thresholds: Thresholds) -> Name:
     margins = {a.effect: a.margin for a in one.laws}
     nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
-    # That none of the family follows better than another speaks for one that the catalogue does not have.
-    return Name(one, nearest, kind / 2.0, 1.0 / len(family), others, True)
+    sure = probability_of_kind(one, left, thresholds, lawless=True)
+    return Name(one, nearest, sure, 1.0 / len(family), others, True)
 
 
-def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:
+def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
     """That an effect of this family is there: a logistic of two ratios, each without a unit, and the evidence for it.
 
     What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow), and
-    how far its equation is asked to depart.
+    how far its equation is asked to depart. ``lawless``: no law of the family follows it better than another, which
+    speaks for a law, or a kind, that the catalogue does not have.
     """
-    intercept, per_left, per_departed = thresholds.kind_odds
+    intercept, per_left, per_departed, without_law = thresholds.kind_odds
     ratio = (left + thresholds.material) / (one.size + thresholds.material)
-    score = intercept + per_left * math.log(ratio) + per_departed * one.departed
+    score = intercept + per_left * math.log(ratio) + per_departed * one.departed + without_law * lawless
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 

@@ -74,10 +74,11 @@ class Thresholds:
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (1.92, -1.04, -0.9),
+        (1.92, -1.04, -0.9, -1.0),
         "log odds",
-        "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure",
-        "logistic regression on 306 cases of two worlds",
+        "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure; where no"
+        " law of it follows",
+        "logistic regression on 306 cases of two worlds; without a law on 825",
     )
     least_confidence: float = threshold(
         0.667,

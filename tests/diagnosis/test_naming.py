@@ -126,7 +126,8 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family
-    assert name.confidence == pytest.approx(probability_of_kind(name.member, 0.0, STANDARD) / 2.0)
+    assert name.confidence == probability_of_kind(name.member, 0.0, STANDARD, lawless=True)
+    assert name.confidence < probability_of_kind(name.member, 0.0, STANDARD)
     assert name.law == pytest.approx(1.0 / len(family))
 
 
@@ -145,8 +146,10 @@ def test_least_confidence_is_of_the_kind_below_which_nothing_is_named() -> None:
 
 def test_kind_odds_are_the_logistics_coefficients() -> None:
     for intercept in (-2.0, 0.0, 3.0):
-        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0))
+        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0, -1.0))
         assert probability_of_kind(member(), 0.002, plain) == pytest.approx(1 / (1 + math.exp(-intercept)))
+        lawless = probability_of_kind(member(), 0.002, plain, lawless=True)
+        assert lawless == pytest.approx(1 / (1 + math.exp(1.0 - intercept)))
 
 
 @given(st.floats(0.0, 60.0))
