@@ -140,12 +140,14 @@ def _settled(state: State, sessions: Sequence[Session], progress: Progress) -> S
 
     In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one.
     """
-    seen: set[tuple[str, ...]] = set()
+    seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
     for _ in range(ROUNDS):
         chosen = tuple(sorted(one.name for one in state.chosen))
-        if chosen in seen or state.improved < state.evidence.odds:
+        # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
+        here = tuple(sorted(state.fit.model.names)), chosen
+        if here in seen or state.improved < state.evidence.odds:
             break
-        seen.add(chosen)
+        seen.add(here)
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
         likelihood = state.likelihood(sessions)
         found = min(
