@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from smartshoe.diagnosis._baseline import USUAL
+from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL
 from smartshoe.diagnosis._likelihood import FEW_STEPS, fit
+from smartshoe.diagnosis._members import begun_with
+from smartshoe.diagnosis._sensitivity import available
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
 from smartshoe.models.effects.effect import CoreEffect
@@ -25,6 +27,27 @@ def with_another_pole(state: State, sessions: Sequence[Session]) -> State:
     starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in state.thresholds.memory_s]
     best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
     return state_at(best, sessions, state.thresholds)
+
+
+def with_a_latency(state: State, sessions: Sequence[Session]) -> State:
+    """The best of fits of the effects that delay a reading, each beside an arm as units have.
+
+    An arm that has come to its bounds is a lag's imitation, about which no lag is found.
+    """
+    likelihood = state.likelihood(sessions)
+    bare = with_arm(state.fit.model, Arm(USUAL.relaxing_share, USUAL.relaxation_rate_per_s))
+    late = [one for one in available(likelihood.sessions) if one.is_latency and one.name not in bare.names]
+    return state_at(
+        min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost),
+        sessions,
+        state.thresholds,
+    )
+
+
+def is_stretched(model: ExtendedModel) -> bool:
+    """Whether the baseline's arm has come to a bound: no wall has such a one."""
+    share, rate = model.relaxing_share, model.relaxation_rate_per_s
+    return not (SHARE.lower < share < SHARE.upper and RATE.lower < rate < RATE.upper)
 
 
 def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:

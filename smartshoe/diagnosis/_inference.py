@@ -12,7 +12,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.diagnosis._arms import arms_of, effect_count, with_an_arm_that_creeps, with_another_pole, with_arm
+from smartshoe.diagnosis._arms import (
+    arms_of,
+    effect_count,
+    is_stretched,
+    with_a_latency,
+    with_an_arm_that_creeps,
+    with_another_pole,
+    with_arm,
+)
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
@@ -65,7 +73,11 @@ def infer(
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, (), can_validate)
-    state = _settled(State(given, evidence, best, plain), sessions, progress)
+    state = State(given, evidence, best, plain)
+    if is_stretched(plain.model):
+        late = with_a_latency(state, sessions)
+        state = late if _is_simpler(late.fit, state, sessions) else state
+    state = _settled(state, sessions, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         again = _settled(with_another_pole(state, sessions), sessions, progress)
