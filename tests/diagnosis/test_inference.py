@@ -138,6 +138,25 @@ def test_a_corner_below_the_least_load_is_a_dead_band_and_no_curve(values: tuple
     assert found.explained_percent > 90.0
 
 
+def test_a_lag_that_the_baselines_arm_could_imitate_is_a_lag() -> None:
+    """A plain model takes an arm of a few hundredths of a second for it, and then a second arm for the wall's."""
+    late = MODEL.with_part(effect("sensor_lag"), np.array([0.12, 0.3]))
+    curved = late.with_part(effect("sensor_nonlinearity"), np.array([0.012, -0.003, 0.001]))
+    protocol = dynamic_protocol((300, 800, 3000), repeats=2, rest_s=3.0)
+    time_s = np.arange(0.0, protocol.duration_s, 0.01)
+    load = protocol.load_at(time_s) / curved.full_scale_load_n
+    share = curved.simulate(Conditions(time_s, load, 0.01))
+    runs = []
+    for seed in range(3):
+        noisy = share + 3e-4 * np.random.default_rng(seed).standard_normal(time_s.size)
+        runs.append(
+            Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * noisy, name=f"late_{seed}")
+        )
+    found = diagnose(runs[:2], hold_out=[runs[2]])
+    assert {one.effect.family for one in found.causes} == {"timing", "static_curve"}
+    assert found.explained_percent > 95.0
+
+
 def test_a_curve_is_found_and_gains_on_data_not_fitted(plain: tuple[list[Recording], Diagnosis]) -> None:
     _, found = plain
     assert found.causes
@@ -158,15 +177,20 @@ def test_offset_sign_and_unit_of_a_reading_change_no_cause(
     assert again.causes[0].held_out.gain_percent == pytest.approx(found.causes[0].held_out.gain_percent, abs=2.0)
 
 
-def test_what_is_held_out_selects_nothing(plain: tuple[list[Recording], Diagnosis]) -> None:
+@pytest.mark.parametrize("wander", [0.0, 20.0])
+def test_what_is_held_out_selects_nothing(plain: tuple[list[Recording], Diagnosis], wander: float) -> None:
     runs, found = plain
-    nonsense = with_reading(runs[2], 0.5, 7.0)
+    wrong = 0.5 * runs[2].sensor.values + wander * np.sin(runs[2].time_s / 15.0)
+    nonsense = Recording.from_arrays(
+        time_s=runs[2].time_s, force_n=runs[2].force_n, pressure_v=wrong + 7.0, name="nonsense"
+    )
     again = diagnose(runs[:2], hold_out=[nonsense])
     assert found.model is not None
     assert again.model is not None
     assert_allclose(again.model.theta, found.model.theta, rtol=1e-9, atol=1e-12)
-    assert [one.name for one in again.causes] == [one.name for one in found.causes]
+    assert [(one.name, one.confidence) for one in again.causes] == [(one.name, one.confidence) for one in found.causes]
     assert again.causes[0].held_out.rmse_after != found.causes[0].held_out.rmse_after
+    assert again.verdict == ("partly_explained" if wander else "explained")
 
 
 def test_nothing_is_named_where_nothing_is_wrong() -> None:

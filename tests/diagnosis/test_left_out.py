@@ -13,7 +13,7 @@ from smartshoe.diagnosis import Thresholds, _validation
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._session import Session, full_scale, prepare
-from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut
+from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
@@ -95,6 +95,24 @@ def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
     errors = [float(_left_out(chance).errors(one).sum()) for one in (model, bare)]
     assert _left_out(chance).stands(model, bare) == (errors[0] < (1.0 - STANDARD.foreseen) * errors[1])
     assert not _left_out(chance).stands(model, bare)
+
+
+def test_what_follows_as_a_law_does_needs_to_foresee_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two recordings one may not hold all that an effect needs; what fits only in part must do as well elsewhere."""
+    sessions = _sessions([_curved(0.3)] * 2)
+    plain, law = _fitted(sessions), _fitted(sessions, "gas_compression")
+    # A law that is held away from its optimum leaves more than a law does.
+    half = law.at(np.where(np.arange(law.theta.size) == law.theta.size - 1, 0.17, law.theta))
+    left_out = _left_out(sessions)
+    shares = [1.0 - (error_of(sessions, one) / error_of(sessions, plain)) ** 2 for one in (law, half)]
+    assert shares[0] > 1.0 - STANDARD.law_departure**2 > shares[1] > STANDARD.foreseen
+    for foreseen, stand in ((STANDARD.foreseen + 0.01, (True, False)), (STANDARD.foreseen - 0.01, (False, False))):
+        monkeypatch.setattr(
+            left_out, "errors", lambda one, left=1.0 - foreseen: np.array([1.0 if one is plain else left])
+        )
+        assert (left_out.stands(law, plain), left_out.stands(half, plain)) == stand
+    monkeypatch.setattr(left_out, "errors", lambda one: np.array([1.0 if one is plain else 1.0 - shares[1]]))
+    assert left_out.stands(half, plain)
 
 
 def _following(sessions: list[Session], model: ExtendedModel, thresholds: Thresholds = STANDARD) -> tuple[str, ...]:
