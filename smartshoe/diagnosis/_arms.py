@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL
+from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL, with_usual_arm
 from smartshoe.diagnosis._likelihood import FEW_STEPS, fit
 from smartshoe.diagnosis._members import begun_with
 from smartshoe.diagnosis._sensitivity import available
@@ -35,7 +35,7 @@ def with_a_latency(state: State, sessions: Sequence[Session]) -> State:
     An arm that has come to its bounds is a lag's imitation, about which no lag is found.
     """
     likelihood = state.likelihood(sessions)
-    bare = with_arm(state.fit.model, Arm(USUAL.relaxing_share, USUAL.relaxation_rate_per_s))
+    bare = with_usual_arm(state.fit.model)
     late = [one for one in available(likelihood.sessions) if one.is_latency and one.name not in bare.names]
     return state_at(
         min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -53,6 +54,11 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     _, gain, share, pole = best
     ratio = _wall_ratio(sessions, gain, scale)
     return ExtendedModel(gain, share, pole * (1.0 + share), scale.load_n, scale.reading, scale.unit.symbol, (), ratio)
+
+
+def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
+    """``model`` with an arm as units have, from which a fit begins where its own is bent."""
+    return replace(model, relaxing_share=USUAL.relaxing_share, relaxation_rate_per_s=USUAL.relaxation_rate_per_s)
 
 
 def lagged(signal: Array, step_s: float, tau_s: float) -> Array:

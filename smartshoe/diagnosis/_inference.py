@@ -75,16 +75,13 @@ def infer(
         return Inference(plain, plain, likelihood, (), screening, (), can_validate)
     state = State(given, evidence, best, plain)
     if is_stretched(plain.model):
-        late = with_a_latency(state, sessions)
-        state = late if _is_simpler(late.fit, state, sessions) else state
+        state = _simpler(with_a_latency(state, sessions), state, sessions)
     state = _settled(state, sessions, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        again = _settled(with_another_pole(state, sessions), sessions, progress)
-        state = again if _is_simpler(again.fit, state, sessions) else state
+        state = _simpler(_settled(with_another_pole(state, sessions), sessions, progress), state, sessions)
     if state.fit.model.relaxing_share < 0.0:
-        again = _settled(with_an_arm_that_creeps(state, sessions), sessions, progress)
-        state = again if _is_simpler(again.fit, state, sessions) else state
+        state = _simpler(_settled(with_an_arm_that_creeps(state, sessions), sessions, progress), state, sessions)
     lawful = with_laws(state, sessions)
     state = state if lawful is state else _settled(lawful, sessions, progress)
     progress("weighing alternatives")
@@ -129,6 +126,10 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
     """The best predictor of the form of ``start``: output error, each correlation time of what is left counted once."""
     residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
     return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start)
+
+
+def _simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
+    return other if _is_simpler(other.fit, state, sessions) else state
 
 
 def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._aligned import aligned
-from smartshoe.diagnosis._baseline import USUAL, baseline_of
+from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
@@ -139,7 +139,7 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     sessions = prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
     start = baseline_of(sessions, scale)
     if clocks.parts:  # against a load of another clock no relaxation is found
-        start = replace(start, relaxing_share=USUAL.relaxing_share, relaxation_rate_per_s=USUAL.relaxation_rate_per_s)
+        start = with_usual_arm(start)
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
