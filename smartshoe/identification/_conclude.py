@@ -99,8 +99,8 @@ def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
         delay_s=Parameter.from_sd(delay_s, delay_sd, "s", quantile),
         initial_states=states,
         noise={
-            "load": Parameter.from_sd(fit.noise.get("load", 0.0), 0.0, "N"),
-            "reading": Parameter.from_sd(fit.noise.get("reading", 0.0), 0.0, choice.reading_unit.symbol),
+            "load": Parameter.from_sd(fit.noise["load"], 0.0, "N"),
+            "reading": Parameter.from_sd(fit.noise["reading"], 0.0, choice.reading_unit.symbol),
         },
         fit_percent=100.0 * (1.0 - float(np.sqrt(cost / spread))) if spread > 0 else float("nan"),
         rmse=float(np.sqrt(cost / problem.count)),
@@ -208,8 +208,9 @@ def _spread_of_output(fit: ParameterFit) -> float:
     """Sum of squares of the output about its mean, over all samples that count."""
     outputs = [masked(y, mask) for y, mask in zip(fit.problem.outputs, fit.problem.masks, strict=True)]
     count = sum(output.size for output in outputs)
-    mean = sum(float(output.sum()) for output in outputs) / max(count, 1)
-    return sum(float(np.dot(output - mean, output - mean)) for output in outputs)
+    mean = sum(float(output.sum()) for output in outputs) / count
+    deviations = [output - mean for output in outputs]
+    return sum(float(np.dot(one, one)) for one in deviations)
 
 
 def _plain_cost(fit: ParameterFit) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.identification._experiment import Experiment
-from smartshoe.identification._prediction_error import EVERY, NOT_STORED, PredictionError
+from smartshoe.identification._prediction_error import EVERY, NONE, NOT_STORED, PredictionError
 from smartshoe.identification._solve import solve_normal
 from smartshoe.models.first_order import interpolation_gain
 from smartshoe.signals.noise import white_noise_sd
@@ -56,12 +56,12 @@ def _answer(problem: PredictionError, theta: Array) -> tuple[Array, float]:
     """The response to a unit impulse: its products (3,) with its own derivatives over (ln alpha, p1, p2), its power."""
     from smartshoe.kernels.first_order import COLUMNS, inner_products
 
-    shape, impulse, none = problem.shape(theta), np.zeros(IMPULSE_SAMPLES), np.zeros(0)
+    shape, impulse = problem.shape(theta), np.zeros(IMPULSE_SAMPLES)
     impulse[1] = 1.0
     products, step_s = np.zeros((COLUMNS, COLUMNS)), problem.experiments[0].sample_time_s
     # Without an output to compare with, the error is the response.
     inner_products(
-        impulse, none, np.zeros_like(impulse), EVERY, step_s, None, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0,
+        impulse, NONE, np.zeros_like(impulse), EVERY, step_s, None, 0.0, shape.alpha, shape.p1, shape.p2, 0.0, 0.0,
         NOT_STORED, products,
     )  # fmt: skip
     return products[:3, -1], float(products[-1, -1])

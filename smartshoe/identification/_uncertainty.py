@@ -21,14 +21,12 @@ Function = Callable[[Array], tuple[float, Array]]
 
 def inverse_normal(normal: Array) -> tuple[Array, bool]:
     """(J'J)^-1 and whether J'J is singular within rounding."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 0.0))
-    degenerate = bool(not scale.all() or not np.isfinite(scale).all())
-    scale = np.where(scale > 0, scale, 1.0)
+    norms = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    scale = np.where(norms > 0.0, norms, 1.0)
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     floor = PERSISTENT_CONDITION * values[-1]
-    degenerate = degenerate or bool(values[0] < floor)
     inverse: Array = (vectors / np.maximum(values, floor)) @ vectors.T / np.outer(scale, scale)
-    return inverse, degenerate
+    return inverse, not bool(values[0] > floor)
 
 
 def t_quantile(degrees: int) -> float:
@@ -77,7 +75,7 @@ def _profile_end(
             return sign * np.inf
         moved = abs(function(following)[0] - value)
         at, now = following, seen_there
-        if moved <= 1e-6 * max(abs(value), 1e-300) or (
+        if moved <= 1e-6 * abs(value) or (
             moved <= 1e-3 * abs(function(at)[0] - function(theta)[0]) and abs(now.cost - ceiling) < 0.01 * allowed
         ):
             return function(at)[0]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import resource
+import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -238,3 +240,15 @@ def test_a_record_holds_256_mebibytes_and_no_byte_more(tmp_path: Path) -> None:
 def test_a_journal_that_cannot_be_read_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         read_journal(tmp_path / "none")
+
+
+@pytest.mark.parametrize("missing", [1, 7])
+def test_a_record_that_says_more_bytes_than_there_are_is_none(missing: int) -> None:
+    """Though its checksum is that of those that are there: it was never written so."""
+    payload = bytes(range(40))
+    checked = struct.pack("<BBI", 3, 0, len(payload) + missing)
+    head = _records.MARKER + checked + struct.pack("<I", zlib.crc32(payload, zlib.crc32(checked)))
+    assert _records.record_at(head + payload, 0) is None
+    whole = _records.packed(3, payload)
+    found = _records.record_at(b"xx" + whole, 2)
+    assert found == _records.Record(3, payload, len(whole) + 2)
