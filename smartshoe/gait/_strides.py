@@ -114,16 +114,13 @@ def with_runs(strides: Sequence[Stride]) -> list[Stride]:
 def loading_rate(stance_n: Array, rate_hz: float) -> float | None:
     """Mean slope in N/s from a fifth to four fifths of the first peak of a stance (n,); None where there is none."""
     half = stance_n[: max(2, stance_n.size // 2)]
-    top = int(half.argmax())
-    peak = float(half[top])
-    if top < 1 or peak <= 0.0:
-        return None
-    rise = half[: top + 1]
-    low, high = int(np.argmax(rise >= RATE_FROM * peak)), int(np.argmax(rise >= RATE_TO * peak))
+    peak = float(half.max())
+    low, high = int(np.argmax(half >= RATE_FROM * peak)), int(np.argmax(half >= RATE_TO * peak))
 
     def place(at: int, level: float) -> float:
-        return at if at == 0 else at - (rise[at] - level) / max(rise[at] - rise[at - 1], 1e-12)
+        return at if at == 0 else at - (half[at] - level) / (half[at] - half[at - 1])
 
+    # A stance that is there with its first sample, or bears nothing, takes no time to rise.
     took = place(high, RATE_TO * peak) - place(low, RATE_FROM * peak)
     return float((RATE_TO - RATE_FROM) * peak * rate_hz / took) if took > 0 else None
 

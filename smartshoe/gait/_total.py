@@ -77,12 +77,12 @@ def standing_spans(
 
 
 def _shared(first: Sequence[tuple[float, float]], second: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    both = [(max(a, c), min(b, d)) for a, b in first for c, d in second if min(b, d) > max(a, c)]
-    return sorted(both)
+    """What each of ``first`` shares with each of ``second``; those that do not meet end before they begin."""
+    return sorted((max(a, c), min(b, d)) for a, b in first for c, d in second)
 
 
 def whole_strides(total: TotalForce, strides: Sequence[Stride]) -> list[Stride]:
-    """Those within the total's time during which neither foot misses more than `MOST_MISSING` of its samples.
+    """Those within the total's two samples or more while neither foot misses more than `MOST_MISSING` of its own.
 
     While one foot lacks a unit the total is too small, whichever foot steps.
     """
@@ -93,7 +93,7 @@ def whole_strides(total: TotalForce, strides: Sequence[Stride]) -> list[Stride]:
         first, last = gone[np.searchsorted(time_s, [stride.start_s, stride.end_s])]
         return float(last - first)
 
-    step = (time_s[-1] - time_s[0]) / max(time_s.size - 1, 1)
+    step = (time_s[-1] - time_s[0]) / (time_s.size - 1)
     return [
         s
         for s in strides

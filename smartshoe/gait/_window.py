@@ -94,7 +94,7 @@ def _peaks_of(time_s: Array, load: Array, contacts: Contacts, start_s: float, en
     with np.errstate(invalid="ignore"):
         known = np.isfinite(contacts.strike_s) & (contacts.toe_off_s >= start_s) & (contacts.toe_off_s < end_s)
     bounds = np.searchsorted(time_s, np.column_stack([contacts.strike_s[known], contacts.toe_off_s[known]]))
-    return [load[first:last].max(axis=0) for first, last in np.minimum(bounds, time_s.size - 1) if last > first]
+    return [load[first:last].max(axis=0) for first, last in bounds if last > first]
 
 
 def _usual_peak(peaks: Sequence[Array], load: Array) -> Array:

@@ -86,7 +86,7 @@ def both_down(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> tu
             down += there * np.maximum(0.0, np.minimum(off[k], end) - np.maximum(strike[k], start))
         double.append(over / (end - start))
         flight.append(1.0 - (toe_off - start + down - over) / (end - start))
-    if not double or not np.concatenate(double).size:
+    if not double:
         return None
     shares = (float(np.concatenate(double).mean()), float(np.concatenate(flight).mean()))
     both, neither = (100.0 * share if share > ROUNDING else 0.0 for share in shares)

@@ -240,9 +240,8 @@ class CalibrationStore:
         since, until = segment(events, at)
         fitting = [e for e in history if (since is None or e.date >= since) and (until is None or e.date < until)]
         if not fitting:
-            said = (
-                f"since its repair on {iso(since)}" if since else f"before its repair on {iso(until)}" if until else ""
-            )
+            bounds = (("since", since), ("before", until))
+            said = " and ".join(f"{word} its repair on {iso(when)}" for word, when in bounds if when is not None)
             raise RefusedError(f"unit {serial_number} has no calibration {said}: calibrate it")
         # Of two calibrations of one moment the one added last counts.
         best = min(fitting, key=lambda e: (abs(days_between(e.date, at)), e.date, -e.order))

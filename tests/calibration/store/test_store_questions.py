@@ -152,12 +152,14 @@ def test_a_placing_at_the_moment_of_retirement_does_not_bring_a_unit_back(store:
 
 def test_where_no_calibration_lies_between_the_same_repairs_is_said(store: CalibrationStore) -> None:
     put(store, 50)
-    store.repair("S1", day(40)), store.repair("S1", day(60))
+    store.repair("S1", day(40)), store.repair("S1", day(60)), store.repair("S1", day(80))
     store.repair("S2", day(55))  # of another unit: nothing to it
+    between = f"^unit S1 has no calibration since its repair on {day(60)} and before its repair on {day(80)}: calibrate"
     said = {
+        79: between,
         39: f"^unit S1 has no calibration before its repair on {day(40)}: calibrate it$",
-        60: f"^unit S1 has no calibration since its repair on {day(60)}: calibrate it$",
-        70: f"^unit S1 has no calibration since its repair on {day(60)}: calibrate it$",
+        60: between,
+        80: f"^unit S1 has no calibration since its repair on {day(80)}: calibrate it$",
     }
     for at, says in said.items():
         with pytest.raises(RefusedError, match=says):
