@@ -1,0 +1,520 @@
+"""How a diagnosis is put together from its parts: verdicts at their bounds, causes and traces in units, by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe import Recording, diagnose
+from smartshoe.diagnosis import Thresholds, _procedure
+from smartshoe.diagnosis._held_out import Errors, Gain, own_of
+from smartshoe.diagnosis._procedure import (
+    _cause,
+    _diagnosed,
+    _goodness,
+    _held_out_evidence,
+    _is_within_a_sample,
+    _outside,
+    _percent_less,
+    _prepared,
+    _refused,
+    _refused_members,
+    _sentence,
+    _trace,
+    _verdict,
+    _with_offset,
+    _zero_cause,
+)
+from smartshoe.diagnosis._session import Scale, prepare
+from smartshoe.diagnosis._zero import Zero, offsets, shift_of
+from smartshoe.errors import UsageError
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import MILLIBAR
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+MODEL = ExtendedModel(1.2, 0.08, 0.22, 800.0, 140.0, "mbar")
+SCALE = Scale(800.0, -140.0, MILLIBAR, 3.0)
+BEFORE = Errors(np.array([4.0, 12.0]), np.array([100.0, 300.0]), 0.8)
+AFTER = Errors(np.array([1.0, 3.0]), np.array([100.0, 300.0]), 0.8)
+
+
+def _left(rms: float, significant: bool = True, how: str = "repeats", is_noise: bool = False) -> Any:
+    return SimpleNamespace(rms=rms, significant=significant, how=how, is_noise=is_noise, says="here", size=rms)
+
+
+# -- refusals ---------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("low", "high", "is_out"),
+    [(-24.9, 100.0, False), (-25.1, 100.0, True), (-100.0, 24.9, False), (-100.0, 25.1, True), (50.0, 100.0, False),
+     (-100.0, -50.0, False), (0.0, 100.0, False)],
+)  # fmt: skip
+def test_a_load_of_both_signs_is_no_units(low: float, high: float, is_out: bool) -> None:
+    """The smaller side more than a quarter of the larger, but for one in a hundred at either end."""
+    load = np.repeat([low, high], 100)
+    load[[0, 150]] = (-1e4, 1e4)
+    one = Recording.from_arrays(time_s=0.1 * np.arange(200), force_n=load, pressure_mbar=load, name="pulled")
+    still = Recording.from_arrays(time_s=0.1 * np.arange(200), force_n=np.ones(200), pressure_mbar=load)
+    for told in (_outside([one], STANDARD), _outside([still, one], STANDARD)):
+        assert len(told) == is_out
+    if is_out:
+        (said,) = _outside([one], STANDARD)
+        assert f"pulled: the load runs from {low:.4g} to {high:.4g} N" in said
+
+
+def test_a_refusal_says_why_and_what_is_known_without_a_model() -> None:
+    time_s = 0.1 * np.arange(400)
+    falling = Recording.from_arrays(time_s=time_s, pressure_mbar=100.0 * np.exp(-time_s / 8.0))
+    constant = Recording.from_arrays(time_s=time_s, pressure_mbar=np.full(400, 5.0))
+    load = 100.0 * np.abs(time_s % 4.0 - 2.0)
+    pressed = Recording.from_arrays(time_s=time_s, force_n=load, pressure_mbar=0.5 * load)
+    found = _refused([falling, constant, pressed], SimpleNamespace(faults=()), ("no load", "nor else"), STANDARD)  # type: ignore[arg-type]
+    assert (found.verdict, found.says, found.unit) == ("refused", "no diagnosis: no load", "mbar")
+    assert (found.full_scale_load_n, found.full_scale_reading) == (0.0, 0.0)
+    assert found.limits[:2] == ("no load", "nor else")
+    decay, curve = found.limits[2:]
+    assert "falls by" in decay
+    assert "over this load" in curve
+    bare = Recording.from_arrays(time_s=time_s, force_n=load)
+    assert _refused([bare], SimpleNamespace(faults=()), ("no reading",), STANDARD).unit == ""  # type: ignore[arg-type]
+
+
+def test_a_diagnosis_needs_a_recording_and_takes_what_is_material_from_either() -> None:
+    with pytest.raises(UsageError, match="no recording"):
+        diagnose([])
+    bare = Recording.from_arrays(time_s=0.1 * np.arange(200), pressure_mbar=np.ones(200))
+    other = replace(STANDARD, material=0.1, same=0.3)
+    assert diagnose([bare]).thresholds == STANDARD
+    assert diagnose([bare], thresholds=other).thresholds == other
+    assert diagnose([bare], thresholds=other, material=0.2).thresholds == replace(other, material=0.2)
+    pulled = np.resize([-100.0, 100.0], 400)
+    drawn = Recording.from_arrays(time_s=0.1 * np.arange(400), force_n=pulled, pressure_mbar=pulled)
+    assert diagnose([drawn]).verdict == "refused"
+
+
+# -- verdicts ---------------------------------------------------------------------------------------------------------
+CAUSES: Any = [SimpleNamespace(name="linear_leak")]
+
+
+def test_what_is_left_is_held_against_what_laws_depart_by_and_what_a_good_unit_leaves() -> None:
+    """A quarter of 0.04, where each cause has a law; what is tolerable else; and what is material, where that is more."""
+    wrong = _left(0.04)
+    for bound, follows, thresholds in (
+        (0.01, True, STANDARD),
+        (STANDARD.tolerable, False, STANDARD),
+        (0.03, True, replace(STANDARD, tolerable=0.03)),
+        (0.05, True, replace(STANDARD, material=0.05)),
+    ):
+        told = [_verdict(CAUSES, wrong, _left(by * bound), thresholds, follows) for by in (1.0, 1.0001)]
+        assert told == ["explained", "partly_explained"]
+    assert _verdict(CAUSES, wrong, _left(0.5, significant=False), STANDARD) == "explained"
+    hidden = _left(0.04, significant=False)
+    assert _verdict(CAUSES, hidden, _left(0.9 * STANDARD.tolerable), STANDARD) == "explained"
+    assert _verdict(CAUSES, hidden, _left(1.1 * STANDARD.tolerable), STANDARD) == "partly_explained"
+
+
+def test_without_a_cause_it_is_adequate_up_to_what_is_tolerable_or_material() -> None:
+    for thresholds in (STANDARD, replace(STANDARD, material=0.02)):
+        bound = max(thresholds.tolerable, thresholds.material)
+        told = [_verdict([], _left(0.5), _left(by * bound), thresholds) for by in (1.0, 1.0001)]
+        assert told == ["adequate", "unexplained"]
+    assert _verdict([], _left(0.5), _left(0.5, significant=False), STANDARD) == "adequate"
+
+
+def _said(verdict: Any, *names: str, left: Any = None) -> str:
+    causes: Any = [SimpleNamespace(name=name) for name in names]
+    return _sentence(verdict, causes, BEFORE, AFTER, left or _left(0.034), STANDARD)
+
+
+def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
+    good = "the baseline simulation is good to 20 % of full scale on data it was not fitted to"
+    assert _said("explained", "linear_leak") == f"{good}, with linear leak to 10 %"
+    assert _said("explained", "dead_band", "delay").endswith("with dead band and delay to 10 %")
+    assert _said("explained", "dead_band", "delay", "rate_gain").endswith("with dead band, delay and rate gain to 10 %")
+    rest = "3.4 % repeats and is not explained"
+    assert _said("partly_explained", "delay") == f"{good}, with delay to 10 %; {rest}"
+    assert _said("unexplained") == f"{good}; {rest}, and no effect of the catalogue accounts for it"
+    assert _said("adequate") == f"{good}; {rest}"
+    for quiet in (_left(STANDARD.material), _left(0.5, significant=False)):
+        assert _said("adequate", left=quiet) == good
+    assert "0 % repeats" in _said("unexplained", left=_left(0.5, significant=False))
+
+
+def test_what_was_taken_out_again_is_said_once() -> None:
+    found: Any = SimpleNamespace(can_validate=True, refused=())
+    assert _refused_members(found) == []
+    found.refused = ("linear_leak", "delay", "linear_leak")
+    (said,) = _refused_members(found)
+    assert said.endswith(": linear leak, delay")
+    found.can_validate = False
+    (said,) = _refused_members(found)
+    assert "no cause can be told" in said
+
+
+def test_a_fall_is_in_percent_and_never_below_nothing() -> None:
+    assert _percent_less(1.0, 4.0) == 75.0
+    assert _percent_less(5.0, 4.0) == 0.0
+    assert _percent_less(1.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_latency_within_a_sample_is_none(sign: float) -> None:
+    """A twelfth's root of the longest sample: a time stamp's own uncertainty."""
+    slow, fast = (Recording.from_arrays(time_s=step * np.arange(50), force_n=np.ones(50)) for step in (0.1, 0.01))
+    member: Any = SimpleNamespace(name="delay")
+    for by, is_within in ((0.9999, True), (1.0001, False)):
+        late = MODEL.with_part("linear_leak").with_part("delay", np.array([sign * by * 0.1 / math.sqrt(12.0)]))
+        name: Any = SimpleNamespace(effect=effect("delay"), member=member)
+        assert _is_within_a_sample(name, late, [fast, slow]) is is_within
+    # No latency; and one that is no time.
+    leak: Any = SimpleNamespace(effect=effect("linear_leak"), member=SimpleNamespace(name="linear_leak"))
+    assert not _is_within_a_sample(leak, MODEL.with_part("linear_leak"), [slow])
+    drift = effect("clock_drift")
+    named: Any = SimpleNamespace(effect=drift, member=SimpleNamespace(name="clock_drift"))
+    assert not _is_within_a_sample(named, MODEL.with_part(drift, np.array([1e-9])), [slow])
+
+
+# -- causes -----------------------------------------------------------------------------------------------------------
+def test_evidence_on_held_out_data_is_in_the_readings_unit() -> None:
+    size, gained = _held_out_evidence(0.0123, Gain(2.5, 0.75, "mbar", 70.0, (60.0, 80.0)))
+    assert (size.value, size.threshold) == (pytest.approx(1.23), 0.0)
+    assert "by 1.23 % of full scale" in size.says
+    assert (gained.value, gained.threshold) == (70.0, 0.0)
+    assert "from 2.5 to 0.75 mbar" in gained.says
+
+
+def _told(monkeypatch: pytest.MonkeyPatch, present: frozenset[str], kind_only: bool = False, laws: Any = ()) -> Any:
+    asked: list[Any] = []
+
+    def after(fine: Any, model: Any) -> Errors:
+        asked.append((fine, model))
+        return BEFORE
+
+    monkeypatch.setattr(_procedure, "errors", after)
+    monkeypatch.setattr(_procedure, "parameters_of", lambda fit, name, scale: {"of": (fit, name, scale)})
+    member = SimpleNamespace(
+        name="static_curve_block",
+        size=0.0123,
+        without=SimpleNamespace(model="without"),
+        alternatives=(SimpleNamespace(effect=None, margin=55.0), SimpleNamespace(effect="delay", margin=90.0)),
+        laws=tuple(SimpleNamespace(effect=name, margin=by) for name, by in laws),
+    )
+    one = effect("linear_leak")
+    name: Any = SimpleNamespace(
+        member=member, effect=one, confidence=0.9, law=0.6, equivalents=("orifice_leak",), kind_only=kind_only
+    )
+    given: Any = SimpleNamespace(scale=SCALE, excitation=SimpleNamespace(present=present))
+    found: Any = SimpleNamespace(fit="fit")
+    cause = _cause(name, found, "fine", AFTER, given)  # type: ignore[arg-type]
+    assert asked == [("fine", "without")]
+    assert cause.parameters == {"of": ("fit", "static_curve_block", SCALE)}
+    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, 0.9, 0.6)
+    assert (cause.equivalents, cause.size) == (("orifice_leak",), 0.0123)
+    assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
+    return cause
+
+
+def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monkeypatch: pytest.MonkeyPatch) -> None:
+    exposed = effect("linear_leak").exposed_by
+    cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 7.0), ("delay", 60.0)))
+    assert [(one.effect, one.margin) for one in cause.rivals] == [("orifice_leak", 7.0), ("delay", 60.0)]
+    fall, size, gained, rival = cause.evidence
+    assert (fall.value, fall.threshold) == (55.0, 0.0)
+    assert "less likely by 55 of -2 log" in fall.says
+    assert (size.value, gained.value) == (pytest.approx(1.23), pytest.approx(50.0))
+    assert (rival.value, rival.threshold) == (7.0, 0.0)
+    assert rival.says == "orifice leak in its place is worse by 7"
+
+
+def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
+    exposed = effect("linear_leak").exposed_by
+    assert exposed
+    lacking = _told(monkeypatch, frozenset(), kind_only=True).evidence[-1]
+    assert (lacking.value, lacking.threshold) == (len(exposed), 0.0)
+    assert lacking.says == "the data holds no " + ", no ".join(sorted(one.replace("_", " ") for one in exposed))
+    kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
+    assert (kind.statistic, kind.value, kind.threshold) == ("kind", 1.0, 1.0)
+
+
+@pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", 140.0, "mbar"), ("load", 800.0, "N")])
+@pytest.mark.parametrize("alternatives", [(), ("another",)])
+def test_a_zero_is_a_cause_by_which_every_reading_is_off(
+    signal: str, factor: float, unit: str, alternatives: tuple[str, ...]
+) -> None:
+    zero = Zero(shift_of(signal), -0.02, 0.004, 0.03, alternatives)
+    given: Any = SimpleNamespace(scale=SCALE)
+    cause = _zero_cause(zero, None, (), AFTER, given, STANDARD)  # type: ignore[arg-type]
+    ((name, parameter),) = cause.parameters.items()
+    assert name == zero.effect.parameters[0].name
+    assert (parameter.value, parameter.sd, parameter.unit) == (-0.02 * factor, 0.004 * factor, unit)
+    half = 1.959963984540054 * 0.004
+    assert parameter.ci95 == pytest.approx(((-0.02 - half) * factor, (-0.02 + half) * factor))
+    # Without it each of 400 samples would be off by it beside the errors that there are.
+    worse = math.sqrt((4.0 + 400 * 0.03**2) / 400.0)
+    assert cause.held_out.rmse_before == pytest.approx(140.0 * worse)
+    assert cause.held_out.rmse_after == pytest.approx(14.0)
+    seen, size, _ = cause.evidence
+    assert (seen.value, seen.threshold) == (pytest.approx(5.0), pytest.approx(3.8906, abs=1e-4))
+    assert "it is 5 standard deviations" in seen.says
+    assert size.value == pytest.approx(3.0)
+    assert cause.confidence == (STANDARD.least_confidence if alternatives else 1.0 - STANDARD.false_name)
+    assert cause.law_confidence == (0.5 if alternatives else 1.0)
+    assert (cause.equivalents, cause.size) == (alternatives, 0.03)
+
+
+def test_goodness_is_in_the_readings_unit() -> None:
+    found = _goodness(AFTER, 7.0, _left(0.02), SCALE)
+    assert (found.rmse, found.unit, found.force_rmse_n) == (pytest.approx(14.0), "mbar", 7.0)
+    assert found.structure_rms == pytest.approx(2.8)
+    assert found.fit_percent == pytest.approx(87.5)
+    assert found.variance_explained_percent == pytest.approx(100.0 * (1.0 - 1.0 / 64.0))
+
+
+# -- traces and offsets -----------------------------------------------------------------------------------------------
+TIME_S = 0.05 * np.arange(600)
+LOAD = np.abs((TIME_S / 2.0) % 2.0 - 1.0)
+
+
+def _prepared_run(offset_mbar: float = 0.0) -> Any:
+    share = MODEL.simulate(Conditions(TIME_S, LOAD, 0.05))
+    reading = offset_mbar + 3.0 - 140.0 * share
+    run = Recording.from_arrays(time_s=TIME_S + 5.0, force_n=800.0 * LOAD, pressure_mbar=reading, name="run")
+    (session,) = prepare([run], [np.ones(600, dtype=bool)], None, SCALE, 1, STANDARD)
+    return session
+
+
+def test_a_trace_is_as_it_was_logged() -> None:
+    session = _prepared_run()
+    other = replace(MODEL, gain=0.9)
+    found = _trace(session, other, MODEL, SCALE)
+    assert found.name == "run"
+    assert found.time_s == pytest.approx(TIME_S + 5.0)
+    assert found.load_n == pytest.approx(800.0 * session.conditions.load)
+    assert found.reading == pytest.approx(3.0 - 140.0 * session.reading)
+    for shown, model in ((found.baseline, other), (found.extended, MODEL)):
+        plain = model.simulate(session.conditions)
+        own = own_of(session, model, session.reading - plain)[1]
+        assert shown == pytest.approx(3.0 - 140.0 * (plain + own))
+    assert found.extended == pytest.approx(found.reading, abs=1.0)
+    assert (found.usable is session.usable, found.held_out is session.held_out) == (True, True)
+    assert found.cycle is session.cycle
+
+
+def test_a_model_gives_readings_as_they_are_logged() -> None:
+    """A shift of the reading stands before the chain's end, which multiplies it."""
+    session = _prepared_run(offset_mbar=14.0)
+    mean = float(np.mean(offsets([session], MODEL)))
+    assert mean == pytest.approx(-0.1, abs=0.01)
+    ((name, part),) = [(one.name, one.values) for one in _with_offset(MODEL, (), [session], SCALE).parts]
+    assert (name, part) == (shift_of("reading").name, pytest.approx([(mean + 3.0 / -140.0) / 1.2]))
+    seen = Zero(shift_of("reading"), 0.06, 0.01, 0.06)
+    (shifted,) = _with_offset(MODEL, [seen], [session], SCALE).parts
+    assert shifted.values == pytest.approx([0.05])
+    tare = Zero(shift_of("load"), 0.06, 0.01, 0.06)
+    first, second = _with_offset(MODEL, [tare], [session], SCALE).parts
+    assert (first.name, first.values) == (shift_of("load").name, pytest.approx([0.06]))
+    assert second.name == shift_of("reading").name
+    nothing = replace(SCALE, zero=-mean * SCALE.reading)
+    assert _with_offset(MODEL, (), [session], nothing).parts == ()
+
+
+# -- in all -----------------------------------------------------------------------------------------------------------
+def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
+    def run(seed: int) -> Recording:
+        noise = 0.1 * np.random.default_rng(seed).standard_normal(600)
+        return Recording.from_arrays(
+            time_s=TIME_S, force_n=800.0 * LOAD, pressure_mbar=140.0 * LOAD + noise, name=f"run_{seed}"
+        )
+
+    runs = [run(seed) for seed in range(3)]
+    usable = tuple(np.ones(600, dtype=bool) for _ in runs)
+
+    def integrity(lag_s: float) -> Any:
+        return SimpleNamespace(clock_offset_s=(lag_s,) * 3, clock_rate=(0.0,) * 3, usable=usable)
+
+    found = _prepared(runs, 2, integrity(0.0), STANDARD)
+    assert [bool(one.held_out.all()) for one in found.sessions] == [False, False, True]
+    assert [one.thinned for one in found.fine] == [1, 1, 1]
+    assert not found.is_no_unit
+    assert found.start.parts == ()
+    within = _prepared(runs, 3, integrity(0.0), STANDARD)
+    assert all(0.1 < float(one.held_out.mean()) < 0.6 for one in within.sessions)
+    late = _prepared(runs, 3, integrity(0.3), STANDARD)
+    ((name, value),) = [(one.name, one.values) for one in late.start.parts]
+    assert (name, value) == ("delay", pytest.approx([0.3]))
+    assert (late.start.relaxing_share, late.start.relaxation_rate_per_s) == (0.08, 0.22)
+    # Friction in each recording is no unit's; in one of them it is said.
+    rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
+    assert _prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
+    mixed = _prepared([runs[0], rubbed[1], runs[2]], 3, integrity(0.0), STANDARD)
+    assert not mixed.is_no_unit
+    assert sum("friction; Coulomb" in said for said in mixed.limits) == 1
+    assert sum("friction; Coulomb" in said for said in _prepared(runs, 3, integrity(0.0), STANDARD).limits) == 0
+
+
+def replace_reading(one: Recording, reading: Array) -> Recording:
+    return Recording.from_arrays(time_s=one.time_s, force_n=one.force_n, pressure_mbar=reading, name=one.name)
+
+
+@pytest.fixture
+def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Every step of a diagnosis by what it is told to answer."""
+    fitted = SimpleNamespace(fitted=np.ones(3, dtype=bool), name="fitted")
+    held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held")
+    given = SimpleNamespace(
+        sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
+        is_no_unit=False,
+    )  # fmt: skip
+    extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
+    core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5)
+    other = SimpleNamespace(effect=effect("dead_band"), size=0.25)
+    found = SimpleNamespace(
+        fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
+        can_validate=True, refused=(), screening=tuple((f"n{k}", float(k)) for k in range(6)),
+    )  # fmt: skip
+    kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
+    kinds[2].memory, kinds[2].size = "memory", 0.07
+    made = SimpleNamespace(
+        given=given, found=found, kinds=kinds, names=[], zeros=[], seen={}, sizes={"linear_leak": 0.1, "delay": 0.3}
+    )
+
+    def structure(sessions: Any, residuals: Any, thresholds: Any) -> Any:
+        made.seen.setdefault("structure", []).append((list(sessions), list(residuals)))
+        return made.kinds[len(made.seen["structure"]) - 1]
+
+    def answer(name: str, value: Any) -> None:
+        def called(*args: Any, **named: Any) -> Any:
+            made.seen[name] = (args, named)
+            return value(*args) if callable(value) else value
+
+        monkeypatch.setattr(_procedure, name, called)
+
+    def cause(name: Any, *_: Any) -> Any:
+        return SimpleNamespace(name=name.name, size=made.sizes[name.name], rivals=(f"rival of {name.name}",))
+
+    answer("_prepared", given)
+    answer("infer", found)
+    answer("residual_of", lambda session, model: f"{session.name} {len(model.parts)}")
+    monkeypatch.setattr(_procedure, "residual_structure", structure)
+    answer("names_of", lambda *_: tuple(made.names))
+    answer("_is_within_a_sample", lambda name, *_: name.name == "short")
+    answer("zeros_of", lambda *_: tuple(made.zeros))
+    answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
+    answer("_cause", cause)
+    answer("_zero_cause", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
+    answer("_with_offset", "with offset")
+    answer("noise_kinds", ["noise"])
+    answer("joint_parameters", ({"p": 1}, ((1.0,),)))
+    answer("force_rmse_n", lambda fine, model: 7.0 if len(model.parts) else 9.0)
+    answer("next_experiment", "next")
+    answer("_trace", "trace")
+    answer("_sentence", "sentence")
+    return made
+
+
+def _run_diagnosis(parts: Any) -> Any:
+    said: list[str] = []
+    integrity: Any = SimpleNamespace(faults=("fault",))
+    result = _diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
+    assert said == ["judging on held-out data"]
+    return result
+
+
+def _name(name: str, kind_only: bool = False) -> Any:
+    return SimpleNamespace(name=name, kind_only=kind_only)
+
+
+def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
+    parts.names = [_name("linear_leak"), _name("short"), _name("delay")]
+    parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, 0.2), Zero(shift_of("reading"), 0.2, 0.1, 1e-4)]
+    told = _run_diagnosis(parts)
+    assert [one.name for one in told.causes] == ["delay", "zero", "linear_leak"]  # the largest first, no immaterial one
+    assert (told.unit, told.full_scale_load_n, told.full_scale_reading) == ("mbar", 800.0, 140.0)
+    assert (told.verdict, told.says, told.minor) == ("explained", "sentence", ())
+    assert told.data_faults == ("fault", "noise")
+    assert (told.baseline.rmse, told.extended.rmse) == (pytest.approx(28.0), pytest.approx(14.0))
+    assert (told.baseline.force_rmse_n, told.extended.force_rmse_n) == (9.0, 7.0)
+    assert (told.baseline.structure_rms, told.extended.structure_rms) == (pytest.approx(42.0), pytest.approx(2.8))
+    assert told.gain.gain_percent == pytest.approx(50.0)
+    # Of the error's variance 0.04 there is noise 0.01 less what structure is left of it.
+    assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - 0.02**2) / 0.04))
+    assert told.explained_percent == pytest.approx(75.0)
+    assert (told.rivals, told.next_experiment) == (("rival of delay",), "next")
+    assert (told.limits, told.leftover, told.screening) == (("limit",), None, parts.found.screening)
+    assert (told.model, told.baseline_model, told.parameters) == ("with offset", MODEL, {"p": 1})
+    assert (told.covariance, told.traces, told.thresholds) == (((1.0,),), ("trace",), STANDARD)
+    seen = parts.seen
+    assert [residuals for _, residuals in seen["structure"]] == [
+        ["held 0", "fitted 0"], ["held 2", "fitted 2"], ["fitted 2"],
+    ]  # fmt: skip
+    assert [one.name for one in seen["structure"][2][0]] == ["fitted"]
+    assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
+    assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
+    assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
+    assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
+    assert seen["next_experiment"][1] == {"open_": True}
+    assert seen["infer"][0][4] is True
+
+
+def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) -> None:
+    told = _run_diagnosis(parts)
+    assert (told.verdict, told.leftover, told.causes) == ("unexplained", "here", ())
+    assert [one.effect for one in told.rivals] == ["n0", "n1", "n2", "n3"]
+    assert [one.margin for one in told.rivals] == [0.0, 1.0, 2.0, 3.0]
+    assert told.minor == ("linear_leak", "delay")
+    assert parts.seen["noise_kinds"][0][3] is False
+    parts.seen.clear()
+    parts.kinds[1].is_noise = True
+    _run_diagnosis(parts)
+    assert parts.seen["noise_kinds"][0][3] is True
+
+
+def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
+    parts.kinds[1].significant = False
+    told = _run_diagnosis(parts)
+    assert (told.verdict, told.leftover) == ("adequate", None)
+    assert told.explainable_percent == pytest.approx(75.0)
+    assert parts.seen["next_experiment"][1] == {"open_": False}
+    assert parts.seen["noise_kinds"][0][3] is True
+
+
+def test_a_kind_without_a_law_leaves_no_more_than_what_is_tolerable(parts: Any) -> None:
+    for kind_only, verdict in ((False, "explained"), (True, "partly_explained")):
+        parts.seen.clear()
+        parts.names = [_name("linear_leak"), _name("delay", kind_only)]
+        told = _run_diagnosis(parts)
+        assert (told.verdict, told.leftover is None) == (verdict, verdict == "explained")
+
+
+def test_of_what_is_no_unit_or_one_cycle_no_zero_is_told(parts: Any) -> None:
+    parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, 0.2)]
+    parts.given.is_no_unit = True
+    told = _run_diagnosis(parts)
+    assert (told.causes, told.verdict) == ((), "unexplained")
+    assert parts.seen["infer"][0][4] is False
+    parts.seen.clear()
+    parts.given.is_no_unit, parts.found.can_validate = False, False
+    assert _run_diagnosis(parts).causes == ()
+    parts.seen.clear()
+    parts.found.can_validate = True
+    assert [one.name for one in _run_diagnosis(parts).causes] == ["zero"]
+
+
+def test_what_is_material_at_the_least_is_a_zero(parts: Any) -> None:
+    for size, count in ((STANDARD.material, 1), (0.999 * STANDARD.material, 0)):
+        parts.seen.clear()
+        parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, size)]
+        assert len(_run_diagnosis(parts).causes) == count
+
+
+def test_what_is_left_beyond_the_error_leaves_no_noise(parts: Any) -> None:
+    parts.kinds[1].rms = 0.5
+    assert _run_diagnosis(parts).explainable_percent == 100.0

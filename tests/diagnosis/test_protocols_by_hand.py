@@ -1,0 +1,323 @@
+"""Protocols as a machine runs them, corner by corner, and what rises of a load tell of rates, peaks and repeats."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._excitation import (
+    Excitation,
+    _distinct,
+    _distinct_rates,
+    _held,
+    _longest,
+    _rises,
+    excitation_of,
+)
+from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.models.effects import Conditions
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+Step = tuple[str, float, float]  # kind, load in N, duration in s
+
+
+def _made(name: str, peak_n: float = 800.0) -> list[Step]:
+    return [(one.kind, one.load_n, one.duration_s) for one in EXPERIMENTS[name](peak_n).segments]
+
+
+def _like(steps: list[Step]) -> list[Any]:
+    return [(kind, pytest.approx(load_n), pytest.approx(duration_s)) for kind, load_n, duration_s in steps]
+
+
+def _triangle(load_n: float, ramp_s: float, rest_s: float) -> list[Step]:
+    return [("ramp", load_n, ramp_s), ("ramp", 0.0, ramp_s), ("rest", 0.0, rest_s)]
+
+
+def _press(load_n: float, ramp_s: float, hold_s: float, rest_s: float) -> list[Step]:
+    return [
+        ("rest", 0.0, 3.0), ("ramp", load_n, ramp_s), ("hold", load_n, hold_s), ("ramp", 0.0, ramp_s),
+        ("rest", 0.0, rest_s),
+    ]  # fmt: skip
+
+
+# -- protocols --------------------------------------------------------------------------------------------------------
+def test_holds_are_as_long_and_at_such_loads() -> None:
+    """A ramp to the whole load takes four seconds; a triangle to it three each way."""
+    assert _made("long_hold") == _like([*_press(600.0, 3.0, 300.0, 300.0), *_triangle(800.0, 3.0, 4.0)])
+    several = [
+        *_press(200.0, 1.0, 90.0, 30.0), *_press(800.0, 4.0, 90.0, 30.0), *_press(400.0, 2.0, 90.0, 30.0),
+        *_press(600.0, 3.0, 90.0, 30.0),
+    ]  # fmt: skip
+    assert _made("holds_at_several_loads") == _like(several)
+
+
+def test_rests_are_as_long_between_triangles() -> None:
+    three = _triangle(800.0, 3.0, 4.0) * 3
+    assert _made("idle") == _like([*three, ("rest", 0.0, 600.0), *three])
+    paused: list[Step] = []
+    for pause_s in (5.0, 120.0, 20.0, 300.0, 5.0):
+        paused += [*_triangle(800.0, 3.0, 2.0) * 3, ("rest", 0.0, pause_s)]
+    assert _made("pauses") == _like(paused)
+
+
+def test_steps_go_to_each_load_at_once_and_hold_it_four_seconds() -> None:
+    loads = [400.0, 0.0, 800.0, 200.0, 600.0, 0.0, 800.0, 400.0, 0.0, 600.0, 200.0, 0.0]
+    stepped: list[Step] = [("rest", 0.0, 3.0)]
+    for load_n in loads:
+        stepped += [("ramp", load_n, 0.1), ("hold", load_n, 4.0)]
+    assert _made("steps") == _like(stepped)
+
+
+def test_loops_lie_within_loops_at_two_rates() -> None:
+    turns = [800.0, 160.0, 640.0, 320.0, 560.0, 400.0, 520.0, 80.0, 360.0, 200.0, 720.0, 0.0]
+    looped: list[Step] = [("rest", 0.0, 3.0)]
+    for rate_n_per_s in (80.0, 320.0):
+        ways = np.abs(np.diff([0.0, *turns]))
+        looped += [("ramp", n, way / rate_n_per_s) for n, way in zip(turns, ways, strict=True)]
+        looped.append(("rest", 0.0, 5.0))
+    assert _made("minor_loops") == _like(looped)
+
+
+def test_shuffled_loads_are_reached_at_one_rate() -> None:
+    loads = [200, 400, 200, 600, 400, 800, 200, 600, 400, 800, 80, 400, 200, 800, 600, 80]
+    shuffled: list[Step] = [("rest", 0.0, 3.0)]
+    for load_n in loads:
+        shuffled += _triangle(float(load_n), 3.0 * load_n / 800.0, 3.0)
+    assert _made("shuffled_loads") == _like(shuffled)
+
+
+def test_triangles_at_five_rates_are_run_three_times_each() -> None:
+    ramps = [(n, s) for kind, n, s in _made("rates") if kind == "ramp"]
+    expected = [(load_n, 1.0 / rate) for rate in (0.0625, 0.125, 0.25, 0.5, 1.0) for load_n in (800.0, 0.0) * 3]
+    assert ramps == [(pytest.approx(n), pytest.approx(s)) for n, s in expected]
+
+
+def test_a_multisine_is_that_of_its_frequencies_and_phases() -> None:
+    """Schroeder (1970): phases pi k (k - 1) / N of N sines; here from 0.02 to 2 Hz, eight and a half to an octave."""
+    made = _made("multisine")
+    waves = []
+    for count in range(1200):
+        at_s = 0.1 * count
+        waves.append(
+            sum(
+                math.cos(2.0 * math.pi * 0.02 * 10.0 ** (0.2 * (k - 1)) * at_s + math.pi * k * (k - 1) / 11.0)
+                for k in range(1, 12)
+            )
+        )
+    loads = [800.0 * (0.5 + 0.45 * wave / max(abs(one) for one in waves)) for wave in waves]
+    assert made[:2] == _like([("rest", 0.0, 3.0), ("ramp", loads[0], 2.0)])
+    assert made[2:-2] == _like([("ramp", load_n, 0.1) for load_n in loads[1:]])
+    assert made[-2:] == _like([("ramp", 0.0, 2.0), ("rest", 0.0, 5.0)])
+
+
+def test_these_are_all_in_their_order() -> None:
+    expected = ["steps", "multisine", "minor_loops", "shuffled_loads", "rates", "holds_at_several_loads", "long_hold",
+                "pauses", "idle"]  # fmt: skip
+    assert list(EXPERIMENTS) == expected
+    assert [EXPERIMENTS[name](1.0).name for name in EXPERIMENTS] == expected
+
+
+# -- rises ------------------------------------------------------------------------------------------------------------
+def _session(load: Array, step_s: float = 0.1, thinned: int = 2, resting: Any = None) -> Any:
+    at_rest = np.abs(load) < STANDARD.standing if resting is None else resting
+    return SimpleNamespace(
+        conditions=Conditions(step_s * np.arange(load.size), load, step_s), thinned=thinned, resting=at_rest
+    )
+
+
+def _course(*corners: tuple[int, float]) -> Array:
+    """Straight lines of so many steps to such a load."""
+    parts, at = [np.zeros(1)], 0.0
+    for steps, share in corners:
+        parts.append(np.linspace(at, share, steps + 1)[1:])
+        at = share
+    return np.concatenate(parts)
+
+
+def test_a_rise_is_told_by_its_middle_half() -> None:
+    """Slow at first and last, fast between a quarter and three quarters."""
+    load = _course((10, 0.0), (20, 0.18), (12, 0.62), (30, 0.8), (20, 0.0), (10, 0.0))
+    (rise,) = _rises(_session(load), STANDARD)
+    # The first at 0.2 or more is the first of the twelve, the first at 0.6 or more the last of them.
+    assert rise.samples == 11
+    assert rise.rate == pytest.approx(0.5 * 0.8 / 1.1)
+    assert rise.peak == pytest.approx(0.8)
+    assert not rise.is_minor
+    finer = _rises(_session(load, step_s=0.05), STANDARD)
+    assert next(finer).rate == pytest.approx(2.0 * rise.rate)
+
+
+def test_a_step_within_a_sample_took_half_of_one() -> None:
+    load = np.repeat([0.0, 1.0, 0.0], 20)
+    (rise,) = _rises(_session(load), STANDARD)
+    assert (rise.samples, rise.rate) == (0, pytest.approx(0.5 / 0.05))
+    # Where nothing was thinned a sample more or less would make another rate of four or fewer.
+    for steps, is_told in ((6, False), (7, True)):  # three and four from a quarter to three quarters
+        ramp = _course((20, 0.0), (steps, 1.0), (20, 1.0), (20, 0.0), (20, 0.0))
+        (thinned,) = _rises(_session(ramp), STANDARD)
+        assert thinned.samples == steps // 2 + steps % 2
+        assert bool(list(_rises(_session(ramp, thinned=1), STANDARD))) is is_told
+
+
+@pytest.mark.parametrize(("height", "is_told"), [(0.235, False), (0.245, True)])
+def test_a_rise_is_clear_of_what_makes_a_cycle(height: float, is_told: bool) -> None:
+    """Three times 0.08 of the span, in a load that goes to one beside it."""
+    load = _course((10, 0.0), (20, 1.0), (20, 0.0), (20, height), (20, 0.0), (10, 0.0))
+    assert len(list(_rises(_session(load), STANDARD))) == 1 + is_told
+    # Of a load that moves by little the span is its own; of one that goes beyond the full scale it is that.
+    assert len(list(_rises(_session(0.1 * load + 0.5), STANDARD))) == 1 + is_told
+    tall = _course((10, 0.0), (20, 3.0), (20, 0.0), (20, height), (20, 0.0), (10, 0.0))
+    assert len(list(_rises(_session(tall), STANDARD))) == 1 + is_told
+
+
+@pytest.mark.parametrize(("foot", "is_minor"), [(0.155, False), (0.165, True)])
+def test_a_minor_loop_begins_clear_of_the_least_load(foot: float, is_minor: bool) -> None:
+    load = _course((10, 0.0), (20, 1.0), (20, foot), (20, 0.9), (20, 0.0), (10, 0.0))
+    assert [one.is_minor for one in _rises(_session(load - 0.3), STANDARD)] == [False, is_minor]
+
+
+def test_a_rise_that_ends_at_no_load_bears_none() -> None:
+    load = _course((10, 0.0), (20, 1.0), (20, 0.0), (10, 0.0))
+    assert list(_rises(_session(load - 1.0), STANDARD)) == []
+    assert len(list(_rises(_session(load - 0.999), STANDARD))) == 1
+    assert list(_rises(_session(np.full(50, 0.3)), STANDARD)) == []
+
+
+# -- rates and peaks --------------------------------------------------------------------------------------------------
+def test_numbers_that_are_alike_are_one() -> None:
+    assert _distinct([1.0, 1.2501, 0.5, 1.25], 0.25) == [0.5, 1.0, 1.2501]
+    assert _distinct([], 0.25) == []
+
+
+def test_rates_of_long_ramps_differ_by_more_than_that_share() -> None:
+    many = 10_000
+    assert _distinct_rates([(1.0, many), (1.249, many)], 0.25) == [1.0]
+    assert _distinct_rates([(1.251, many), (1.0, many)], 0.25) == [1.0, 1.251]
+    assert _distinct_rates([], 0.25) == []
+
+
+def test_rates_of_short_ramps_differ_by_more_than_two_samples_at_either_end() -> None:
+    """A ramp of ten lasted eight to twelve: up to ten eighths of the rate; one of twenty down to twenty of 22."""
+    reach = 10.0 / 8.0
+    for by, count in ((0.999, 1), (1.001, 2)):
+        rate = by * reach * 22.0 / 20.0
+        assert len(_distinct_rates([(1.0, 10), (rate, 20)], 0.25)) == count
+    # One of two samples and less may have been as quick as can be; of none as of one.
+    assert _distinct_rates([(1.0, 2), (2.0 / 0.1, 10**6)], 0.25) == [1.0]
+    assert len(_distinct_rates([(1.0, 2), (2.001 / 0.1, 10**6)], 0.25)) == 2
+    assert len(_distinct_rates([(1.0, 0), (10.001, 10**6)], 0.25)) == 2
+    assert len(_distinct_rates([(1.0, 0), (9.999, 10**6)], 0.25)) == 1
+    assert len(_distinct_rates([(1.0, 10**6), (3.001, 0)], 0.25)) == 2
+    assert len(_distinct_rates([(1.0, 10**6), (2.999, 0)], 0.25)) == 1
+
+
+def test_a_stray_ramp_makes_no_second_rate() -> None:
+    one, other = (1.0, 1000), (2.0, 1000)
+    assert _distinct_rates([one, other, other, other], 0.25) == [2.0]  # three quarters of all
+    assert _distinct_rates([one, one, one, other], 0.25) == [1.0]
+    assert _distinct_rates([one, one, other, other, other], 0.25) == [1.0, 2.0]
+
+
+# -- what an experiment shows -----------------------------------------------------------------------------------------
+def _shown(*sessions: Any, thresholds: Thresholds = STANDARD) -> Excitation:
+    return excitation_of(sessions, thresholds)
+
+
+def test_a_hold_bears_more_than_a_cycle_leaves_and_stands_still() -> None:
+    load = np.concatenate([np.full(40, 0.079), np.full(30, 0.081), np.full(20, 1.0)])
+    load.flags.writeable = False
+    session = _session(load, step_s=1.0)
+    still = _held(session, STANDARD)
+    assert not still[:39].any()
+    assert still[42:68].all()
+    session.conditions.cache["rate_per_s"] = np.where(np.arange(90) < 80, STANDARD.still_per_s, 0.0)
+    assert list(np.flatnonzero(_held(session, STANDARD))) == list(range(80, 90))
+    session.resting[85:] = True
+    assert list(np.flatnonzero(_held(session, STANDARD))) == list(range(80, 85))
+    assert _longest(_held(session, STANDARD)) == 5
+    assert _longest(np.zeros(4, dtype=bool)) == 0
+
+
+def _with(runs: list[tuple[bool, int]], step_s: float = 0.1) -> Any:
+    """Rests (True) and holds at 0.5 (False), so many samples each."""
+    resting = np.concatenate([np.full(count, one) for one, count in runs])
+    session = _session(np.where(resting, 0.0, 0.5), step_s, resting=resting)
+    session.conditions.cache["rate_per_s"] = np.zeros(resting.size)
+    return session
+
+
+@pytest.mark.parametrize(
+    ("word", "below", "at"),
+    [
+        ("holds", [(True, 2), (False, 29)], [(True, 2), (False, 30)]),  # 3 s
+        ("rests", [(True, 3), (False, 5)], [(True, 4), (False, 5)]),  # 0.4 s
+        ("idle", [(True, 599), (False, 5)], [(True, 600), (False, 5)]),  # 60 s
+        # Of the rests within the record the longest more than twice the shortest, or than what has settled.
+        ("pauses", [(True, 90), (False, 2), (True, 10), (False, 2), (True, 20), (False, 2), (True, 90)],
+         [(True, 90), (False, 2), (True, 10), (False, 2), (True, 21), (False, 2), (True, 90)]),
+        ("pauses", [(True, 90), (False, 2), (True, 1), (False, 2), (True, 8), (False, 2), (True, 90)],
+         [(True, 90), (False, 2), (True, 1), (False, 2), (True, 9), (False, 2), (True, 90)]),
+    ],
+)  # fmt: skip
+def test_times_are_at_least_as_long_as_said(word: str, below: list[Any], at: list[Any]) -> None:
+    assert word not in _shown(_with(below)).present
+    assert word in _shown(_with(at)).present
+    # Any recording may show it.
+    assert word in _shown(_with(below), _with(at)).present
+
+
+def _rising(*rises: tuple[float, float]) -> Any:
+    """Rises at such rates to such peaks, long rests between them."""
+    corners: list[tuple[int, float]] = [(20, 0.0)]
+    for rate, peak in rises:
+        corners += [(max(round(peak / rate / 0.1), 1), peak), (20, 0.0), (20, 0.0)]
+    return _session(_course(*corners))
+
+
+def test_steps_low_loads_and_repeats() -> None:
+    # So fast that an echo's time takes a quarter of the load.
+    assert "steps" not in _shown(_rising((2.4, 0.96))).present
+    assert "steps" in _shown(_rising((4.0, 1.0))).present
+    assert "low_loads" not in _shown(_rising((0.1, 1.0), (0.1, 0.26))).present
+    assert "low_loads" in _shown(_rising((0.1, 1.0), (0.1, 0.2495))).present
+    for rises, repeats in (([(0.1, 1.0)], 1), ([(0.1, 1.0)] * 2, 2), ([(0.1, 1.0), (0.1, 0.5)], 1),
+                           ([(0.1, 1.0), (0.3, 1.0)], 1), ([], 0)):  # fmt: skip
+        found = _shown(_rising(*rises))
+        assert found.repeats == repeats
+        assert ("repeats" in found.present) is (repeats > 1)
+    # Across recordings too.
+    assert _shown(_rising((0.1, 1.0)), _rising((0.1, 1.0))).repeats == 2
+
+
+def test_of_what_kind_a_repeat_is_goes_by_the_logarithm() -> None:
+    """Rates and peaks within steps of a quarter are one kind: 1 and 1.1 of a rate, 1 and 1.25 are not."""
+    assert _shown(_rising((0.1, 1.0), (0.11, 1.0))).repeats == 2
+    assert _shown(_rising((0.1, 1.0), (0.125, 1.0))).repeats == 1
+    assert _shown(_rising((0.1, 1.0), (0.1, 0.92))).repeats == 2
+    assert _shown(_rising((0.1, 1.0), (0.1, 0.8))).repeats == 1
+
+
+def test_each_thing_that_lacks_has_its_sentence() -> None:
+    every = frozenset({"holds", "rests", "repeats"})
+    rich = Excitation((0.1, 0.5), (0.5, 1.0), 2, every, STANDARD)
+    for changes, words in (
+        ({"rates_per_s": (0.1,)}, "one loading rate only"),
+        ({"present": every - {"holds"}}, "no hold longer than 3 s under load"),
+        ({"present": every - {"rests"}}, "never seen unloaded"),
+        ({"present": every - {"repeats"}}, "no load cycle is repeated"),
+        ({"peaks": (1.0,)}, "one peak load only"),
+    ):
+        (said,) = replace(rich, **changes).limits()  # type: ignore[arg-type]
+        assert words in said
+    # Without any rise the rate is said alone.
+    (said,) = replace(rich, rates_per_s=(), peaks=()).limits()
+    assert "one loading rate only" in said
