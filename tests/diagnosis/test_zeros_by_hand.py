@@ -1,0 +1,415 @@
+"""Zeros, clocks, kinds of noise and parameters' units: by numbers that are put in, at the very bounds that decide."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from smartshoe.diagnosis import Thresholds, _noise_kinds, _zero
+from smartshoe.diagnosis._aligned import _on_one_clock, _one_pair, aligned
+from smartshoe.diagnosis._noise_kinds import noise_kinds
+from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
+from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, shift_of, zeros_of
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.recording import Recording
+from smartshoe.units import MILLIBAR, VOLT
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+MODEL = ExtendedModel(0.8, 0.1, 0.22, 800.0, 140.0, "mbar")
+SCALE = Scale(800.0, 140.0, MILLIBAR)
+MANY = float(norm.isf(0.5 * STANDARD.false_alarm))
+
+
+# -- zeros that are seen ----------------------------------------------------------------------------------------------
+def _seen(
+    monkeypatch: pytest.MonkeyPatch, rests: list[tuple[float, float, float]], scale: Scale = SCALE
+) -> dict[str, Any]:
+    """By loads, readings and drifts of first rests."""
+    monkeypatch.setattr(_zero, "first_rests", lambda *given: np.array(rests).reshape(-1, 3))
+    found = zeros_of([], MODEL, scale, 0.0, 0.0, STANDARD)
+    sizes = [one.size for one in found]
+    assert sizes == sorted(sizes, reverse=True)
+    return {one.effect.shifts: one for one in found}
+
+
+def test_a_zero_is_named_from_so_many_of_its_deviations_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four ten-thousandths, how well a rest is known to be zero, each."""
+    bound = MANY * STANDARD.zero_sd
+    for by, is_named in ((0.999, False), (1.001, True)):
+        assert ("load" in _seen(monkeypatch, [(by * bound, -0.1, 0.0)])) is is_named
+        assert ("reading" in _seen(monkeypatch, [(0.1, -by * bound, 0.0)])) is is_named
+    found = _seen(monkeypatch, [(0.02, -0.05, 0.0)])
+    assert (found["load"].value, found["load"].size) == (-0.02, pytest.approx(0.016))
+    assert (found["reading"].value, found["reading"].size) == (pytest.approx(-0.04), pytest.approx(0.04))
+    assert found["load"].sd == found["reading"].sd == pytest.approx(STANDARD.zero_sd)
+    assert _seen(monkeypatch, [(0.02, -0.05, 0.0)], replace(SCALE, unit=VOLT)) == {}
+
+
+def test_a_reading_that_agrees_with_the_load_or_is_far_off_is_no_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = MANY * math.sqrt(2.0) * STANDARD.zero_sd
+    for by, is_named in ((0.999, False), (1.001, True)):
+        assert bool(_seen(monkeypatch, [(0.05, 0.05 + by * both, 0.0)])) is is_named
+        assert bool(_seen(monkeypatch, [(0.05, 0.05 - by * both, 0.0)])) is is_named
+    for reading, is_named in ((0.3001, False), (0.2999, True), (-0.3001, False)):
+        assert bool(_seen(monkeypatch, [(0.0, reading, 0.0)])) is is_named
+
+
+def test_a_zeros_deviation_is_of_its_scatter_its_rest_and_what_drifted(monkeypatch: pytest.MonkeyPatch) -> None:
+    rests = [(0.10, -0.05, 0.01), (0.11, -0.06, -0.03), (0.12, -0.09, 0.02)]
+    found = _seen(monkeypatch, rests)
+    loads, readings, drifted = np.array(rests).T
+    error = np.std(loads, ddof=1) / math.sqrt(3.0)
+    assert found["load"].sd == pytest.approx(math.hypot(error, 4e-4))
+    assert found["load"].value == pytest.approx(-0.11)
+    spread = np.std(readings, ddof=1) / math.sqrt(3.0)
+    assert np.mean(np.abs(drifted)) == pytest.approx(0.02)
+    scattered = _seen(monkeypatch, [(0.3 + a, 0.5 * b, c) for a, b, c in rests])["reading"]
+    assert scattered.value == pytest.approx(0.8 * 0.5 * float(np.mean(readings)))
+    assert scattered.sd == pytest.approx(math.sqrt((0.5 * spread) ** 2 + 4e-4**2 + (0.25 * 0.02) ** 2))
+
+
+# -- zeros that are not -----------------------------------------------------------------------------------------------
+def _session(load: Array, fitted: Any = None) -> Any:
+    kept = np.ones(load.size, dtype=bool) if fitted is None else fitted
+    return SimpleNamespace(
+        conditions=Conditions(0.1 * np.arange(load.size), load, 0.1), fitted=kept, reading=0.0 * load,
+        resting=np.abs(load) < 0.02, recording=SimpleNamespace(command_n=None), thinned=1,
+    )  # fmt: skip
+
+
+def _told(monkeypatch: pytest.MonkeyPatch, offsets: list[float], left: float = 0.0, remembered: float = 0.0) -> Any:
+    monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(offsets))
+    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
+    sessions = [_session(np.linspace(0.2, 0.9, 101)), _session(np.linspace(-0.4, -0.9, 101))]
+    sessions.append(_session(np.full(9, 0.01), np.zeros(9, dtype=bool)))
+    return _unseen(sessions, MODEL, left, remembered, shift_of("reading"), shift_of("load"), STANDARD)
+
+
+def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Past: begun at 0.3 on the mean, a quarter of the arm's tenth and what is remembered; lowest 0.207; drifts 0.3.
+    past = 0.3 * (0.25 * 0.1 + 0.02)
+    drifted = 0.25 * np.mean([0.2, 0.4])
+    for offsets in ([0.2], [0.25, 0.27], [0.2, 0.24, 0.25]):
+        scatter = np.std(offsets, ddof=1) / math.sqrt(len(offsets)) if len(offsets) > 1 else 0.0
+        sd = math.sqrt(scatter**2 + 4e-4**2 + 0.003**2 + past**2 + (0.25 * 0.207) ** 2 + drifted**2)
+        mean = float(np.mean(offsets))
+        assert mean < MANY * sd
+        assert _told(monkeypatch, offsets, 0.003, 0.02) == ()
+        (zero,) = _scaled_down(monkeypatch, offsets)
+        assert zero.sd == pytest.approx(0.1 * sd)
+        assert (zero.value, zero.size) == (pytest.approx(mean), pytest.approx(abs(mean)))
+        assert (zero.effect.shifts, zero.alternatives) == ("reading", (shift_of("load").name,))
+    for sign in (1.0, -1.0):
+        (zero,) = _scaled_down(monkeypatch, [sign * 0.2])
+        assert (zero.value, zero.size) == (pytest.approx(sign * 0.2), pytest.approx(0.2))
+
+
+def _scaled_down(monkeypatch: pytest.MonkeyPatch, offsets: list[float]) -> Any:
+    """All that may lie in it a tenth as large, the scatter's share by more recordings like these."""
+    mean = float(np.mean(offsets))
+    small = [mean + 0.1 * (one - mean) for one in offsets]
+    monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(small))
+    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
+    sessions = [_session(0.1 * np.linspace(0.2, 0.9, 101)), _session(-0.1 * np.linspace(0.4, 0.9, 101))]
+    thresholds = replace(STANDARD, zero_sd=4e-5)
+    return _unseen(sessions, MODEL, 0.0003, 0.02, shift_of("reading"), shift_of("load"), thresholds)
+
+
+def test_an_unseen_zero_is_told_between_its_deviations_and_what_is_foreign(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.zeros(5))
+    still = replace(MODEL, relaxing_share=0.0)
+    session = _session(np.zeros(50))
+
+    def told(offset: float) -> bool:
+        monkeypatch.setattr(_zero, "offsets", lambda *given: np.array([offset]))
+        return bool(_unseen([session], still, 0.0, 0.0, shift_of("reading"), shift_of("load"), STANDARD))
+
+    bound = MANY * STANDARD.zero_sd
+    assert [told(by * bound) for by in (0.999, 1.001, -0.999, -1.001)] == [False, True, False, True]
+    assert [told(by * 0.3) for by in (0.999, 1.001, -1.001)] == [True, False, False]
+
+
+# -- first rests ------------------------------------------------------------------------------------------------------
+def _rested(count: int, level: float = 0.0, reading: float = 0.01, step_s: float = 0.1) -> Any:
+    load = np.concatenate([np.full(count, level), np.linspace(level, 1.0, 60)])
+    shown = np.concatenate([np.full(count, reading), np.linspace(reading, 1.0, 60)])
+    one = _session(load)
+    one.conditions = Conditions(step_s * np.arange(load.size), load, step_s)
+    one.reading = shown
+    one.resting = np.arange(load.size) < count
+    return one
+
+
+def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
+    """Four tenths of a second: four samples; and no more of it is looked at than of a hold that shows creep."""
+    for count, is_told in ((3, False), (4, True)):
+        found = first_rests([_rested(count)], MODEL, STANDARD)
+        assert found.shape == ((1, 3) if is_told else (0, 3))
+    long = _rested(50)
+    long.reading[30:] = 9.0
+    (rest,) = first_rests([long], MODEL, STANDARD)
+    assert rest == pytest.approx([0.0, 0.01 / 0.8, 0.0])
+    # Where it is not fitted it does not count; where the unit rests all along it is the first three seconds.
+    long.fitted[:27] = False
+    assert first_rests([long], MODEL, STANDARD).size == 0
+    long.fitted[26] = True
+    assert first_rests([long], MODEL, STANDARD).shape == (1, 3)
+    ever = _rested(80)
+    ever.resting[:] = True
+    assert first_rests([ever], MODEL, STANDARD)[0] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
+    assert first_rests([], MODEL, STANDARD).shape == (0, 3)
+    slow = _rested(2, step_s=10.0)
+    assert first_rests([slow], MODEL, STANDARD).shape == (1, 3)
+
+
+def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
+    """By a thousandth of the largest command, either way, while the load stands still."""
+    one = _rested(30, level=0.3, reading=0.2)
+    one.resting[:] = False
+    assert first_rests([one], MODEL, STANDARD).size == 0
+    for asked, is_told in ((0.99, True), (1.01, False), (-0.99, True), (-1.01, False)):
+        command = np.concatenate([np.full(10, asked), np.linspace(1.0, -1000.0, 80)])
+        one.recording = SimpleNamespace(command_n=command)
+        found = first_rests([one], MODEL, STANDARD)
+        assert found.shape == ((1, 3) if is_told else (0, 3))
+        if is_told:
+            assert found[0, :2] == pytest.approx([0.3, 0.2 / 0.8])
+    moved = _rested(30, level=0.3, reading=0.2)
+    moved.recording = SimpleNamespace(command_n=np.zeros(90))
+    moved.conditions.load[3:] = 0.3 + 0.02
+    assert first_rests([moved], MODEL, STANDARD).size == 0
+    # A command at the full rate is taken at the thinned samples; one that ends earlier has no rest beyond.
+    thin = _rested(30, level=0.3, reading=0.2)
+    thin.thinned, thin.resting[:] = 3, False
+    command = np.full(90, 500.0)
+    command[0:12:3] = 0.0
+    thin.recording = SimpleNamespace(command_n=command)
+    assert first_rests([thin], MODEL, STANDARD).shape == (1, 3)
+    command[0] = 500.0
+    assert first_rests([thin], MODEL, STANDARD).size == 0
+
+
+def test_a_first_rest_at_a_tare_ends_where_the_load_leaves_it() -> None:
+    one = _rested(30, level=0.3, reading=0.01)
+    one.resting[:] = False
+    one.conditions.load[20:30] = 0.3 + 0.02
+    one.reading[20:30] = 5.0
+    (rest,) = first_rests([one], MODEL, STANDARD)
+    assert rest == pytest.approx([0.3, 0.01 / 0.8, 0.0])
+
+
+def test_what_has_drifted_at_rest_is_taken_out_of_a_first_rest() -> None:
+    drifting = MODEL.with_part("dead_band").with_part("zero_drift", np.array([0.002, 0.0]))
+    one = _rested(25)
+    moved = _drifted(one, drifting)
+    expected = drifting.simulate(one.conditions) - drifting.without("zero_drift").simulate(one.conditions)
+    assert moved == pytest.approx(expected)
+    assert np.ptp(moved) > 0.0
+    (rest,) = first_rests([one], drifting, STANDARD)
+    mean = float(np.mean(moved[:25]))
+    assert rest[1:] == pytest.approx([(0.01 - mean) / 0.8, mean / 0.8])
+
+
+# -- clocks -----------------------------------------------------------------------------------------------------------
+T = 0.05 * np.arange(400)
+
+
+def _run(name: str = "run", size: int = 400) -> Recording:
+    return Recording.from_arrays(time_s=T[:size] + 3.0, force_n=T[:size], pressure_mbar=10.0 * T[:size], name=name)
+
+
+def _aligned(lags_s: tuple[float, ...], rates: tuple[float, ...]) -> Any:
+    runs = [_run(f"run_{k}") for k in range(len(lags_s))]
+    usable = tuple(np.ones(400, dtype=bool) for _ in runs)
+    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=rates, usable=usable)
+    return aligned(runs, integrity, STANDARD)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_lags_within_a_quarter_of_the_largest_are_one_delay(sign: float) -> None:
+    for other, is_one in ((0.751, True), (0.749, False)):
+        found = _aligned((sign, sign * other), (0.0, 0.0))
+        assert [one.name for one, _ in found.parts] == ["delay"] * is_one
+        assert len(found.says) == 2 * (not is_one)
+    assert found.parts == ()
+    ((_, value),) = _aligned((sign, sign * 0.8), (0.0, 0.0)).parts
+    assert value == pytest.approx([sign * 0.9])
+    upper = effect("delay").parameters[0].upper
+    assert _aligned((sign * upper,) * 2, (0.0, 0.0)).parts == ()
+    assert len(_aligned((sign * 0.999 * upper,) * 2, (0.0, 0.0)).parts) == 1
+    assert _aligned((0.0, 0.0), (0.0, 0.0)).says == ()
+    assert _aligned((), ()).parts == ()
+
+
+def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_was_taken() -> None:
+    """Its clock shows the middle late by the lag, and runs fast by the rate."""
+    kept = np.ones(400, dtype=bool)
+    kept[200] = False
+    for offset_s, rate in ((0.52, 0.0), (-0.52, 0.0), (0.2, 0.01), (-0.2, -0.02)):
+        moved, usable = _on_one_clock(_run(), kept, offset_s, rate)
+        middle = 0.5 * (T[0] + T[-1])
+        source = T + offset_s + rate * (T - middle)
+        inside = (source >= 0.0) & (source <= T[-1])
+        assert moved.sensor.values[inside] == pytest.approx(10.0 * source[inside])
+        nearest = [int(np.flatnonzero(T >= at - 1e-12)[0]) if at <= T[-1] else 399 for at in source]
+        expected = inside & kept[nearest]
+        assert list(np.flatnonzero(usable != expected)) == []
+        assert list(moved.force_n) == list(_run().force_n)
+
+
+def test_one_line_through_the_beginnings_and_ends_is_one_pair_of_clocks() -> None:
+    duration = np.array([100.0, 60.0, 30.0])
+    rate, before = 0.002, 0.3
+
+    def told(lags: Any, rates: Any) -> tuple[float, float] | None:
+        return _one_pair(np.array(lags), np.array(rates), duration, STANDARD)
+
+    lags = before + 0.5 * rate * duration
+    assert told(lags, [rate] * 3) == pytest.approx((before, rate))
+    assert told(lags, [rate, rate, -rate]) is None
+    assert told([*lags[:2], 0.35], [rate, rate, 0.0]) is None  # it shows a lag and no drift
+    # What is hidden in the last: less than what has settled, four tenths of a second.
+    assert told([*lags[:2], 0.0], [rate, rate, 0.0]) == pytest.approx((before, rate))
+    assert told([*(0.2 + lags[:2]), 0.0], [rate, rate, 0.0]) is None
+    for by, is_hidden in ((0.999, True), (1.001, False)):
+        shift = by * STANDARD.settled_s - rate * 30.0
+        assert (told([shift + 0.1, shift + 0.06, 0.0], [rate, rate, 0.0]) is not None) is is_hidden
+        turned = told([-shift - 0.1, -shift - 0.06, 0.0], [-rate, -rate, 0.0])
+        assert (turned is not None) is is_hidden
+    # Lines that differ by more than a quarter of the largest lag are of two pairs.
+    both = [100.0, 100.0]
+    for apart, is_one in ((0.99, True), (1.01, False)):  # half of it from the line through both
+        found = _one_pair(np.array([1.0, 1.0 + apart]), np.array([1e-9, 1e-9]), np.array(both), STANDARD)
+        assert (found is not None) is is_one
+
+
+def test_a_pair_of_clocks_is_a_drift_and_a_delay_no_longer_than_a_delay_can_be() -> None:
+    upper = effect("delay").parameters[0].upper
+    half = 0.5 * T[-1]
+    for by, is_told in ((0.99, True), (1.01, False), (-0.99, True), (-1.01, False)):
+        found = _aligned((by * upper + 0.01 * half,) * 2, (0.01, 0.01))
+        assert [one.name for one, _ in found.parts] == ["clock_drift", "delay"] * is_told
+        if is_told:
+            assert [float(value[0]) for _, value in found.parts] == pytest.approx([0.01, by * upper])
+
+
+# -- kinds of noise ---------------------------------------------------------------------------------------------------
+def _fine(index: int, usable: bool = True) -> Any:
+    kept = np.ones(20, dtype=bool)
+    kept[3] = usable
+    run = SimpleNamespace(time_s=np.array([5.0, 6.0]), label=f"run {index}")
+    conditions = SimpleNamespace(step_s=0.1, time_s=0.1 * np.arange(20))
+    return SimpleNamespace(
+        index=index, usable=kept, conditions=conditions, reading=np.full(20, 3.0), recording=run, fitted=kept
+    )
+
+
+def _kinds(monkeypatch: pytest.MonkeyPatch, sessions: list[Any], **given: Any) -> list[Any]:
+    asked: list[Any] = []
+
+    def evidence(kind: str, strength: float) -> Any:
+        def told(residual: Array, conditions: Any, prediction: Array, step_s: float) -> Any:
+            asked.append((float(residual[0]), float(prediction[0]), step_s))
+            return SimpleNamespace(strength=strength, says=f"says {kind}")
+
+        return told
+
+    strengths = {"hum": 0.5, "timing_jitter": 0.1, "heteroscedastic_noise": 0.0999, "coloured_noise": 0.3}
+    monkeypatch.setattr(_noise_kinds, "KINDS", {kind: evidence(kind, by) for kind, by in strengths.items()})
+    model: Any = SimpleNamespace(simulate=lambda conditions: np.full(20, 1.0))
+    told = {"known": [], "explained": True, "material": 0.1, "memory": None, **given}
+    found = noise_kinds(sessions, model, **told)
+    assert set(asked) <= {(2.0, 1.0, 0.1)}
+    return found
+
+
+def test_kinds_as_strong_as_what_counts_are_told_throughout(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = _kinds(monkeypatch, [_fine(4)])
+    assert [one.kind for one in found] == ["hum", "timing_jitter", "coloured_noise"]
+    assert (found[0].recording, found[0].says, found[0].severity) == (4, "says hum", "minor")
+    assert (found[0].start_s, found[0].stop_s, found[0].share) == (5.0, pytest.approx(6.9), 1.0)
+    unexplained = _kinds(monkeypatch, [_fine(4)], explained=False)
+    assert [one.kind for one in unexplained] == ["hum", "timing_jitter"]
+
+
+def test_where_a_fault_imitates_noise_none_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fault(kind: str, recording: int = 4) -> Any:
+        return SimpleNamespace(kind=kind, recording=recording)
+
+    for kind in ("held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"):
+        assert _kinds(monkeypatch, [_fine(4)], known=[fault(kind)]) == []
+        assert len(_kinds(monkeypatch, [_fine(4)], known=[fault(kind, 3)])) == 3
+    assert [one.kind for one in _kinds(monkeypatch, [_fine(4)], known=[fault("hum")])] == [
+        "timing_jitter", "coloured_noise",
+    ]  # fmt: skip
+    assert _kinds(monkeypatch, [_fine(4, usable=False)]) == []
+
+
+def test_noise_that_remembers_is_told_where_it_was_not_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    memory = SimpleNamespace(is_noise=True, rms=0.1, tau_s=1.23)
+    held = _fine(7)
+    held.fitted[:] = False
+    torn = _fine(6, usable=False)
+    sessions = [_fine(4), torn, held]
+    found = _kinds(monkeypatch, sessions, memory=memory, explained=False)
+    assert [one.recording for one in found if one.kind == "coloured_noise"] == [4, 6]
+    assert "about 1.2 s" in found[-1].says
+    assert "10 % of full scale" in found[-1].says
+    known = _kinds(monkeypatch, sessions, memory=memory)
+    assert [one.recording for one in known if one.kind == "coloured_noise"] == [4, 6]
+    assert known[2].says == "says coloured_noise"
+    for changes in ({"is_noise": False}, {"rms": 0.0999}):
+        less = SimpleNamespace(**{**vars(memory), **changes})
+        assert "coloured_noise" not in [
+            one.kind for one in _kinds(monkeypatch, sessions, memory=less, explained=False)
+        ]
+
+
+# -- units ------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("unit", "expected"),
+    [("FS_reading", (0.5 * 140.0, "mbar")), ("FS_reading/s", (70.0, "mbar/s")), ("FS_load", (800.0, "N")),
+     ("1/FS_load", (1.0 / 800.0, "1/N")), ("FS_reading/FS_load", (70.0 / 800.0, "mbar/N")), ("s", (1.0, "s"))],
+)  # fmt: skip
+def test_shares_come_to_units(unit: str, expected: tuple[float, str]) -> None:
+    factor, told = _scaled(unit, replace(SCALE, reading=-140.0), 0.5)
+    assert (factor, told) == (pytest.approx(expected[0]), expected[1])
+    assert _scaled("FS_reading", replace(SCALE, reading=math.inf), 0.5)[0] == 1.0
+
+
+def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> None:
+    model = MODEL.with_part("zero_drift", np.array([1e-4, 2e-3])).with_part("dead_band", np.array([0.05, 0.2]))
+    rng = np.random.default_rng(1)
+    root = 1e-3 * rng.standard_normal((7, 7))
+    covariance = root @ root.T
+    covariance[4, 4] = -1e-9  # by rounding
+    fit: Any = SimpleNamespace(model=model, covariance=covariance)
+    found, joint = joint_parameters(fit, SCALE)
+    assert list(found) == ["zero_drift.drift_rate", "zero_drift.temperature_coefficient", "dead_band.lost_load",
+                           "dead_band.softness"]  # fmt: skip
+    factors = np.array([0.8 * 140.0, 0.8 * 140.0, 800.0, 1.0])
+    assert np.array(joint) == pytest.approx(covariance[3:, 3:] * np.outer(factors, factors))
+    drift = parameters_of(fit, "zero_drift", SCALE)
+    assert list(drift) == ["drift_rate", "temperature_coefficient"]
+    one = drift["drift_rate"]
+    sd = math.sqrt(covariance[3, 3])
+    assert (one.value, one.sd) == (pytest.approx(112.0 * 1e-4), pytest.approx(112.0 * sd))
+    bounds = effect("zero_drift").parameters[0]
+    low, high = max(1e-4 - 1.959963984540054 * sd, bounds.lower), min(1e-4 + 1.959963984540054 * sd, bounds.upper)
+    assert one.ci95 == pytest.approx((112.0 * low, 112.0 * high))
+    assert drift["temperature_coefficient"].sd == 0.0
+    covariance[5, 5] = 1e6
+    limits = effect("dead_band").parameters[0]
+    wide = parameters_of(fit, "dead_band", SCALE)["lost_load"]
+    assert wide.ci95 == pytest.approx((800.0 * limits.lower, 800.0 * limits.upper))
