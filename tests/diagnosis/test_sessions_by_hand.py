@@ -43,7 +43,9 @@ SCALE = Scale(800.0, 140.0, MILLIBAR)
 def _run(load: Array, reading: Array | None = None, step_s: float = STEP_S, **more: Any) -> Recording:
     """Shares of 800 N and 140 mbar."""
     shown = 140.0 * (load if reading is None else reading)
-    return Recording.from_arrays(time_s=step_s * np.arange(load.size), force_n=800.0 * load, pressure_mbar=shown, **more)
+    return Recording.from_arrays(
+        time_s=step_s * np.arange(load.size), force_n=800.0 * load, pressure_mbar=shown, **more
+    )
 
 
 def _course(*corners: tuple[int, float]) -> Array:
@@ -158,6 +160,7 @@ def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(coun
 # -- the load's rests and cycles --------------------------------------------------------------------------------------
 def test_a_unit_begins_unloaded_where_its_gauge_reads_a_quarter_of_a_still_load() -> None:
     """Over the first four tenths of a second, twenty samples."""
+
     def told(load: Any, reading: Any) -> bool:
         return begins_unloaded(np.asarray(load, dtype=float), np.asarray(reading, dtype=float), STEP_S, STANDARD)
 

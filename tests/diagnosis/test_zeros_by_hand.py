@@ -371,9 +371,7 @@ def test_noise_that_remembers_is_told_where_it_was_not_yet(monkeypatch: pytest.M
     assert known[2].says == "says coloured_noise"
     for changes in ({"is_noise": False}, {"rms": 0.0999}):
         less = SimpleNamespace(**{**vars(memory), **changes})
-        assert "coloured_noise" not in [
-            one.kind for one in _kinds(monkeypatch, sessions, memory=less, explained=False)
-        ]
+        assert "coloured_noise" not in [one.kind for one in _kinds(monkeypatch, sessions, memory=less, explained=False)]
 
 
 # -- units ------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,429 @@
+"""The columns that inference works on, the baseline's grid and held-out errors, against written-out sums."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._baseline import POLES_PER_S, _wall_ratio, baseline_of, lagged, with_usual_arm
+from smartshoe.diagnosis._held_out import Errors, _percent, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis._jittered import as_sampled, jitter_s
+from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._sensitivity import (
+    Candidate,
+    Linearised,
+    _factors,
+    _lag,
+    available,
+    departures,
+    directions,
+    linearised,
+    marginal,
+    nuisance_precision,
+)
+from smartshoe.diagnosis._session import Scale
+from smartshoe.models.core import USUAL_WALL_RATIO
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import MILLIBAR, VOLT
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
+SCALE = Scale(800.0, 140.0, MILLIBAR)
+STEP_S = 0.1
+
+
+def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held: Any = None) -> Any:
+    rng = np.random.default_rng([seed, 9])
+    usable = rng.random(load.size) >= lost
+    held_out = np.zeros(load.size, dtype=bool) if held is None else held
+    return SimpleNamespace(
+        conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
+        held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
+        cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
+    )  # fmt: skip
+
+
+def _load(size: int, seed: int) -> Array:
+    rng = np.random.default_rng([seed, 4])
+    return np.interp(np.arange(size), np.linspace(0, size, 20), rng.uniform(0.0, 1.0, 20))
+
+
+def _past(session: Any, rate_per_s: float) -> Array:
+    return np.array([[1.0, math.exp(-rate_per_s * at)] for at in session.conditions.time_s])
+
+
+def _sessions(model: ExtendedModel, noise: float = 0.01, sizes: tuple[int, ...] = (300, 220)) -> list[Any]:
+    made = []
+    for seed, size in enumerate(sizes):
+        load = _load(size, seed)
+        at = Conditions(STEP_S * np.arange(size), load, STEP_S)
+        off = noise * np.random.default_rng(seed).standard_normal(size)
+        made.append(_session(load, 0.05 * seed + model.simulate(at) + off, seed))
+    return made
+
+
+# -- candidates -------------------------------------------------------------------------------------------------------
+def _candidate(*bounds: tuple[float, float, float]) -> Candidate:
+    """An effect of a shape and of strengths with such (null, lower, upper)."""
+    shape = SimpleNamespace(name="shape", null=None, lower=0.1, upper=9.0)
+    strengths = [SimpleNamespace(name=f"s{k}", null=n, lower=lo, upper=up) for k, (n, lo, up) in enumerate(bounds)]
+    one: Any = SimpleNamespace(
+        name="one", family="family", imitates="", parameters=(shape, *strengths),
+        start=lambda at: np.array([at["shape"], *(n for n, _, _ in bounds)]),
+    )  # fmt: skip
+    return Candidate(one, {"shape": 4.0}, tuple(range(len(bounds))))
+
+
+def test_strengths_begin_from_their_nulls_within_their_bounds() -> None:
+    one = _candidate((1.0, 0.5, 2.0), (0.0, -3.0, 3.0), (0.0, -1.0, 1.0))
+    assert list(one.start(np.array([0.25, -1.5, 0.5]))) == [4.0, 1.25, -1.5, 0.5]
+    assert list(one.start(np.array([9.0, -9.0, 9.0]))) == [4.0, 2.0, -3.0, 1.0]
+    assert list(one.start(np.array([-9.0, 9.0, 0.0]))) == [4.0, 0.5, 3.0, 0.0]
+
+
+def test_a_strength_has_the_sign_that_its_bounds_allow() -> None:
+    up, down, either = _candidate((0.0, 0.0, 5.0)), _candidate((0.0, -5.0, 0.0)), _candidate((0.0, -5.0, 5.0))
+    for one, told in ((up, (True, True, False)), (down, (False, True, True)), (either, (True, True, True))):
+        assert tuple(one.has_sign_of(np.array([by])) for by in (1.0, 0.0, -1.0)) == told
+    both = _candidate((0.0, 0.0, 5.0), (0.0, -5.0, 0.0))
+    assert both.has_sign_of(np.array([1.0, -1.0]))
+    assert not both.has_sign_of(np.array([1.0, 1.0]))
+    assert not both.has_sign_of(np.array([-1.0, -1.0]))
+
+
+def test_a_slot_is_a_family_or_the_one_that_is_imitated() -> None:
+    one = _candidate((0.0, 0.0, 5.0))
+    assert (one.name, one.slot) == ("one", "family")
+    other: Any = SimpleNamespace(**{**vars(one.effect), "imitates": "another"})
+    assert replace(one, effect=other).slot == "another"
+
+
+def test_an_effect_needs_its_channel_in_every_session() -> None:
+    def session(**more: Any) -> Any:
+        return SimpleNamespace(conditions=SimpleNamespace(**{"temperature_k": None, "neighbour": None, **more}))
+
+    bare, beside, warm = session(), session(neighbour=1), session(temperature_k=1)
+
+    def told(*sessions: Any) -> set[str]:
+        return {one.name for one in available(sessions)}
+
+    assert told(beside) - told(bare) == {"cross_talk"}
+    assert told(beside, bare) == told(bare)
+    assert told(warm) >= told(bare)
+    for one in available([bare]):
+        assert one.is_physical
+        assert one.shifts is None
+        assert not one.is_refinement
+        assert not one.needs
+
+
+# -- columns ----------------------------------------------------------------------------------------------------------
+def test_factors_are_of_load_direction_speed_and_time() -> None:
+    load = np.array([0.0, 0.1, 0.4, 0.8, 0.8, 0.8, 0.3])
+    time_s = 0.5 * np.arange(7)
+    session: Any = SimpleNamespace(conditions=Conditions(time_s, load, 0.5))
+    rate = np.gradient(load, 0.5)
+    for k in range(7):
+        x, e, v = 2.0 * load[k] - 1.0, 2.0 * time_s[k] / 3.0 - 1.0, rate[k]
+        expected = [x, 0.5 * (3.0 * x * x - 1.0), v / math.hypot(v, 0.004), math.log10((0.004 + abs(v)) / 0.004) - 1.0,
+                    e, 0.5 * (3.0 * e * e - 1.0)]  # fmt: skip
+        assert _factors(session, STANDARD)[k] == pytest.approx(expected)
+    single: Any = SimpleNamespace(conditions=Conditions(np.zeros(1), np.ones(1), 0.5))
+    assert _factors(single, STANDARD)[0, 4] == -1.0
+
+
+def test_a_lag_is_that_of_its_recursion() -> None:
+    signal, keep = _load(30, 1), math.exp(-0.1 / 0.7)
+    seen = [signal[0]]
+    for value in signal[1:]:
+        seen.append(keep * seen[-1] + (1.0 - keep) * value)
+    assert _lag(signal, 0.1, 0.7) == pytest.approx(seen)
+    assert lagged(signal, 0.1, 0.7) == pytest.approx(seen)
+
+
+def test_departures_are_factors_and_lags_of_the_signatures_own_rms() -> None:
+    sessions = _sessions(MODEL)
+    given: Any = SimpleNamespace(
+        sessions=sessions, thresholds=STANDARD, factors=tuple(_factors(one, STANDARD) for one in sessions)
+    )
+    own = [np.random.default_rng(k).standard_normal(one.reading.size) for k, one in enumerate(sessions)]
+    found = departures(given, own)
+    size = sum(float(np.sum(one[s.fitted] ** 2)) for one, s in zip(own, sessions, strict=True))
+    for column in range(9):
+        parts = []
+        for one, session in zip(own, sessions, strict=True):
+            if column < 6:
+                parts.append(one * _factors(session, STANDARD)[:, column])
+            else:
+                parts.append(_lag(one, STEP_S, STANDARD.memory_s[column - 6]) - one)
+        power = sum(float(np.sum(one[s.fitted] ** 2)) for one, s in zip(parts, sessions, strict=True))
+        for made, part in zip(found, parts, strict=True):
+            assert made[:, column] == pytest.approx(part * math.sqrt(size / power))
+    assert directions(STANDARD) == 9
+    assert directions(replace(STANDARD, memory_s=(1.0,))) == 7
+    nothing = departures(given, [0.0 * one for one in own])
+    assert all(not part.any() for part in nothing)
+
+
+def test_inner_products_are_of_what_the_nuisances_leave() -> None:
+    (session, _) = _sessions(MODEL)
+    rows = np.random.default_rng(2).standard_normal((300, 3))
+    past = _past(session, 0.3)[session.fitted]
+    seen = rows[session.fitted]
+    left = seen - past @ np.linalg.lstsq(past, seen, rcond=None)[0]
+    assert marginal(rows, session, MODEL) == pytest.approx(left.T @ left, rel=1e-7, abs=1e-7)
+
+
+def test_what_no_column_reaches_is_the_noise() -> None:
+    sessions = _sessions(MODEL, noise=0.05)
+    rng = np.random.default_rng(3)
+    rows = tuple(np.column_stack([one.reading, one.conditions.load, rng.standard_normal(one.reading.size)])
+                 for one in sessions)  # fmt: skip
+    given = Linearised(MODEL, tuple(sessions), rows, np.ones(3), 2, (), STANDARD)
+    wide = []
+    for k, (one, row) in enumerate(zip(sessions, rows, strict=True)):
+        own = np.zeros((row.shape[0], 4))
+        own[:, 2 * k : 2 * k + 2] = _past(one, 0.3)
+        wide.append(np.column_stack([row, own])[one.fitted])
+    whole = np.concatenate(wide)
+    found = np.linalg.lstsq(whole[:, 1:], whole[:, 0], rcond=None)[0]
+    left = []
+    for k, (one, row) in enumerate(zip(sessions, rows, strict=True)):
+        left.append(row[:, 0] - row[:, 1:] @ found[:2] - _past(one, 0.3) @ found[2 + 2 * k : 4 + 2 * k])
+    expected = correlated_sd(left, [one.fitted for one in sessions])
+    assert given.noise_sd() == pytest.approx(expected, rel=1e-6)
+    assert given.gram[0, 0] == pytest.approx(sum(marginal(r, s, MODEL)[0, 0] for r, s in zip(rows, sessions,
+                                                                                            strict=True)))  # fmt: skip
+
+
+@pytest.mark.parametrize(("share", "begun"), [(0.2, 0.5), (0.2, 0.01), (-0.2, -0.5), (0.0, 1.0)])
+def test_the_prior_of_a_past_is_of_what_the_arm_may_hold(share: float, begun: float) -> None:
+    session = _session(np.full(5, begun), np.zeros(5))
+    sd = max(abs(share) * 1.1 * max(abs(begun), 0.05), 1e-6)
+    found = nuisance_precision(session, replace(MODEL, relaxing_share=share), STANDARD)
+    assert found == pytest.approx(np.diag([0.0, sd**-2]))
+    turned = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=-1.1), STANDARD)
+    assert turned == pytest.approx(found)
+
+
+def test_columns_are_what_each_strength_does_to_the_reading() -> None:
+    model = MODEL.with_part("dead_band", np.array([0.05, 0.3])).with_part("delay", np.array([0.12]))
+    sessions = _sessions(model, sizes=(150, 120))
+    nothing = _session(_load(50, 5), np.zeros(50), lost=1.1)
+    found = linearised(model, [sessions[0], nothing, sessions[1]], STANDARD)
+    assert found.sessions == tuple(sessions)
+    assert (found.own, found.scales[0]) == (3, 1.0)
+    assert [one.columns for one in found.candidates[:2]] == [(4,), (5,)]
+    assert [one.name for one in found.candidates[:2]] == ["dead_band", "delay"]
+    assert (dict(found.candidates[0].shape), dict(found.candidates[1].shape)) == ({"softness": 0.3}, {})
+    outside = found.candidates[2:]
+    assert not {one.name for one in outside} & {"dead_band", "delay"}
+    place = 6
+    for one in outside:
+        count = sum(p.null is not None for p in one.effect.parameters)
+        assert one.columns == tuple(range(place, place + count))
+        place += count
+    assert found.rows[0].shape[1] == place == found.scales.size
+    for name in {one.name for one in outside}:
+        own = [dict(one.shape) for one in outside if one.name == name]
+        assert own == [dict(shape) for shape in effect_of(outside, name).shapes]
+    assert found.shapes["second_relaxation"] == len(effect("second_relaxation").shapes)
+    for row, session in zip(found.rows, sessions, strict=True):
+        at = session.conditions
+        plain = model.simulate(at)
+        within = [plain - model.without(name).simulate(at) for name in ("dead_band", "delay")]
+        assert row[:, 0] == pytest.approx(session.reading - plain + within[0] + within[1])
+        told = row * found.scales
+        slopes = model.sensitivities(at)[1]
+        assert told[:, 1:4] == pytest.approx(slopes[:, :3])
+        assert told[:, 4:6] == pytest.approx(np.column_stack(within))
+        for one in (one for one in outside if one.name in ("second_relaxation", "sensor_nonlinearity")):
+            start = one.effect.start(one.shape)
+            beside = model.extended_by(one.effect, start)
+            expected = model.column_of(beside, at, model.trace(at))
+            assert told[:, list(one.columns)] == pytest.approx(expected)
+    whole = np.concatenate([row[one.fitted] for row, one in zip(found.rows, sessions, strict=True)])
+    rms = np.sqrt(np.mean(whole[:, 1:] ** 2, axis=0))
+    assert rms[rms > 0.0] == pytest.approx(1.0)
+    assert list(found.scales[1:][rms == 0.0]) == [1.0] * int(np.sum(rms == 0.0))
+
+
+def effect_of(candidates: Any, name: str) -> Any:
+    return next(one.effect for one in candidates if one.name == name)
+
+
+# -- the baseline -----------------------------------------------------------------------------------------------------
+def _slow_baseline(sessions: list[Any]) -> tuple[float, float, float]:
+    best = (math.inf, 0.0, 0.0, 0.0)
+    for pole in np.geomspace(0.01, 50.0, 35):
+        rows = []
+        for one in (one for one in sessions if one.fitted.any()):
+            load = one.conditions.load
+            kept = one.fitted
+            seen = np.column_stack([one.reading, load, _lag(load, STEP_S, 1.0 / pole)])[kept]
+            past = _past(one, pole)[kept]
+            rows.append(seen - past @ np.linalg.lstsq(past, seen, rcond=1e-10)[0])
+        whole = np.concatenate(rows)
+        fast, slow = np.linalg.lstsq(whole[:, 1:], whole[:, 0], rcond=None)[0]
+        total = fast + slow
+        if total <= 0.0 or fast <= 0.0:
+            continue
+        share = min(max(total / fast - 1.0, -0.9), 5.0)
+        fast = total / (1.0 + share)
+        left = whole[:, 0] - whole[:, 1] * fast - whole[:, 2] * (total - fast)
+        best = min(best, (float(left @ left), total, share, pole))
+    _, total, share, pole = best
+    return total, share, pole * (1.0 + share)
+
+
+@pytest.mark.parametrize(("share", "rate"), [(0.1, 0.3), (0.5, 2.0), (-0.3, 0.5), (1.5, 0.1)])
+def test_the_baseline_is_the_best_of_written_out_least_squares(share: float, rate: float) -> None:
+    sessions = _sessions(replace(MODEL, relaxing_share=share, relaxation_rate_per_s=rate), noise=0.003)
+    sessions.append(_session(_load(60, 8), np.zeros(60), lost=1.1))
+    found = baseline_of(sessions, SCALE)
+    told = found.gain, found.relaxing_share, found.relaxation_rate_per_s
+    assert told == pytest.approx(_slow_baseline(sessions), rel=1e-5)
+    assert (found.full_scale_load_n, found.full_scale_reading, found.reading_unit) == (800.0, 140.0, "mbar")
+    assert found.wall_ratio == USUAL_WALL_RATIO
+
+
+@pytest.mark.parametrize(("fast", "slow"), [(0.1, 2.0), (5.0, -4.9)])
+def test_a_share_beyond_what_a_wall_can_have_is_held_at_its_bound(fast: float, slow: float) -> None:
+    sessions = _sessions(MODEL)
+    for one in sessions:
+        load = one.conditions.load
+        one.reading = fast * load + slow * _lag(load, STEP_S, 1.0 / 0.5)
+    found = baseline_of(sessions, SCALE)
+    told = found.gain, found.relaxing_share, found.relaxation_rate_per_s
+    assert -0.9 <= found.relaxing_share <= 5.0
+    assert told == pytest.approx(_slow_baseline(sessions), rel=1e-5)
+
+
+def test_a_reading_that_falls_under_load_has_a_plain_baseline() -> None:
+    sessions = _sessions(MODEL, noise=0.0)
+    for one in sessions:
+        one.reading = -one.conditions.load
+    found = baseline_of(sessions, SCALE)
+    assert (found.gain, found.relaxing_share, found.relaxation_rate_per_s) == (1.0, 0.0, 0.2)
+    usual = with_usual_arm(found)
+    assert (usual.gain, usual.relaxing_share, usual.relaxation_rate_per_s) == (1.0, 0.08, 0.22)
+    assert POLES_PER_S[[0, -1]] == pytest.approx([0.01, 50.0])
+
+
+@pytest.mark.parametrize(("ratio", "is_told"), [(1.019, False), (1.021, True), (49.9, True), (50.1, False)])
+def test_a_declared_area_tells_the_walls_ratio_within_what_can_be(ratio: float, is_told: bool) -> None:
+    pascal_per_newton = 1.1 * 140.0 * 100.0 / 800.0
+    session: Any = SimpleNamespace(
+        recording=SimpleNamespace(metadata={"effective_area_m2": 1.0 / (ratio * pascal_per_newton)})
+    )
+    found = _wall_ratio([session], 1.1, SCALE)
+    assert found == pytest.approx(ratio if is_told else USUAL_WALL_RATIO)
+    assert _wall_ratio([session], 1.1, replace(SCALE, unit=VOLT)) == USUAL_WALL_RATIO
+
+
+# -- what is held out -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("share", [0.1, -0.1, 0.0])
+def test_an_offset_and_a_past_are_ridge_estimates_of_what_was_fitted(share: float) -> None:
+    model = replace(MODEL, relaxing_share=share)
+    for held in (np.arange(220) > 150, np.ones(220, dtype=bool)):
+        one = _session(_load(220, 3), np.zeros(220), 3, held=held)
+        residual = 0.3 + 0.1 * np.random.default_rng(6).standard_normal(220)
+        mask = one.fitted if one.fitted.any() else one.usable
+        past = _past(one, 0.3)
+        holds = max(abs(share) * 1.1, 1e-6)
+        spread = np.std(residual[mask])
+        wide = np.concatenate([past[mask], [[0.0, spread / holds]]])
+        expected = np.linalg.lstsq(wide, np.append(residual[mask], 0.0), rcond=None)[0]
+        found, added = own_of(one, model, residual)
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
+        assert added == pytest.approx(past @ expected)
+    lost = _session(_load(50, 3), np.zeros(50), lost=1.1)
+    assert own_of(lost, model, np.ones(50))[0] == pytest.approx([0.0, 0.0])
+
+
+def test_errors_are_sums_over_held_out_cycles_and_deviations_from_each_mean() -> None:
+    sessions = _sessions(MODEL, noise=0.05)
+    held = []
+    for one in sessions:
+        held.append(_session(one.conditions.load, one.reading, 4, held=np.isin(one.cycle, [1, 4, 6])))
+    held[1].cycle[:] = np.minimum(held[1].cycle, 5)
+    found = errors([*held, sessions[0]], MODEL)
+    squares, counts, spread = [], [], 0.0
+    for one in held:
+        residual = residual_of(one, MODEL)
+        for number in range(7):
+            inside = [k for k in range(residual.size) if one.judged[k] and one.cycle[k] == number]
+            if inside:
+                squares.append(sum(residual[k] ** 2 for k in inside))
+                counts.append(len(inside))
+        values = one.reading[one.judged]
+        spread += float(np.sum((values - np.mean(values)) ** 2))
+    assert found.squares == pytest.approx(squares)
+    assert list(found.counts) == counts
+    assert found.spread == pytest.approx(math.sqrt(spread / sum(counts)))
+    expected = math.sqrt(sum(squares) / sum(counts))
+    assert found.rmse == pytest.approx(expected)
+    assert found.fit_percent == pytest.approx(100.0 * (1.0 - expected / found.spread))
+    level = replace(found, spread=0.0)
+    assert (level.fit_percent, level.variance_explained_percent) == (0.0, 0.0)
+
+
+def test_a_gain_is_of_norms_and_its_interval_of_draws_of_cycles() -> None:
+    rng = np.random.default_rng(3)
+    before = Errors(rng.uniform(1.0, 2.0, 12), np.full(12, 5.0), 1.0)
+    after = Errors(rng.uniform(0.1, 1.0, 12), np.full(12, 5.0), 1.0)
+    found = gain(before, after, SCALE)
+    drawn = np.random.default_rng(0).integers(0, 12, size=(400, 12))
+    again = [100.0 * (1.0 - math.sqrt(sum(after.squares[d]) / sum(before.squares[d]))) for d in drawn]
+    assert found.ci95 == pytest.approx((np.percentile(again, 2.5), np.percentile(again, 97.5)))
+    pair = gain(replace(before, squares=before.squares[:2]), replace(after, squares=after.squares[:2]), SCALE)
+    assert pair.ci95[0] < pair.gain_percent < pair.ci95[1]
+    assert float(_percent(0.0, 0.0)) == 100.0
+
+
+def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
+    """Of a model without an arm the force is the reading over the gain; its offset is the recording's own."""
+    plain = replace(MODEL, relaxing_share=0.0)
+    total, count = 0.0, 0
+    held = []
+    for seed, size in enumerate((200, 150)):
+        load = _load(size, seed)
+        noise = 0.02 * np.random.default_rng(seed).standard_normal(size)
+        one = _session(load, 1.1 * load + 0.2 + noise, seed, held=np.arange(size) > 0.4 * size)
+        held.append(one)
+        _, own = own_of(one, plain, one.reading - plain.simulate(one.conditions))
+        off = 800.0 * ((one.reading - own) / 1.1 - load)[one.judged]
+        total += float(off @ off)
+        count += off.size
+    unjudged = _session(_load(80, 1), np.zeros(80))
+    assert force_rmse_n([held[0], unjudged, held[1]], plain) == pytest.approx(math.sqrt(total / count), rel=1e-6)
+    assert math.isnan(force_rmse_n([unjudged], plain))
+
+
+# -- jitter -----------------------------------------------------------------------------------------------------------
+def test_a_load_is_smoothed_by_the_jitter_of_what_it_was_smoothed_to() -> None:
+    rng = np.random.default_rng(1)
+    time_s = 0.02 * np.arange(3000)
+    load = np.clip(3.0 * np.abs((time_s / 2.5) % 2.0 - 1.0) - 1.0, 0.0, 1.0)
+    reading = 1.3 * np.interp(time_s + 0.03 * rng.standard_normal(3000), time_s, load)
+    reading += 1e-3 * rng.standard_normal(3000)
+    seen = load
+    for _ in range(3):
+        sd = jitter_s(seen, reading, 0.02) / 0.02
+        assert sd > 1.0
+        seen = gaussian_filter1d(load, sd, mode="nearest")
+    assert as_sampled(load, reading, 0.02) == pytest.approx(seen)
+    assert jitter_s(0.0 * load, reading, 0.02) == 0.0
+    # Whatever the gain between them.
+    assert jitter_s(load, 7.0 * reading, 0.02) == pytest.approx(jitter_s(load, reading, 0.02))
