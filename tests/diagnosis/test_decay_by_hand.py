@@ -239,7 +239,7 @@ def test_an_order_is_that_of_a_fit_and_its_interval_of_two_standard_deviations(o
     assert found.order == pytest.approx(fitted, abs=1e-4)
     assert found.order_ci95 is not None
     assert np.mean(found.order_ci95) == pytest.approx(found.order)
-    first = int(round(onset_s / 0.1))
+    first = round(onset_s / 0.1)
     ordered = _fit(_of_order, T[first:] - T[first], reading[first:], [90.0, 15.0, order])
     assert found.order_ci95[1] - fitted == pytest.approx(1.959964 * float(ordered.sd[2]), rel=1e-2)
     _, tau_s, _ = _slow_found(reading, "exponential")

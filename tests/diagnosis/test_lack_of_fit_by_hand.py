@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -203,7 +204,7 @@ def _slow_quiet(rows: Array) -> list[int]:
 def _slow_loudness(rows: Array) -> Array:
     fast = []
     for row in rows:
-        jumps = [abs(b - a) for a, b in zip(row[:-1], row[1:], strict=True)]
+        jumps = [abs(b - a) for a, b in itertools.pairwise(row)]
         most = 2.0 * np.median(jumps) / 0.674489750196  # twice the standard deviation, by the median
         fast.append(sum(min(one, most) ** 2 for one in jumps) / len(jumps))
     usual = sum(fast[k] for k in _slow_quiet(rows)) / len(_slow_quiet(rows))

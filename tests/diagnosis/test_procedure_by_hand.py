@@ -105,7 +105,7 @@ CAUSES: Any = [SimpleNamespace(name="linear_leak")]
 
 
 def test_what_is_left_is_held_against_what_laws_depart_by_and_what_a_good_unit_leaves() -> None:
-    """A quarter of 0.04, where each cause has a law; what is tolerable else; and what is material, where that is more."""
+    """A quarter of 0.04, where each cause has a law; what is tolerable else; what is material, where that is more."""
     wrong = _left(0.04)
     for bound, follows, thresholds in (
         (0.01, True, STANDARD),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -234,7 +235,7 @@ def test_fewer_than_six_cycles_make_twelve_parts_of_the_time(rises: int, count: 
 
 def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
     load = _course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
-    dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in zip(load[:-1], load[1:], strict=True))
+    dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in itertools.pairwise(load))
     first = _left_behind(_conditions(load), STANDARD)
     assert first == pytest.approx({"largest_load": 0.9, "cycles": 2.0, "time_s": 90 * STEP_S, "dose": dose})
     before = {"largest_load": 0.95, "cycles": 7.0, "time_s": 30.0, "dose": 4.0}

@@ -262,7 +262,7 @@ def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_wa
         source = T + offset_s + rate * (T - middle)
         inside = (source >= 0.0) & (source <= T[-1])
         assert moved.sensor.values[inside] == pytest.approx(10.0 * source[inside])
-        nearest = [int(np.flatnonzero(T >= at - 1e-12)[0]) if at <= T[-1] else 399 for at in source]
+        nearest = [int(np.flatnonzero(at - 1e-12 <= T)[0]) if at <= T[-1] else 399 for at in source]
         expected = inside & kept[nearest]
         assert list(np.flatnonzero(usable != expected)) == []
         assert list(moved.force_n) == list(_run().force_n)
