@@ -253,7 +253,7 @@ def test_of_a_whole_stride_three_tenths_may_be_missing(gone: int, is_whole: bool
 # -- the window ----------------------------------------------------------------------------------------------------
 def test_a_window_has_the_samples_from_its_start_to_before_its_end() -> None:
     one = window(BOTH, start_s=2.0, end_s=3.0)
-    given = np.array([1.99, 2.0 - 2e-9, 2.0 - 0.5e-9, 2.0, 2.5, 3.0 - 2e-9, 3.0 - 0.5e-9, 3.0, 9.0])
+    given = np.array([1.99, 2.0 - 1.5e-9, 2.0 - 0.5e-9, 2.0, 2.5, 3.0 - 1.5e-9, 3.0 - 0.5e-9, 3.0, 9.0])
     assert one.own(given).tolist() == [False, False, True, True, True, True, False, False, False]
     assert one.contacts == {"left": BOTH["left"].contacts, "right": BOTH["right"].contacts}
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from windows import BOTH, TIME_S, contacts, foot, series, stride, window
 
-from smartshoe.gait import Contacts
+from smartshoe.gait import Contacts, Coverage
+from smartshoe.gait._trial import feet_of
 from smartshoe.gait._trial_sums import TrialSums
-from smartshoe.gait._window import AnalysisWindow
+from smartshoe.gait._window import AnalysisWindow, analyse_window
+from smartshoe.recording import Recording
 
 
 def trial_sums(*windows: AnalysisWindow, reference: Any = None) -> TrialSums:
@@ -103,3 +105,47 @@ def test_sequence_errors_are_a_share_of_the_strides_judged() -> None:
     for starts in ([0.0, 1.0], [2.0, 3.0]):
         sums.add(window(made, strides=[stride(start_s) for start_s in starts]))
     assert sums.indices()["left"]["sequence_error_percent"] == pytest.approx(25.0)
+
+
+# -- a window that is analysed -------------------------------------------------------------------------------------
+def worn(right_column: str = "right_heel_n") -> dict[str, Any]:
+    """20 s of a walk: 0.6 s down in each second, 400 N in the left foot and 300 in the right, half a second apart."""
+    loads = [peak_n * ((TIME_S + shift_s) % 1.0 < 0.6) for peak_n, shift_s in ((400.0, 0.3), (300.0, 0.8))]
+    made = Recording.from_arrays(time_s=TIME_S, name="walk", left_heel_n=loads[0], **{right_column: loads[1]})
+    return feet_of([made], ())[0]
+
+
+def steps(first_s: float, count: int = 19) -> Contacts:
+    strikes = first_s + np.arange(float(count))
+    return contacts(strikes.tolist(), (strikes + 0.6).tolist(), regions=("heel",))
+
+
+STEPS = {"left": steps(0.7), "right": steps(0.2)}
+
+
+def test_a_window_holds_the_strides_that_begin_in_it_and_the_spans_forces_and_peaks_beside_them() -> None:
+    feet, peaks = worn(), {"left": [np.array([900.0])], "right": []}
+    whole = analyse_window(feet, STEPS, Coverage(0.8), None)
+    assert (whole.start_s, whole.end_s, whole.spans) == (-np.inf, np.inf, ())
+    assert whole.loaded == {"left": True, "right": True}
+    assert len(whole.strides) == 36
+    assert whole.total is not None
+    assert whole.total.force_n == pytest.approx(sum(foot.load.sum(axis=1) for foot in feet.values()) / 0.8)
+    part = analyse_window(feet, STEPS, Coverage(0.8), 9e3, peaks=peaks, start_s=4.7, end_s=6.7)
+    assert [(one.foot, round(one.start_s, 6)) for one in part.strides] == [
+        ("left", 4.7), ("right", 5.2), ("left", 5.7), ("right", 6.2),
+    ]  # fmt: skip
+    assert part.loaded == {"left": False, "right": False}  # for somebody of 9 kN
+    # Stances that end from 4.7 s on and before 6.7 s: the left ones at 5.3 and 6.3, the right ones at 4.8 and 5.8 s.
+    assert [[float(one[0]) for one in own] for own in peaks.values()] == [[900.0, 400.0, 400.0], [300.0, 300.0]]
+    assert (part.series["left"].usual_peak[0], part.series["right"].usual_peak[0]) == (400.0, 300.0)
+    assert part.series["left"].force_n == pytest.approx(feet["left"].load.sum(axis=1) / 0.8)
+
+
+def test_where_one_foot_is_no_force_there_is_no_whole_force() -> None:
+    feet = worn("right_heel_mbar")
+    found = analyse_window(feet, STEPS, Coverage(), None)
+    assert found.total is None
+    assert found.loaded == {"left": True, "right": False}
+    assert found.series["right"].force_n is None
+    assert len(found.strides) == 36

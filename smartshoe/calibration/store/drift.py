@@ -238,12 +238,9 @@ def _fit_of(days: Array, values: Array, sds: Array, pieces: Index) -> tuple[_Tre
     Where the slope is not determined (each piece has one date) the levels alone, and None.
     """
     levels = (pieces[:, None] == np.arange(int(pieces[-1]) + 1)).astype(float)
-    span = float(np.ptp(days)) or 1.0
-    found = _fit(np.column_stack([levels, (days - days.mean()) / span]), values, sds)
+    found = _fit(np.column_stack([levels, days - days.mean()]), values, sds)
     if found is not None:
-        per_day = np.zeros(found.theta.size)
-        per_day[-1] = 1.0 / span
-        return found, per_day
+        return found, np.eye(found.theta.size)[-1]
     found = _fit(levels, values, sds)
     if found is None:  # a level a piece is always determined: nothing but broken numbers gets here
         raise UsageError(
