@@ -98,11 +98,13 @@ def test_a_stance_that_is_cut_is_as_long_as_the_usual_one(
     starts = [*strikes[:1], *whole[0], *strikes[1:]] if np.isnan(strikes[0]) else [*whole[0], *strikes]
     stops = [*offs[:1], *whole[1], *offs[1:]] if np.isnan(strikes[0]) else [*whole[1], *offs]
     found = made.whole(borne, TIME_S, contacts(starts, stops))
+    later = made.whole(borne, 500.0 + TIME_S, contacts(500.0 + np.array(starts), 500.0 + np.array(stops)))
     expected = np.full(1000, 125.0)
     for begin_s, end_s in zip([1.0, 2.0, 3.0, *begins], [1.6, 2.8, 4.0, *ends], strict=True):
         inside = (begin_s - 1e-9 <= TIME_S) & (end_s - 1e-9 > TIME_S)
         expected[inside] = 100.0 + 100.0 * (TIME_S[inside] - begin_s) / (end_s - begin_s)
     assert found == pytest.approx(expected)
+    assert later == pytest.approx(expected, abs=3.0)  # a sample more or less
 
 
 def test_without_a_whole_stance_a_cut_one_has_the_even_share() -> None:
@@ -124,7 +126,7 @@ def test_what_is_no_course_is_told(tmp_path: Any) -> None:
     Coverage.midfoot(0.8).save(path)
     whole = path.read_text().splitlines()
     plain = [line for line in whole if "least" not in line]
-    path.write_text("\n".join(["# a remark", *plain]))
+    path.write_text("\n".join(["# a remark", *plain]).replace("# c", "#c"))
     assert Coverage.load(path) == replace(Coverage.midfoot(0.8), least_stance_s=0.0)
     for lines, says in (
         (whole[1:], "give a '# coverage:' line"), (whole[:-1], "101 rows"), ([*whole, "101,0.0"], "101 rows"),

@@ -77,6 +77,19 @@ def test_forces_of_feet_in_other_units_are_not_known() -> None:
     assert summed(window(BOTH, RISING, [stride(0.5)])).forces(710.5).body_weight == BodyWeight(710.5, 0.0, "given")
 
 
+@pytest.mark.parametrize("start_s", [-3.0, 500.0])
+def test_a_weight_does_not_know_when_the_clock_began(start_s: float) -> None:
+    time_s, missing = start_s + TIME_S, np.zeros(2001, dtype=bool)
+    missing[50:75] = True
+    made = {name: series(300.0, TIME_S < 5.0, time_s=time_s) for name in ("left", "right")}
+    strides = [stride(start_s + at, 2.0) for at in (0.495, 2.495)]
+    spans = [(start_s + 8.0, start_s + 12.0)]
+    later = four(summed(window(made, RISING, strides, spans, missing=missing, time_s=time_s)).forces(None))
+    # A quarter of a second is missing of 2 s; 675 and 775 N for 4 s, and 1100 N for 3.01 s.
+    assert later[1:3] == pytest.approx(((4.0 * 724.75 + 3.01 * 1100.0) / 7.01, 1100.0))
+    assert later[0] == BodyWeight(pytest.approx(724.75), pytest.approx(50.0), "strides")
+
+
 # -- weight from standing ------------------------------------------------------------------------------------------
 def test_standing_counts_once_it_has_settled() -> None:
     total_n = np.full(2001, 1e6)

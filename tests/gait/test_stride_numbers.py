@@ -119,6 +119,14 @@ def test_samples_are_missed_in_one_piece_or_by_their_share(gone: list[tuple[int,
     assert found.gap == gap
 
 
+@pytest.mark.parametrize(("count", "gap"), [(30, False), (31, True)])
+def test_what_a_stride_misses_is_counted_from_its_first_sample(count: int, gap: bool) -> None:
+    missing = NOTHING_GONE.copy()
+    missing[: 2 * count : 2] = True
+    (found,) = strides_of("left", contacts([0.0, 1.0], [0.6, 1.6]), samples(12.0), None, missing)
+    assert found.gap == gap
+
+
 @pytest.mark.parametrize(
     ("left", "right", "right_start_s", "runs"),
     [

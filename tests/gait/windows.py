@@ -42,13 +42,13 @@ def series(load: Any, state: Any = 1, missing: Any = False, time_s: np.ndarray =
 
 def window(
     made: Any, total_n: Any = None, strides: Any = (), spans: Any = (), start_s: float = -np.inf,
-    end_s: float = np.inf, missing: Any = False, loaded: Any = None,
+    end_s: float = np.inf, missing: Any = False, loaded: Any = None, time_s: np.ndarray = TIME_S,
 ) -> AnalysisWindow:  # fmt: skip
     """A window of feet whose ``made`` series are all that is asked of them."""
     total = None
     if total_n is not None:
-        gone = np.array(np.broadcast_to(missing, TIME_S.shape))
-        total = TotalForce(TIME_S, np.array(np.broadcast_to(total_n, TIME_S.shape), dtype=float), gone)
+        gone = np.array(np.broadcast_to(missing, time_s.shape))
+        total = TotalForce(time_s, np.array(np.broadcast_to(total_n, time_s.shape), dtype=float), gone)
     return AnalysisWindow(start_s, end_s, made, made, tuple(strides), tuple(spans), loaded or {}, total, ())
 
 
