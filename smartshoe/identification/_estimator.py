@@ -99,11 +99,9 @@ _WHY = {
 
 
 def _noise(problem: PredictionError, noise: Mapping[str, float | None]) -> dict[str, float]:
-    load, reading = noise["load"], noise["reading"]
-    if load is None or reading is None:
-        seen = noise_sds(problem.experiments)
-        load, reading = (seen[0] if load is None else load), (seen[1] if reading is None else reading)
-    return {"load": load, "reading": reading}
+    load, reading = noise_sds(problem.experiments)
+    known = {"load": noise["load"], "reading": noise["reading"]}
+    return {"load": load, "reading": reading} | {name: sd for name, sd in known.items() if sd is not None}
 
 
 def _output_error(problem: PredictionError, method: str, prefilter_rad_s: float, limits: Termination) -> ParameterFit:

@@ -183,7 +183,7 @@ def _require_identifiable(experiments: Sequence[Experiment], recordings: Sequenc
         ends = [(float(signal.min()), float(signal.max())) for signal in signals]
         largest = max(max(abs(low), abs(high)) for low, high in ends)
         spread = max(high - low for low, high in ends)
-        if spread <= 1e-12 * largest or spread == 0.0:
+        if spread <= 1e-12 * largest:
             raise NotIdentifiableError(
                 f"{where}: the {what} is constant, a single static level: record a load that rises and falls"
             )

@@ -340,3 +340,14 @@ def test_correlations_of_the_fit_are_carried_to_what_is_told(pair: list[Experime
     fit = fitted(pair, theta, direction="forward", options={"offset": 0.0}, covariance=covariance)
     load = concluded(fit, load_zero_free=True).load_offsets["a"]
     assert load.sd == pytest.approx(_spread({4: -1.0 / 0.5, 2: 12.0 / 0.5**2}, covariance))
+
+
+def test_a_summary_has_six_digits_of_a_number_and_two_of_its_error(pair: list[Experiment]) -> None:
+    theta, sd = _with(0, np.log(0.251234567)), _with(0, 0.02345678, SD)
+    found = concluded(fitted(pair, theta, sd))
+    table = found._summary_table()
+    rows = {row[0]: row[1:] for row in table.rows}
+    one = found.parameters["a1"]
+    assert rows["a1"] == ["0.251235", "0.0059", f"{one.ci95[0]:.6g}", f"{one.ci95[1]:.6g}", "1/s"]
+    assert list(rows) == ["a1", "b0", "b1", "k1", "k2", "c", "delay", "offset (a)", "offset (b)"]
+    assert rows["delay"][:2] == ["0.1", "0.0001"]
