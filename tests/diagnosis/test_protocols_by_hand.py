@@ -318,6 +318,7 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
     ):
         (said,) = replace(rich, **changes).limits()  # type: ignore[arg-type]
         assert words in said
+    assert len(replace(rich, rates_per_s=(0.1,), peaks=(1.0,)).limits()) == 2
     # Without any rise the rate is said alone.
     (said,) = replace(rich, rates_per_s=(), peaks=()).limits()
     assert "one loading rate only" in said

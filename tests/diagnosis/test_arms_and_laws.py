@@ -1,0 +1,205 @@
+"""Which arms and laws are tried in the place of others, and which stay: by fits that are told beforehand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from told_evidence import STANDARD
+
+from smartshoe.diagnosis import _arms, _inference, _laws
+from smartshoe.diagnosis._arms import arms_of, effect_count, is_stretched
+from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, with_laws, with_likelier_laws
+from smartshoe.models.effects import blocks, catalogue, effect
+from smartshoe.models.extended import ExtendedModel
+
+MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
+
+
+# -- arms -------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("share", "rate", "stretched"),
+    [(0.1, 0.3, False), (-0.9, 0.3, True), (5.0, 0.3, True), (0.1, 0.01, True), (0.1, 50.0, True),
+     (-0.899, 49.9, False), (4.99, 0.0101, False)],
+)  # fmt: skip
+def test_an_arm_at_a_bound_is_stretched(share: float, rate: float, stretched: bool) -> None:
+    assert is_stretched(ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")) is stretched
+
+
+def test_an_arm_that_creeps_is_one_of_a_share_above_nothing() -> None:
+    for share, count in ((0.1, 1), (0.0, 0)):
+        model = MODEL.with_part("second_relaxation", np.array([share, 5.0])).with_part("dead_band")
+        assert len(arms_of(model)) == count
+    assert effect_count(ExtendedModel(1.0, 0.0, 0.3, 800.0, 140.0, "mbar")) == 0
+
+
+def test_a_latency_is_the_best_that_is_not_there_yet_beside_a_usual_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    late = [effect(name) for name in ("delay", "sensor_lag", "clock_drift", "linear_leak")]
+    latencies = [one.name for one in late if one.is_latency]
+    assert len(latencies) > 1
+    begun: list[Any] = []
+
+    def begin(one: Any, bare: ExtendedModel, likelihood: Any) -> Any:
+        begun.append((one.name, bare.names, bare.relaxing_share, bare.relaxation_rate_per_s))
+        return one.name
+
+    monkeypatch.setattr(_arms, "available", lambda sessions: late)
+    monkeypatch.setattr(_arms, "begun_with", begin)
+    monkeypatch.setattr(_arms, "fit", lambda likelihood, name: SimpleNamespace(model=name, cost=-len(name)))
+    monkeypatch.setattr(_arms, "state_at", lambda found, *given: found.model)
+    likelihood = SimpleNamespace(sessions=())
+    stretched = ExtendedModel(1.0, 5.0, 50.0, 800.0, 140.0, "mbar").with_part("delay")
+    state: Any = SimpleNamespace(
+        fit=SimpleNamespace(model=stretched), likelihood=lambda sessions: likelihood, thresholds=STANDARD
+    )
+    expected = [name for name in latencies if name != "delay"]
+    assert _arms.with_a_latency(state, []) == max(expected, key=len)  # type: ignore[comparison-overlap]
+    assert begun == [(name, ("delay",), 0.08, 0.22) for name in expected]
+
+
+def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best by cost and odds against effects: an arm of the baseline's that falls is one."""
+    model = ExtendedModel(1.0, -0.1, 0.3, 800.0, 140.0, "mbar").with_part("second_relaxation", np.array([0.2, 5.0]))
+    starts: list[Any] = []
+
+    def searched(start: ExtendedModel, sessions: Any, thresholds: Any) -> Any:
+        starts.append((start.names, start.relaxing_share, start.relaxation_rate_per_s))
+        return "given", None, "best"
+
+    costs = {1.0 / 0.3: 50.0, 1.0 / 3.0: 45.0, 1.0 / 30.0: 100.0, 0.2: 40.0}
+
+    def fitted(likelihood: Any, start: ExtendedModel, steps: int) -> Any:
+        rate = start.relaxation_rate_per_s
+        share = -0.1 if rate == 0.2 else 0.1  # it has come to fall
+        ended = ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")
+        return SimpleNamespace(model=ended, cost=costs[rate], steps=steps)
+
+    monkeypatch.setattr(_arms, "searched", searched)
+    monkeypatch.setattr(_arms, "with_members", lambda given, best, start, likelihood: start)
+    monkeypatch.setattr(_arms, "fit", fitted)
+    monkeypatch.setattr(_arms, "state_at", lambda found, *given: found)
+    for odds, rate in ((10.0, 1.0 / 3.0), (1.0, 0.2)):
+        state: Any = SimpleNamespace(
+            fit=SimpleNamespace(model=model), likelihood=lambda sessions: None, thresholds=STANDARD,
+            evidence=SimpleNamespace(odds=odds),
+        )  # fmt: skip
+        found: Any = _arms.with_an_arm_that_creeps(state, [])
+        assert found.model.relaxation_rate_per_s == rate
+    memories = [((), 0.08, 1.0 / tau_s) for tau_s in STANDARD.memory_s]
+    assert starts[:4] == [*memories, ((), pytest.approx(0.2), pytest.approx(0.2))]
+    starts.clear()
+    rates: list[float] = []
+
+    def poled(likelihood: Any, start: ExtendedModel, steps: int) -> Any:
+        rates.append(start.relaxation_rate_per_s)
+        assert (start.names, start.relaxing_share, steps) == ((), 0.08, 4)
+        return SimpleNamespace(model=start, cost=costs[start.relaxation_rate_per_s])
+
+    monkeypatch.setattr(_arms, "fit", poled)
+    best: Any = _arms.with_another_pole(state, [])
+    assert rates == [1.0 / tau_s for tau_s in STANDARD.memory_s]
+    assert best.model.relaxation_rate_per_s == 1.0 / 3.0
+
+
+@pytest.mark.parametrize(("simpler", "ends"), [(True, "tried b"), (False, "first")])
+def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
+    monkeypatch: pytest.MonkeyPatch, simpler: bool, ends: str
+) -> None:
+    tried: list[Any] = []
+
+    def swapped(model: Any, arm: Any) -> Any:
+        tried.append((model, arm))
+        return f"{model} {arm}"
+
+    def state(name: str) -> Any:
+        model = SimpleNamespace(names=(), parts=(), without=lambda other: f"without {other}")
+        return SimpleNamespace(
+            name=name, fit=SimpleNamespace(model=model), chosen=(), improved=0.0, thresholds=None, banned=("z",),
+            evidence=SimpleNamespace(odds=10.0), likelihood=lambda sessions: None,
+        )  # fmt: skip
+
+    banned: list[Any] = []
+
+    def stated(found: Any, sessions: Any, thresholds: Any, without: Any) -> Any:
+        banned.append(without)
+        return state(f"tried {found[-1]}")
+
+    monkeypatch.setattr(_inference, "arms_of", lambda model: [("a", "arm a"), ("b", "arm b")])
+    monkeypatch.setattr(_inference, "with_arm", swapped)
+    monkeypatch.setattr(_inference, "fit", lambda likelihood, model: model)
+    monkeypatch.setattr(_inference, "_is_simpler", lambda *given: simpler)
+    monkeypatch.setattr(_inference, "state_at", stated)
+    assert _inference._settled(state("first"), [], lambda said: None).name == ends  # type: ignore[attr-defined]
+    assert tried == [("without a", "arm a"), ("without b", "arm b")]
+    assert banned == [("z",), ("z",)] * simpler
+
+
+# -- laws -------------------------------------------------------------------------------------------------------------
+def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    curve = next(one for family in blocks().values() for one in family if one.is_memoryless)
+    other = next(one for family in blocks().values() for one in family if not one.is_memoryless)
+    curves = {one.name for family in blocks().values() for one in family if one.is_memoryless}
+    assert set(_replaced_with(curve)) == curves
+    assert _replaced_with(other) == (other.name,)
+    chosen = (SimpleNamespace(effect=curve), SimpleNamespace(effect=effect("dead_band")), SimpleNamespace(effect=other))
+    state: Any = SimpleNamespace(chosen=chosen, thresholds=STANDARD, banned=("z",), likelihood=lambda sessions: None)
+    asked: list[Any] = []
+    bound = STANDARD.departure**2
+    for missed, banned in ((0.999 * bound, _replaced_with(curve)), (bound, ())):
+        asked.clear()
+
+        def law_of(block: Any, one: Any, likelihood: Any, missed: float = missed) -> Any:
+            asked.append(block.effect)
+            return (missed, "law") if block.effect is curve else None
+
+        monkeypatch.setattr(_laws, "_law_of", law_of)
+        monkeypatch.setattr(
+            _laws, "state_at",
+            lambda law, sessions, thresholds, without: SimpleNamespace(
+                law=law, banned=without, thresholds=STANDARD, likelihood=lambda sessions: None
+            ),
+        )  # fmt: skip
+        found: Any = with_laws(state, [])
+        assert (found.law, found.banned) == ("law", ("z", *banned))
+        assert asked == [curve, other]
+    monkeypatch.setattr(_laws, "_law_of", lambda *given: None)
+    assert with_laws(state, []) is state
+
+
+def test_likelier_laws_take_their_members_places_and_ban_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_laws, "begun_with", lambda law, model, likelihood: model.with_part(law))
+    monkeypatch.setattr(_laws, "fit", lambda likelihood, model: model)
+    monkeypatch.setattr(_laws, "state_at", lambda found, sessions, thresholds, banned: (found.names, banned))
+    state: Any = SimpleNamespace(likelihood=lambda sessions: None, thresholds=STANDARD, banned=("z",))
+    model = MODEL.with_part("linear_leak").with_part("dead_band")
+    told: Any = with_likelier_laws(state, model, {"linear_leak": "orifice_leak"}, [])
+    assert told == (("dead_band", "orifice_leak"), ("z", "linear_leak"))
+
+
+def test_a_law_begins_from_all_its_shapes_small_and_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    law = effect("second_relaxation")
+    begun: list[Any] = []
+
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
+        begun.append((tuple(model.parts[-1].values), steps))
+        return SimpleNamespace(model=model, cost=-len(begun))
+
+    monkeypatch.setattr(_laws, "fit", fitted)
+    found: Any = _laws._begun(law, MODEL, None)  # type: ignore[arg-type]
+    starts = [tuple(law.begun(shape, sizes)) for shape in law.shapes for sizes in (0.5, 5.0)]
+    assert begun[:-1] == [(start, 1) for start in starts]
+    assert begun[-1] == (starts[-1], 4)  # the best of them goes on
+    assert found.model.parts[-1].effect is law
+
+
+def test_only_a_shape_within_its_bounds_is_not_stretched() -> None:
+    law = next(one for one in catalogue().values() if any(p.null is None for p in one.parameters))
+    k, shape = next((k, p) for k, p in enumerate(law.parameters) if p.null is None)
+    for value, stretched in ((shape.lower, True), (shape.upper, True), (0.5 * (shape.lower + shape.upper), False)):
+        values = law.start()
+        for j, parameter in enumerate(law.parameters):
+            if parameter.null is None:
+                values[j] = 0.5 * (parameter.lower + parameter.upper)
+        values[k] = value
+        assert _is_stretched(MODEL.with_part(law, values)) is stretched

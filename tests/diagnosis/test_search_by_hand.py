@@ -1,0 +1,274 @@
+"""Which effects are found, by evidence that is told beforehand: additions, steps, states, members, folds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, worth
+
+from smartshoe.diagnosis import _members, _state, _validation
+from smartshoe.diagnosis._evidence import Posterior
+from smartshoe.diagnosis._held_out import residual_of
+from smartshoe.diagnosis._members import alternatives, begun_with, members_of
+from smartshoe.diagnosis._search import additions, allowed, search, step
+from smartshoe.diagnosis._validation import LeftOut, _folds, _in_standard_errors, apart, error_of, extrapolating
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
+
+
+# -- additions and steps ----------------------------------------------------------------------------------------------
+def test_members_far_larger_than_all_together_cancel() -> None:
+    evidence: Any = ToldEvidence([candidate("a"), candidate("b")], worth(1.0, 1.0))
+    found = evidence.posterior((0, 1))
+    for together, is_allowed in ((2.5, True), (2.499, False)):
+        assert allowed(evidence, replace(found, sizes=(3.0, 4.0), together=together)) is is_allowed
+
+
+def test_a_new_member_of_one_strength_has_its_sign() -> None:
+    def told(inside: tuple[str, ...], strengths: Array) -> bool:
+        evidence: Any = ToldEvidence([candidate("a"), candidate("b", sign=-1.0)], worth(1.0, 1.0), inside)
+        evidence.strengths[1] = strengths
+        return allowed(evidence, evidence.posterior((0, 1)))
+
+    assert told((), np.array([-1.0]))
+    assert not told((), np.array([1.0]))
+    assert told(("b",), np.array([1.0]))  # within a fit its bounds hold it
+    assert not told(("a",), np.array([1.0]))
+    assert told((), np.array([1.0, 1.0]))
+
+
+def test_additions_are_the_best_shape_of_each_effect_in_order() -> None:
+    candidates = [candidate("a"), candidate("a"), candidate("b", "of b"), candidate("c", "of b"),
+                  candidate("d", sign=-1.0), candidate("e")]  # fmt: skip
+    evidence: Any = ToldEvidence(candidates, worth(1.0, 5.0, 3.0, 4.0, 9.0, 2.0))
+    assert additions(evidence, (), 10) == [1, 3, 2, 5]
+    assert additions(evidence, (), 2) == [1, 3]
+    assert additions(evidence, (2,), 10) == [1, 5]
+    assert additions(evidence, (), 10, ("a",)) == [3, 2, 5]
+    evidence.strengths[4] = np.ones(2)
+    assert additions(evidence, (), 1) == [4]
+    inside: Any = ToldEvidence(candidates, worth(1.0, 5.0, 3.0, 4.0, 9.0, 2.0), ("d",))
+    assert additions(inside, (), 1) == [4]
+    first: Any = ToldEvidence([candidate("a"), candidate("a")], worth(5.0, 5.0))
+    assert additions(first, (), 5) == [0]
+    assert len(additions(ToldEvidence([candidate(f"n{k}") for k in range(9)], worth(*range(9))), ())) == 5  # type: ignore[arg-type]
+
+
+def test_a_step_adds_drops_or_swaps_for_the_better() -> None:
+    candidates = [candidate(f"n{k}") for k in range(9)]
+    added: Any = ToldEvidence(candidates, worth(1.0, 7.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert step(added, (0,)).members == (0, 1)
+    dropped: Any = ToldEvidence(candidates, worth(*[-1.0] * 9))
+    assert step(dropped, (0, 1)).members in ((0,), (1,))
+    assert step(dropped, ()).members == ()
+    # Two that are worth nothing beside each other, each better than the first.
+    table = {(0,): 90.0, (1,): 50.0, (2,): 60.0}
+    swapped: Any = ToldEvidence(candidates[:3], lambda members: table.get(members, 100.0))
+    assert step(swapped, (0,)).members == (1,)
+    assert step(swapped, (0,), ("n1",)).members == (2,)
+    # No more than seven; of eight one may go.
+    full: Any = ToldEvidence(candidates, worth(*[1.0] * 9))
+    assert len(step(full, tuple(range(6))).members) == 7
+    assert len(step(full, tuple(range(7))).members) == 7
+    # A set that is not allowed is none.
+    wrong: Any = ToldEvidence([candidate("a", sign=-1.0), candidate("b")], worth(9.0, -3.0))
+    wrong.strengths[0] = np.ones(1)
+    assert step(wrong, (1,)).members == ()
+
+
+def test_a_search_goes_on_while_it_gains() -> None:
+    evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(4)], worth(5.0, 3e-6, 0.5e-6, -1.0))
+    assert search(evidence).members == (0, 1)
+    assert search(evidence, (2, 3)).members[0] == 0
+    assert search(evidence, (), ("n0",)).members == (1,)
+
+
+# -- states -----------------------------------------------------------------------------------------------------------
+def test_what_is_so_large_that_it_bends_is_taken_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More than a hundredth, of what is not in the model already."""
+    given: Any = SimpleNamespace(candidates=[candidate("a"), candidate("b")], noise_sd=lambda: 0.5)
+    told: list[Any] = []
+    monkeypatch.setattr(_state, "linearised", lambda *args: given)
+    monkeypatch.setattr(_state, "Evidence", lambda given, noise_sd: ("evidence", noise_sd))
+    monkeypatch.setattr(_state, "search", lambda evidence, members, banned: told.append((members, banned)) or "all")
+    model: Any = SimpleNamespace(names=("a",))
+    for size, answer in ((0.01, "all"), (0.0101, "first")):
+        first = Posterior((0, 1), 0.0, (), (0.5, size), ())
+        seen: list[Any] = []
+
+        def stepped(evidence: Any, start: Any, banned: Any, first: Any = first, seen: list[Any] = seen) -> Posterior:
+            seen.append((evidence, start, banned))
+            return first
+
+        monkeypatch.setattr(_state, "step", stepped)
+        found = _state.searched(model, [], STANDARD, ("z",))
+        assert found[:2] == (given, ("evidence", 0.5))
+        assert found[2] == (first if answer == "first" else "all")
+        assert seen == [(("evidence", 0.5), (0,), ("z",))]
+    assert told == [((0, 1), ("z",))]
+
+
+def test_new_effects_begin_on_the_best_part_of_the_way() -> None:
+    """Of the whole way, a half, a fifth and a twentieth; those that were not found go, those that are there stay."""
+    one, two = effect("sensor_nonlinearity"), effect("delay")
+    candidates = [
+        SimpleNamespace(name=one.name, effect=one, columns=(1, 2, 3), start=lambda s: np.array(s, dtype=float)),
+        SimpleNamespace(name=two.name, effect=two, columns=(4,), start=lambda s: np.array(s, dtype=float)),
+    ]
+    given: Any = SimpleNamespace(candidates=candidates, scales=np.array([1.0, 2.0, 4.0, 5.0, 10.0]))
+    found = Posterior((0, 1), 0.0, (np.array([0.2, 0.4, 0.5]), np.array([3.0])), (), ())
+    model = MODEL.with_part(two, np.array([0.07])).with_part("dead_band", np.array([0.05, 0.2]))
+    for length in (1.0, 0.5, 0.2, 0.05):
+        likelihood: Any = SimpleNamespace(cost=lambda trial, length=length: abs(float(trial.theta[-3]) - length * 0.1))
+        begun = _state.with_members(given, found, model, likelihood)
+        assert begun.names == ("delay", "sensor_nonlinearity")
+        assert begun.theta[3:] == pytest.approx([0.07, 0.1 * length, 0.1 * length, 0.1 * length])
+    kept = _state.with_members(given, replace(found, members=(1,), strengths=found.strengths[1:]), model, likelihood)
+    assert kept.names == ("delay",)
+
+
+# -- members ----------------------------------------------------------------------------------------------------------
+def test_members_are_weighed_against_what_could_stand_in_their_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    candidates = [candidate("a", "x"), candidate("b"), candidate("a", "x"), candidate("c", is_flexible=True),
+                  candidate("d"), candidate("e", sign=-1.0)]  # fmt: skip
+    evidence: Any = ToldEvidence(candidates, worth(50.0, 20.0, 49.0, 30.0, 10.0, 40.0))
+    best = evidence.posterior((0, 1))
+    near = alternatives(evidence, best, 0, ())
+    # Nothing, and d in its place; not itself at another shape, no flexible block, none that cancels or has no sign.
+    assert [(one.effect, one.margin) for one in near] == [("d", 40.0), (None, 50.0)]
+    assert [one.effect for one in alternatives(evidence, best, 0, ("d",))] == [None]
+
+
+def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, two = effect("linear_leak"), effect("dead_band")
+    candidates = [SimpleNamespace(name=e.name, effect=e, columns=(k,), slot=e.family) for k, e in enumerate((one, two))]
+    evidence: Any = SimpleNamespace(given=SimpleNamespace(candidates=candidates), thresholds=STANDARD)
+    sizes = {"linear_leak": STANDARD.material, "dead_band": 2.0 * STANDARD.material}
+    costs = {(): 500.0, ("dead_band",): 130.0, ("linear_leak",): 170.0}
+    asked: list[Any] = []
+
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
+        asked.append(steps)
+        return SimpleNamespace(model=model, cost=costs.get(model.names, 103.0 + len(model.names[-1])))
+
+    monkeypatch.setattr(_members, "fit", fitted)
+    monkeypatch.setattr(
+        _members, "apart", lambda sessions, less, whole: sizes[next(n for n in whole.names if n not in less.names)]
+    )
+    monkeypatch.setattr(_members, "alternatives", lambda *given: given[2:])
+    monkeypatch.setattr(_members, "begun_with", lambda law, model, likelihood: model.with_part(law))
+    laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
+    monkeypatch.setattr(_members, "available", lambda sessions: laws)
+    extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0)
+    likelihood: Any = SimpleNamespace(sessions=())
+    best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
+    found = members_of(evidence, best, ("z",), likelihood, extended)
+    assert [(m.name, m.size, m.departed, m.fall) for m in found] == [
+        ("dead_band", 2.0 * STANDARD.material, 0.7, 70.0), ("linear_leak", STANDARD.material, 0.3, 30.0),
+    ]  # fmt: skip
+    assert found[1].alternatives == (0, ("z",))
+    assert found[1].laws == ()  # what is hardly there has no other law
+    others = [law.name for law in laws if law.family == two.family and law.name != two.name]
+    assert [law.effect for law in found[0].laws] == others
+    assert set(asked) == {4}
+    sizes["linear_leak"] *= 3.0
+    (leak, _) = members_of(evidence, best, (), likelihood, extended)
+    assert [(law.effect, law.margin) for law in leak.laws] == [("orifice_leak", 15.0)]
+
+
+def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
+    law = effect("second_relaxation")
+    wanted = law.begun(law.shapes[-1])
+    likelihood: Any = SimpleNamespace(cost=lambda model: float(np.sum(np.abs(model.parts[-1].values - wanted))))
+    assert list(begun_with(law, MODEL, likelihood).parts[-1].values) == list(wanted)
+
+
+# -- folds ------------------------------------------------------------------------------------------------------------
+def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blocks() -> None:
+    one, two, none = (session_of(WAVE, np.full(240, bool(k))) for k in (1, 1, 0))
+    folds = _folds([one, none, two])
+    assert [(fold.rest[0] is two, fold.seen is one, len(fold.rest)) for fold in folds[:1]] == [(True, True, 1)]
+    assert (folds[1].rest[0] is one, folds[1].seen is two, len(folds)) == (True, True, 2)
+    assert folds[0].left_out.all()
+    kept = np.ones(240, dtype=bool)
+    kept[200:] = False
+    single = session_of(WAVE, kept, np.repeat(np.arange(12), 20))
+    folds = _folds([single, none])
+    assert len(folds) == 6
+    # Ten cycles are fitted: two each in four of the blocks, one in the others.
+    left = [sorted(set(single.cycle[fold.left_out])) for fold in folds]
+    assert left == [[0, 1], [2, 3], [4, 5], [6, 7], [8], [9]]
+    for fold in folds:
+        (rest,) = fold.rest
+        assert rest is fold.seen
+        assert not (rest.fitted & fold.left_out).any()
+        assert (rest.fitted | fold.left_out).sum() == 200
+    assert len(_folds([session_of(WAVE, None, np.repeat(np.arange(3), 80))])) == 3
+    assert _folds([session_of(WAVE)]) == []
+
+
+def test_gains_are_counted_in_their_standard_errors() -> None:
+    gains = np.array([1.0, 3.0, 8.0])
+    assert _in_standard_errors(gains) == pytest.approx(4.0 / (np.std(gains, ddof=1) / math.sqrt(3.0)))
+    assert _in_standard_errors(gains[:2]) == pytest.approx(2.0)
+    assert _in_standard_errors(np.array([2.0])) == pytest.approx(2e300)
+    assert _in_standard_errors(np.array([-2.0, -2.0])) < -1e299
+
+
+@pytest.mark.parametrize(("fitted", "least"), [(0.2, 0.25), (0.5, 0.375), (0.8, 0.6), (0.839, 0.62925), (0.841, 0.25)])
+def test_an_extension_must_foresee_nearly_what_it_fitted(
+    monkeypatch: pytest.MonkeyPatch, fitted: float, least: float
+) -> None:
+    """A quarter, and three quarters of the share that it fits, where it leaves more than a law does: 0.16."""
+    monkeypatch.setattr(
+        _validation, "error_of", lambda sessions, model: 2.0 * (math.sqrt(1.0 - fitted) if model == "it" else 1.0)
+    )
+    for by, stands in ((1.0001, True), (0.9999, False)):
+        known: Any = SimpleNamespace(
+            sessions=[], thresholds=STANDARD,
+            errors=lambda model, by=by: np.array([3.0, 5.0]) * (1.0 - by * least if model == "it" else 1.0),
+        )  # fmt: skip
+        assert LeftOut.stands(known, "it", "plain") is stands  # type: ignore[arg-type]
+
+
+def test_models_are_apart_and_off_by_the_rms_of_what_is_fitted() -> None:
+    kept = np.arange(240) > 100
+    sessions = [session_of(WAVE, kept), session_of(0.5 * WAVE[:100], reading=0.5 * WAVE[:100] + 0.3)]
+    other = replace(MODEL, gain=1.2)
+    for first, second in ((MODEL, other), (other, MODEL)):
+        off = [(residual_of(s, first) - residual_of(s, second))[s.fitted] for s in sessions]
+        assert apart(sessions, first, second) == pytest.approx(math.sqrt(np.mean(np.concatenate(off) ** 2)))
+    left = np.concatenate([residual_of(s, MODEL)[s.fitted] for s in sessions])
+    assert error_of(sessions, MODEL) == pytest.approx(math.sqrt(np.mean(left**2)))
+    assert error_of([], MODEL) == 0.0
+
+
+@pytest.mark.parametrize(("ratio", "is_beyond"), [(9.99, False), (10.01, True)])
+def test_an_effect_beyond_ten_times_what_was_fitted_is_no_knowledge(ratio: float, is_beyond: bool) -> None:
+    """Of what moves the fitted part by less than what counts, ten times that."""
+
+    def extended(amount: float, names: tuple[str, ...] = ("a", "b")) -> Any:
+        return SimpleNamespace(
+            parts=[SimpleNamespace(name=name) for name in names],
+            without=lambda name: extended(0.0 if name == "b" else amount, tuple(n for n in names if n != name)),
+            simulate=lambda load: 5.0 + amount * load,
+        )
+
+    swing = np.resize([-1.0, 1.0], 40)
+    for small in (1e-3, 1e-6):
+        within = max(small, STANDARD.material)
+        seen, unseen, every = np.ones(40, dtype=bool), np.zeros(40, dtype=bool), small * swing
+        fitted = SimpleNamespace(conditions=every, fitted=seen, judged=unseen)
+        held = SimpleNamespace(conditions=7.0 + ratio * within * swing, fitted=unseen, judged=seen)
+        found = extrapolating([fitted, held], extended(1.0), STANDARD)  # type: ignore[list-item]
+        assert found == ("b" if is_beyond else None)

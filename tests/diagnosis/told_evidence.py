@@ -1,0 +1,71 @@
+"""Candidates, evidence and sessions as they are told, for tests of what is made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._evidence import Posterior
+from smartshoe.diagnosis._session import Quiet, Session
+from smartshoe.models.effects import Conditions
+
+Array = NDArray[np.float64]
+
+STANDARD = Thresholds()
+
+
+def candidate(name: str, slot: str = "", sign: float = 1.0, **of: Any) -> Any:
+    """Of a strength that may be as large as it likes on one side of null only."""
+    made = SimpleNamespace(name=name, is_flexible=False, is_memoryless=False, parameters=())
+    made.__dict__.update(of)
+    return SimpleNamespace(
+        name=name, slot=slot or name, effect=made, columns=(1,),
+        has_sign_of=lambda strengths: bool(sign * float(strengths[0]) >= 0.0),
+    )  # fmt: skip
+
+
+class ToldEvidence:
+    """Scores of sets as they are told; a candidate's strength is 1."""
+
+    def __init__(
+        self, candidates: list[Any], score: Callable[[tuple[int, ...]], float], inside: tuple[str, ...] = ()
+    ) -> None:
+        self.given: Any = SimpleNamespace(candidates=candidates, model=SimpleNamespace(names=inside))
+        self.thresholds, self.odds, self._score = STANDARD, 10.0, score
+        self.strengths: dict[int, Array] = {}
+
+    def posterior(self, members: tuple[int, ...]) -> Posterior:
+        members = tuple(sorted(members))
+        count = len(members)
+        strengths = tuple(self.strengths.get(m, np.ones(1)) for m in members)
+        return Posterior(members, self._score(members), strengths, (1.0,) * count, (0.5,) * count, float(count))
+
+    def extensions(self, members: tuple[int, ...]) -> list[tuple[float, int, Array]]:
+        return [
+            (self._score(tuple(sorted((*members, k)))), k, self.strengths.get(k, np.ones(1)))
+            for k in range(len(self.given.candidates))
+            if k not in members
+        ]
+
+
+def worth(*worths: float) -> Callable[[tuple[int, ...]], float]:
+    """A set is worth the sum of its members'."""
+    return lambda members: 100.0 - sum(worths[m] for m in members)
+
+
+def session_of(load: Array, fitted: Any = None, cycle: Any = None, reading: Any = None) -> Any:
+    kept = np.ones(load.size, dtype=bool) if fitted is None else fitted
+    at = Conditions(0.1 * np.arange(load.size), load, 0.1)
+    told: Any = SimpleNamespace(metadata={})
+    return Session(
+        told, 0, at, load.copy() if reading is None else reading, np.ones(load.size, dtype=bool), ~kept,
+        np.zeros(load.size, dtype=np.intp) if cycle is None else cycle, load < 0.02, 1, Quiet(load, 0.0, 0.0),
+    )  # fmt: skip
+
+
+WAVE = np.abs((np.arange(240) / 10.0) % 2.0 - 1.0)
