@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import POLES_PER_S, _wall_ratio, baseline_of, lagged, with_usual_arm
 from smartshoe.diagnosis._held_out import Errors, _percent, errors, force_rmse_n, gain, own_of, residual_of
-from smartshoe.diagnosis._jittered import as_sampled, jitter_s
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
@@ -409,21 +407,3 @@ def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
     unjudged = _session(_load(80, 1), np.zeros(80))
     assert force_rmse_n([held[0], unjudged, held[1]], plain) == pytest.approx(math.sqrt(total / count), rel=1e-6)
     assert math.isnan(force_rmse_n([unjudged], plain))
-
-
-# -- jitter -----------------------------------------------------------------------------------------------------------
-def test_a_load_is_smoothed_by_the_jitter_of_what_it_was_smoothed_to() -> None:
-    rng = np.random.default_rng(1)
-    time_s = 0.02 * np.arange(3000)
-    load = np.clip(3.0 * np.abs((time_s / 2.5) % 2.0 - 1.0) - 1.0, 0.0, 1.0)
-    reading = 1.3 * np.interp(time_s + 0.03 * rng.standard_normal(3000), time_s, load)
-    reading += 1e-3 * rng.standard_normal(3000)
-    seen = load
-    for _ in range(3):
-        sd = jitter_s(seen, reading, 0.02) / 0.02
-        assert sd > 1.0
-        seen = gaussian_filter1d(load, sd, mode="nearest")
-    assert as_sampled(load, reading, 0.02) == pytest.approx(seen)
-    assert jitter_s(0.0 * load, reading, 0.02) == 0.0
-    # Whatever the gain between them.
-    assert jitter_s(load, 7.0 * reading, 0.02) == pytest.approx(jitter_s(load, reading, 0.02))

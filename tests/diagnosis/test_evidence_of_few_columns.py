@@ -1,0 +1,206 @@
+"""The evidence of sets among a few columns, against Gaussian densities whose every matrix is written out."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from told_evidence import STANDARD, session_of
+
+from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._sensitivity import Linearised, departures, nuisance_precision
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
+SD = 0.02
+MATERIAL, STRENGTH, DEPARTURE = STANDARD.material, STANDARD.strength_sd, STANDARD.departure
+COLUMNS = ((3,), (4, 5), (6,), (7,))  # beside the target, of two own columns
+NAMES = ("one", "two", "three", "one")
+
+
+def _given() -> Linearised:
+    rng = np.random.default_rng(2)
+    sessions, rows = [], []
+    for size in (70, 50):
+        load = np.interp(np.arange(size), np.linspace(0, size, 9), rng.uniform(0.0, 1.0, 9))
+        sessions.append(session_of(load, rng.random(size) < 0.85))
+        columns = np.cumsum(rng.standard_normal((size, 7)), axis=0)
+        columns /= np.sqrt(np.mean(columns**2, axis=0))
+        target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
+        rows.append(np.column_stack([target, columns]))
+    candidates: Any = tuple(SimpleNamespace(name=n, columns=c) for n, c in zip(NAMES, COLUMNS, strict=True))
+    return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)
+
+
+class _Twin:
+    """Precision of each session's samples with its offset and past unknown; all columns beside each other."""
+
+    def __init__(self, given: Linearised) -> None:
+        self.given = given
+        blocks, pasts = [], []
+        for session in given.sessions:
+            kept = session.fitted
+            past = np.array([[1.0, math.exp(-0.3 * at)] for at in session.conditions.time_s])
+            seen = past[kept]
+            inner = seen.T @ seen / SD**2 + nuisance_precision(session, MODEL, STANDARD)
+            blocks.append(np.eye(kept.sum()) / SD**2 - seen @ np.linalg.solve(inner, seen.T) / SD**4)
+            pasts.append(past)
+        size = sum(one.shape[0] for one in blocks)
+        self.weight, first = np.zeros((size, size)), 0
+        for one in blocks:
+            last = first + one.shape[0]
+            self.weight[first:last, first:last] = one
+            first = last
+        self.pasts = pasts
+        self.rows = self.seen(list(given.rows))
+        self.y, self.z = self.rows[:, 0], self.rows[:, 1:]
+
+    def seen(self, signals: list[Array]) -> Array:
+        return np.concatenate([one[s.fitted] for one, s in zip(signals, self.given.sessions, strict=True)])
+
+    def signature(self, column: Array) -> list[Array]:
+        """A column (rows' numbers weighed) less what own columns and each recording's nuisances follow of it."""
+        given = self.given
+        wide = np.zeros((self.y.size, 4))
+        first = 0
+        for k, (session, past) in enumerate(zip(given.sessions, self.pasts, strict=True)):
+            count = int(session.fitted.sum())
+            wide[first : first + count, 2 * k : 2 * k + 2] = past[session.fitted]
+            first += count
+        found = np.linalg.lstsq(np.column_stack([self.rows[:, 1:3], wide]), self.rows @ column, rcond=None)[0]
+        return [
+            rows @ column - rows[:, 1:3] @ found[:2] - past @ found[2 + 2 * k : 4 + 2 * k]
+            for k, (rows, past) in enumerate(zip(given.rows, self.pasts, strict=True))
+        ]
+
+    def direction(self, columns: tuple[int, ...]) -> Array:
+        weights = np.zeros(8)
+        if len(columns) == 1:
+            weights[list(columns)] = 1.0
+            return weights
+        index = [1, 2, *columns]
+        part = self.rows[:, index].T @ self.weight @ self.rows[:, index]
+        part += np.diag([1.0, 1.0] + [STRENGTH**-2] * len(columns))
+        asked = np.linalg.solve(part, self.rows[:, index].T @ self.weight @ self.y)[2:]
+        weights[list(columns)] = asked / np.linalg.norm(asked)
+        return weights
+
+    def solved(
+        self, members: tuple[int, ...], amounts: dict[int, float] | None, exact: tuple[int, ...] = ()
+    ) -> tuple[float, dict[int, Array], dict[int, float]]:
+        """-2 log density but for a constant; members' strengths beyond what is immaterial; departures' rms."""
+        variances = np.concatenate([[1.0, 1.0], np.full(5, MATERIAL**2)])
+        columns, spans = [self.z], {}
+        for member in (*members, *exact):
+            columns.append(self.rows[:, list(COLUMNS[member])])
+            spans[member] = slice(variances.size, variances.size + len(COLUMNS[member]))
+            variances = np.append(variances, np.full(len(COLUMNS[member]), STRENGTH**2))
+        departed = {}
+        for member in members if amounts is not None else ():
+            made = self.seen(departures(self.given, self.signature(self.direction(COLUMNS[member]))))
+            departed[member] = slice(variances.size, variances.size + made.shape[1])
+            assert amounts is not None
+            sd = max(DEPARTURE * amounts[member] / math.sqrt(made.shape[1]), 1e-7)
+            columns.append(made)
+            variances = np.append(variances, np.full(made.shape[1], sd**2))
+        whole = np.column_stack(columns) * np.sqrt(variances)
+        inner = np.eye(whole.shape[1]) + whole.T @ self.weight @ whole
+        asked = whole.T @ self.weight @ self.y
+        pull = np.linalg.solve(inner, asked)
+        score = float(self.y @ self.weight @ self.y - asked @ pull + np.linalg.slogdet(inner)[1])
+        strengths = {m: pull[at] * STRENGTH for m, at in spans.items()}
+        return score, strengths, {m: float(np.sqrt(np.mean(pull[at] ** 2))) for m, at in departed.items()}
+
+    def posterior(self, members: tuple[int, ...]) -> tuple[float, dict[int, Array], dict[int, float]]:
+        found = self.solved(members, None)
+        for _ in range(2):
+            found = self.solved(members, {m: float(np.linalg.norm(s)) for m, s in found[1].items()})
+        return found
+
+    def visible(self, members: tuple[int, ...], strengths: dict[int, Array]) -> float:
+        weights = np.zeros(8)
+        for member in members:
+            weights[list(COLUMNS[member])] += strengths[member]
+        return float(np.sqrt(np.mean(self.seen(self.signature(weights)) ** 2)))
+
+
+@pytest.fixture(scope="module")
+def given() -> Linearised:
+    return _given()
+
+
+@pytest.fixture(scope="module")
+def twin(given: Linearised) -> _Twin:
+    return _Twin(given)
+
+
+ODDS = 2.0 * math.log(3 / STANDARD.false_name)  # of three effects
+SHAPES = (2.0 * math.log(2.0), 0.0, 0.0, 2.0 * math.log(2.0))  # "one" stands at two
+
+
+@pytest.mark.parametrize("members", [(), (0,), (1,), (2, 3), (0, 1), (0, 1, 2, 3)])
+def test_a_sets_evidence_is_that_of_its_density_to_the_digit(
+    given: Linearised, twin: _Twin, members: tuple[int, ...]
+) -> None:
+    evidence = Evidence(given, SD)
+    odds = sum(ODDS + SHAPES[m] for m in members)
+    exact, plain = evidence.exact(members), twin.solved(members, None)
+    assert exact.score - odds == pytest.approx(plain[0], rel=1e-7)
+    for member, strengths in zip(members, exact.strengths, strict=True):
+        assert strengths == pytest.approx(plain[1][member], rel=1e-5)
+    found, slow = evidence.posterior(members), twin.posterior(members)
+    assert found.score - odds == pytest.approx(slow[0], rel=1e-6)
+    assert found.members == members
+    for k, member in enumerate(members):
+        assert found.strengths[k] == pytest.approx(slow[1][member], rel=1e-4)
+        assert found.departed[k] == pytest.approx(slow[2][member], rel=1e-4)
+        assert found.sizes[k] == pytest.approx(twin.visible((member,), slow[1]), rel=1e-4)
+    if members:
+        assert found.together == pytest.approx(twin.visible(members, slow[1]), rel=1e-4)
+        assert exact.departed == (0.0,) * len(members)
+
+
+def test_members_are_a_set_in_any_order_and_known_once(given: Linearised) -> None:
+    evidence = Evidence(given, SD)
+    assert evidence.posterior((2, 0)) is evidence.posterior((0, 2))
+    fresh = Evidence(given, SD).posterior((0, 2))
+    # Whatever was asked before, and in whichever order its departures were made.
+    turned = Evidence(given, SD)
+    for members in ((3,), (2,), (1,), (0, 1, 2, 3)):
+        turned.posterior(members)
+    assert turned.posterior((0, 2)).score == pytest.approx(fresh.score, rel=1e-9)
+
+
+@pytest.mark.parametrize("members", [(), (0,), (1, 2)])
+def test_extensions_are_exact_beside_a_set_whose_equations_depart(
+    given: Linearised, twin: _Twin, members: tuple[int, ...]
+) -> None:
+    evidence = Evidence(given, SD)
+    base = twin.solved(members, None)
+    amounts = {}
+    for _ in range(2):
+        amounts = {m: float(np.linalg.norm(s)) for m, s in base[1].items()}
+        base = twin.solved(members, amounts)
+    amounts = {m: float(np.linalg.norm(s)) for m, s in base[1].items()}
+    told = {k: (score, strengths) for score, k, strengths in evidence.extensions(members)}
+    assert set(told) == set(range(4)) - set(members)
+    before = twin.solved(members, amounts)[0]
+    for k, (score, strengths) in told.items():
+        after, expected, _ = twin.solved(members, amounts, (k,))
+        # The set's own score is that of its last round but one.
+        rise = score - evidence.posterior(members).score - ODDS - SHAPES[k]
+        assert rise == pytest.approx(after - before, rel=1e-5, abs=1e-5)
+        assert strengths == pytest.approx(expected[k], rel=1e-4)
+
+
+def test_what_is_visible_is_what_own_columns_and_nuisances_leave(given: Linearised, twin: _Twin) -> None:
+    evidence = Evidence(given, SD)
+    strengths = {1: np.array([0.3, -0.2])}
+    assert evidence.visible_rms((4, 5), strengths[1]) == pytest.approx(twin.visible((1,), strengths), rel=1e-6)
+    assert evidence.odds == pytest.approx(ODDS)
