@@ -181,6 +181,10 @@ def test_inner_products_are_of_what_the_nuisances_leave() -> None:
     seen = rows[session.fitted]
     left = seen - past @ np.linalg.lstsq(past, seen, rcond=None)[0]
     assert marginal(rows, session, MODEL) == pytest.approx(left.T @ left, rel=1e-7, abs=1e-7)
+    # A past that never fades is no other than an offset.
+    about = seen - seen.mean(axis=0)
+    ever = replace(MODEL, relaxation_rate_per_s=0.0)
+    assert marginal(rows, session, ever) == pytest.approx(about.T @ about, rel=1e-6, abs=1e-6)
 
 
 def test_what_no_column_reaches_is_the_noise() -> None:

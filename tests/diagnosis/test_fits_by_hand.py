@@ -237,3 +237,101 @@ def test_departures_are_as_wide_as_their_members_strengths_and_never_nothing() -
     visible: Any = SimpleNamespace(raw=np.diag([0.0, 4.0, -9.0]))
     assert Evidence.visible_rms(visible, (1,), np.array([3.0])) == pytest.approx(6.0)
     assert Evidence.visible_rms(visible, (2,), np.array([3.0])) == 0.0
+
+
+# -- the way of a fit -------------------------------------------------------------------------------------------------
+class _Slope:
+    """A model of one number, and a likelihood (1 - x)^2 ``scale`` whose slopes tell of ``told`` times the curvature."""
+
+    def __init__(self, x: float, parameter: Any = None, owner: str = "baseline") -> None:
+        self.theta = np.array([x])
+        self.parameters = [(owner, parameter or _parameter(None, -1e9, 1e9))]
+
+    def at(self, theta: Array) -> _Slope:
+        return _Slope(float(theta[0]), *reversed(self.parameters[0]))
+
+
+class _Told:
+    def __init__(self, told: float = 1.0, scale: float = 1e6) -> None:
+        self.told, self.scale = told, scale
+        self.asked: list[tuple[str, float]] = []
+
+    def cost(self, model: _Slope) -> float:
+        return self.scale * float((1.0 - model.theta[0]) ** 2)
+
+    def normal(self, model: _Slope) -> tuple[float, Array, Array]:
+        self.asked.append(("anew", float(model.theta[0])))
+        return self._products(model)
+
+    def nearly_normal(self, model: _Slope, step: Array) -> tuple[float, Array, Array]:
+        self.asked.append(("renewed", float(step[0])))
+        return self._products(model)
+
+    def _products(self, model: _Slope) -> tuple[float, Array, Array]:
+        right = self.scale * (1.0 - model.theta)
+        return self.cost(model), right, self.told * self.scale * np.eye(1)
+
+
+def _went(told: _Told, steps: int, start: _Slope | None = None) -> float:
+    found: Any = fit(told, start or _Slope(0.0), steps)  # type: ignore[arg-type]
+    return float(found.model.theta[0])
+
+
+def test_a_step_that_overshoots_is_damped_tenfold_until_it_gains() -> None:
+    """From 1e-4 on six times; what has gained is damped a tenth as much in the next step."""
+    assert _went(_Told(1.0), 1) == pytest.approx(1.0 / 1.0001, rel=1e-9)
+    assert _went(_Told(0.4), 1) == pytest.approx(1.0 / (0.4 * 2.0), rel=1e-9)  # at 1e-4 to 0.1 it overshoots
+    assert _went(_Told(0.1), 1) == pytest.approx(1.0 / (0.1 * 11.0), rel=1e-9)
+    assert _went(_Told(0.04), 1) == 0.0
+    left = 1.0 - 1.0 / 1.1
+    assert _went(_Told(0.1), 2) == pytest.approx(1.0 - left * left, rel=1e-9)
+    # Of a curvature that is far too large each step goes a part of the way, damped less and less.
+    rest = 1.0
+    for damping in (1e-4, 1e-5, 1e-6, 1e-7, 1e-7):
+        rest *= 1.0 - 1.0 / (2.0 * (1.0 + damping))
+    assert _went(_Told(2.0, 1e9), 5) == pytest.approx(1.0 - rest, rel=1e-12)
+
+
+def test_slopes_are_computed_anew_every_other_step_and_at_the_end() -> None:
+    slowly = _Told(2.0)
+    _went(slowly, 5)
+    assert [way for way, _ in slowly.asked] == ["anew", "renewed", "anew", "renewed", "anew"]
+    assert slowly.asked[1][1] == pytest.approx(0.5, rel=1e-3)  # what the step before did
+    assert slowly.asked[3][1] == pytest.approx(0.125, rel=1e-3)
+    # A fall of less than a tenth ends it, where the slopes are its own.
+    for scale, asked in ((0.09, 1), (0.14, 2)):
+        little = _Told(2.0, scale)  # three quarters of it at the first step
+        _went(little, 9)
+        assert little.asked[0] == ("anew", 0.0)
+        if asked == 1:
+            assert [way for way, _ in little.asked] == ["anew"]
+        else:
+            assert [way for way, _ in little.asked] == ["anew", "renewed", "anew"]
+    stuck = _Told(0.01)
+    assert (_went(stuck, 9), len(stuck.asked)) == (0.0, 1)
+
+
+def test_a_shape_is_drawn_to_where_it_begins() -> None:
+    """One over its size squared against the data; in its logarithm one."""
+    parameter = _parameter(None, -1e9, 1e9, size=0.5)
+    found: Any = fit(_Told(1.0, 4.0), _Slope(0.0, parameter, "one"), 25)  # type: ignore[arg-type]
+    assert float(found.model.theta[0]) == pytest.approx(0.5, abs=0.02)
+    assert found.cost == pytest.approx(4.0 * 0.25 + 4.0 * 0.25, abs=0.02)
+    weight = _parameter(0.25, -1e9, 1e9, prior_sd=0.5)
+    held: Any = fit(_Told(1.0, 4.0), _Slope(0.9, weight, "block"), 25)  # type: ignore[arg-type]
+    assert float(held.model.theta[0]) == pytest.approx(0.625, abs=0.02)
+    steep = _parameter(None, 0.01, 10.0)
+    risen: Any = fit(_Told(1.0, 1e8), _Slope(0.02, steep, "one"), 1)  # type: ignore[arg-type]
+    assert float(risen.model.theta[0]) == pytest.approx(0.02 * math.e)  # a factor e at the most
+    ended: Any = fit(_Told(1.0, 1e4), _Slope(0.5, steep, "one"), 25)  # type: ignore[arg-type]
+    assert float(ended.model.theta[0]) == pytest.approx(1.0, abs=1e-3)
+    assert ended.cost == pytest.approx(math.log(2.0) ** 2, abs=1e-2)
+    plain: Any = fit(_Told(1.0, 4.0), _Slope(0.0), 25)  # type: ignore[arg-type]
+    assert float(plain.model.theta[0]) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_fit_begins_within_its_bounds() -> None:
+    inside = _parameter(None, 0.2, 0.8)
+    for start, end in ((-3.0, 0.2), (5.0, 0.8), (0.5, 0.5)):
+        assert _went(_Told(), 0, _Slope(start, inside)) == end
+    assert _went(_Told(), 5, _Slope(0.5, inside)) == 0.8
