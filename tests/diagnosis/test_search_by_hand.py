@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, worth
 
-from smartshoe.diagnosis import _members, _state, _validation
+from smartshoe.diagnosis import _members, _search, _state, _validation
 from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._members import alternatives, begun_with, members_of
@@ -86,6 +86,26 @@ def test_a_step_adds_drops_or_swaps_for_the_better() -> None:
     assert step(wrong, (1,)).members == ()
 
 
+@pytest.mark.parametrize(("barred", "members"), [(5, (0,)), (4, (0, 5))])
+def test_five_are_tried_beside_a_set(monkeypatch: pytest.MonkeyPatch, barred: int, members: tuple[int, ...]) -> None:
+    """The best ones barred: those that come after them are not looked at."""
+    candidates = [candidate(f"n{k}") for k in range(12)]
+    beside: Any = ToldEvidence(candidates, worth(*(50.0 - k for k in range(12))))
+    bad = set(range(1, 1 + barred))
+    monkeypatch.setattr(_search, "allowed", lambda evidence, found: not bad & set(found.members))
+    assert step(beside, (0,)).members == members
+
+
+@pytest.mark.parametrize(("barred", "members"), [(3, (0,)), (2, (3,))])
+def test_three_are_tried_in_each_members_place(
+    monkeypatch: pytest.MonkeyPatch, barred: int, members: tuple[int, ...]
+) -> None:
+    alone = {(k,): 50.0 + k for k in range(1, 9)}
+    evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(9)], lambda given: alone.get(given, 100.0))
+    monkeypatch.setattr(_search, "allowed", lambda evidence, found: not set(range(1, 1 + barred)) & set(found.members))
+    assert step(evidence, (0,)).members == members
+
+
 def test_a_search_goes_on_while_it_gains() -> None:
     evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(4)], worth(5.0, 3e-6, 0.5e-6, -1.0))
     assert search(evidence).members == (0, 1)
@@ -147,6 +167,12 @@ def test_members_are_weighed_against_what_could_stand_in_their_place(monkeypatch
     # Nothing, and d in its place; not itself at another shape, no flexible block, none that cancels or has no sign.
     assert [(one.effect, one.margin) for one in near] == [("d", 40.0), (None, 50.0)]
     assert [one.effect for one in alternatives(evidence, best, 0, ("d",))] == [None]
+
+
+def test_ten_are_weighed_against_a_member() -> None:
+    evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(14)], worth(*(20.0 - k for k in range(14))))
+    near = alternatives(evidence, evidence.posterior((13,)), 13, ())
+    assert [one.effect for one in near] == [f"n{k}" for k in range(10)] + [None]
 
 
 def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
