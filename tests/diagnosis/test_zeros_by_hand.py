@@ -170,7 +170,8 @@ def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
     assert first_rests([ever], MODEL, STANDARD)[0] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
     assert first_rests([], MODEL, STANDARD).shape == (0, 3)
     slow = _rested(2, step_s=10.0)
-    assert first_rests([slow], MODEL, STANDARD).shape == (1, 3)
+    slow.reading[1] = 9.0  # ten seconds on: no more than a single sample lies within a hold
+    assert first_rests([slow], MODEL, STANDARD)[0] == pytest.approx([0.0, 0.01 / 0.8, 0.0])
 
 
 def test_a_first_rest_is_as_long_as_a_command_asks_for_nothing() -> None:
