@@ -114,7 +114,7 @@ def gauss_markov_of(
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
     tau_s = _memory_s(weights, lags, float(np.median([one.step_s for one in blocks])))
     tests = coloured, float(kurtosis), float(follows)
-    return GaussMarkov(math.sqrt(_remembered(covariance)), tau_s, *tests, flatness, thresholds)
+    return GaussMarkov(math.sqrt(_remembered(blocks, thresholds)), tau_s, *tests, flatness, thresholds)
 
 
 def _blocks(session: Session, residual: Array, thresholds: Thresholds) -> _Blocks:
@@ -171,10 +171,23 @@ def _memory_s(weights: Array, lags: int, step_s: float) -> float:
     return float(fallen[0]) * step_s if fallen.size and fallen[0] < lags else math.inf
 
 
-def _remembered(covariance: Array) -> float:
-    """Variance of the part that remembers: neighbours' covariance a step back, as it falls from one to the next."""
-    whole, one, two = (float(value) for value in covariance[:3])
-    return float(np.clip(one * one / two if two > 0.0 else one, max(one, 0.0), whole))
+def _remembered(blocks: Sequence[_Blocks], thresholds: Thresholds) -> float:
+    """Variance of the part that remembers: neighbours' covariance a step back, as it falls from one to the next.
+
+    A covariance counts where it stands out of what noise without a memory would show, however its loudness changes
+    (White 1980, errors that hold under any heteroscedasticity); one step is not led back by a second that does not.
+    """
+    one, two = (_lagged(blocks, lag, thresholds) for lag in (1, 2))
+    whole = sum(float(block.residual @ block.residual) for block in blocks)
+    remembered = min(one * one / two, whole) if 0.0 < two < one else one
+    return remembered / sum(int(block.there.sum()) for block in blocks)
+
+
+def _lagged(blocks: Sequence[_Blocks], lag: int, thresholds: Thresholds) -> float:
+    """Sum of the products of blocks that lie ``lag`` apart, 0 where noise alone would make it as large."""
+    products = np.concatenate([one.residual[lag:] * one.residual[: one.residual.size - lag] for one in blocks])
+    found = float(products.sum())
+    return found if found > largest_of_noise(1, thresholds) * math.sqrt(float(products @ products)) else 0.0
 
 
 def _kolmogorov(innovations: Array) -> float:

@@ -179,7 +179,8 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
-    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds, follows)
+    known = _known_error(integrity, scale)
+    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, known, thresholds, follows)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
@@ -226,20 +227,30 @@ def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[R
     return abs(float(values[0])) < UNIFORM_SD * step_s
 
 
+def _known_error(integrity: Integrity, scale: Scale) -> float:
+    """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
+    return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
+
+
 def _verdict(
     causes: Sequence[Cause],
     before: ResidualStructure,
     after: ResidualStructure,
+    known: float,
     thresholds: Thresholds,
     follows: bool = True,
 ) -> Verdict:
-    """``follows``: every cause has a law, so that what is left may be what laws usually depart by."""
+    """``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
+
+    ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
+    """
     left = after.rms if after.significant else 0.0
+    least = max(thresholds.material, thresholds.tolerable, known)
     if causes:
         wrong = before.rms if before.significant else 0.0
-        least = max(thresholds.material, thresholds.tolerable, thresholds.departure * wrong if follows else 0.0)
+        least = max(least, thresholds.departure * wrong if follows else 0.0)
         return "partly_explained" if left > least else "explained"
-    return "unexplained" if left > max(thresholds.material, thresholds.tolerable) else "adequate"
+    return "unexplained" if left > least else "adequate"
 
 
 def _sentence(

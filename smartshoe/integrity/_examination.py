@@ -160,4 +160,5 @@ def _fault(number: int, recording: Recording, finding: Finding) -> DataFault:
         float(finding.at.mean()),
         finding.says,
         finding.severity,
+        finding.error,
     )

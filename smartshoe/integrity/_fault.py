@@ -20,7 +20,8 @@ class DataFault:
     else a word of its own (``gaps``, ``two_clocks``). ``recording`` is the index of the recording, ``label`` what it
     is called, ``start_s`` to ``stop_s`` the time from the first sample at fault to the last, ``share`` the fraction
     of samples at fault. ``severity``: *minor* asks for nothing, *material* would show in a fit that ignores it,
-    *fatal* leaves this recording without use.
+    *fatal* leaves this recording without use. ``error`` is the rms that a fault of all samples, which masks none, adds
+    to the reading, in the reading's unit.
     """
 
     kind: str
@@ -31,6 +32,7 @@ class DataFault:
     share: float
     says: str
     severity: Severity = "material"
+    error: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``diagnose --json`` lists under ``data_faults``."""
@@ -43,7 +45,8 @@ class Finding:
     """What a detector hands back: ``at`` (n,) marks the samples at fault, over all samples of the recording.
 
     Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
-    ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded.
+    ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded; ``error`` that of
+    `DataFault`.
     """
 
     kind: str
@@ -53,6 +56,7 @@ class Finding:
     masks: bool = False
     refuses: str | None = None
     values: Array = field(default_factory=lambda: np.zeros(0))
+    error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,6 +36,7 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
         f"the reading lies on a lattice of {usual:.4g} {view.recording.sensor.unit.symbol},"
         f" {100 * usual / view.span:.2g} % of its span: an error of {100 * error / view.span:.2g} % that noise does not"
         " smooth away",
+        error=error,
     )
 
 
