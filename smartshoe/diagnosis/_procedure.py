@@ -173,6 +173,8 @@ def _diagnosed(
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
+    past = [_said_of_the_past(one, scale) for one in zeros if one.is_past]
+    zeros = tuple(one for one in zeros if not one.is_past)
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
     causes = [_cause(name, found, fine, best, given) for name in names]
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
@@ -206,7 +208,7 @@ def _diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
         ),
-        limits=(*given.limits, *_refused_members(found)),
+        limits=(*given.limits, *past, *_refused_members(found)),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         model=with_zero,
@@ -272,6 +274,14 @@ def _sentence(
         return f"{good}; {rest}, and no effect of the catalogue accounts for it"
     said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
     return said if verdict == "explained" else f"{said}; {rest}"
+
+
+def _said_of_the_past(zero: Zero, scale: Scale) -> str:
+    value = zero.value * abs(scale.reading)
+    return (
+        f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
+        " may have begun before, or there is an offset beside (record from where the unit is switched on)"
+    )
 
 
 def _refused_members(found: Inference) -> list[str]:

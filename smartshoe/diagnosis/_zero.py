@@ -24,7 +24,8 @@ from smartshoe.models.extended import ExtendedModel
 class Zero:
     """``value`` of the effect's one parameter (share of full scale) with its standard deviation.
 
-    ``size`` it moves the reading by; ``alternatives`` that this data cannot tell from it.
+    ``size`` it moves the reading by; ``alternatives`` that this data cannot tell from it. ``is_past``: the model's own
+    drift of the zero may have brought it there before the recordings began, so that no offset beside it is seen.
     """
 
     effect: Effect
@@ -32,6 +33,7 @@ class Zero:
     sd: float
     size: float
     alternatives: tuple[str, ...] = ()
+    is_past: bool = False
 
 
 def shift_of(signal: str) -> Effect:
@@ -84,6 +86,17 @@ def _drifted(session: Session, model: ExtendedModel) -> Array:
     return model.simulate(session.conditions) - still.simulate(session.conditions)
 
 
+def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> bool:
+    """Whether an offset may be how far the zero had drifted before the recordings began.
+
+    It drifts the same way, and what it drifts by in a recording is of the offset's order of magnitude: what settles
+    may have been under way for a few of its time constants.
+    """
+    moves = [_drifted(one, model) for one in sessions if one.fitted.any()]
+    moved = float(np.mean([one[-1] - one[0] for one in moves]))
+    return 0.0 < value * moved and abs(value) <= thresholds.extrapolates * abs(moved)
+
+
 def zeros_of(
     sessions: Sequence[Session],
     model: ExtendedModel,
@@ -114,7 +127,8 @@ def zeros_of(
     if abs(load) >= many * load_sd:
         named.append(Zero(machine, -load, load_sd, abs(load * model.gain)))
     if abs(reading) >= many * reading_sd:
-        named.append(Zero(sensor, reading * model.gain, reading_sd, abs(reading * model.gain)))
+        value = reading * model.gain
+        named.append(Zero(sensor, value, reading_sd, abs(value), (), _is_past(value, sessions, model, thresholds)))
     return tuple(sorted(named, key=lambda one: -one.size))
 
 
@@ -141,4 +155,4 @@ def _unseen(
     sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
     if abs(mean) > thresholds.foreign_zero or abs(mean) < largest_of_noise(1, thresholds) * sd:
         return ()
-    return (Zero(sensor, mean, sd, abs(mean), (machine.name,)),)
+    return (Zero(sensor, mean, sd, abs(mean), (machine.name,), _is_past(mean, sessions, model, thresholds)),)

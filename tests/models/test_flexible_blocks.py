@@ -48,7 +48,7 @@ def loading(seed: int, count: int = 40) -> Conditions:
 def test_blocks_stand_apart_from_the_effects_that_may_be_named() -> None:
     assert set(NAMES) == {
         "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop", "flexible_set",
-        "flexible_asymmetry", "flexible_heat", "flexible_softening",
+        "flexible_asymmetry", "flexible_heat", "flexible_softening", "flexible_gain_drift",
     }  # fmt: skip
     assert not set(NAMES) & set(catalogue())
     assert not any(one.is_flexible for one in catalogue().values())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from smartshoe.arrays import Array
@@ -31,6 +33,16 @@ def drift(conditions: Conditions, values: Array) -> Array:
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
         moved += values[0] * running_time_s(conditions)
     return moved
+
+
+def settling_scale(tau_s: float, stretch: float) -> float:
+    """s of exp(-(t/s)^stretch) whose mean time of settling is ``tau_s``."""
+    return tau_s / math.gamma(1.0 + 1.0 / stretch)
+
+
+def settled(time_s: Array, tau_s: float, stretch: float) -> Array:
+    """(n,) what has settled of a whole, 1 - exp(-(t/s)^stretch) (Kohlrausch 1854)."""
+    return np.asarray(-np.expm1(-((time_s / settling_scale(tau_s, stretch)) ** stretch)))
 
 
 def _warmer_k(conditions: Conditions) -> Array:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import running_time_s
+from smartshoe.models.effects._sensor_clock import running_time_s, settled, settling_scale
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -41,21 +37,13 @@ class WarmUp(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and what the zero has moved."""
-        return signal + float(values[0]) * _settled(running_time_s(conditions), float(values[1]), float(values[2]))
+        return signal + float(values[0]) * settled(running_time_s(conditions), float(values[1]), float(values[2]))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Subtract it; exact."""
         change, tau, stretch = (float(value) for value in values)
-        scale = c_number(_scale(tau, stretch))
+        scale = c_number(settling_scale(tau, stretch))
         return Memoryless(
-            lambda signal, time_s: signal - change * _settled(time_s, tau, stretch),
+            lambda signal, time_s: signal - change * settled(time_s, tau, stretch),
             f"x += {c_number(change)} * expm1(-pow(t / {scale}, {c_number(stretch)}));",
         )
-
-
-def _scale(tau: float, stretch: float) -> float:
-    return tau / math.gamma(1.0 + 1.0 / stretch)
-
-
-def _settled(time_s: Array, tau: float, stretch: float) -> Array:
-    return -np.expm1(-((time_s / _scale(tau, stretch)) ** stretch))
