@@ -103,7 +103,8 @@ def gauss_markov_of(
     new = [lfilter([1.0, *-weights], [1.0], one.residual) for one in blocks]
     coloured = max(_kolmogorov(np.where(known, one, 0.0)) for one, known in zip(new, good, strict=True))
     square = np.concatenate([one[known] for one, known in zip(new, good, strict=True)]) ** 2
-    square /= square.mean()
+    unscaled = square
+    square = square / square.mean()
     kurtosis = (float(np.mean(square**2)) - 3.0) / np.sqrt(24.0 / count)
     drives = [
         np.concatenate([one[known] for one, known in zip(drive, good, strict=True)])
@@ -114,7 +115,9 @@ def gauss_markov_of(
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
     tau_s = _memory_s(weights, lags, float(np.median([one.step_s for one in blocks])))
     tests = coloured, float(kurtosis), float(follows)
-    return GaussMarkov(math.sqrt(_remembered(blocks, thresholds)), tau_s, *tests, flatness, thresholds)
+    foretold = max(float(covariance[0]) - float(np.mean(unscaled)), 0.0)
+    rms = math.sqrt(max(_remembered(blocks, thresholds), foretold))
+    return GaussMarkov(rms, tau_s, *tests, flatness, thresholds)
 
 
 def _blocks(session: Session, residual: Array, thresholds: Thresholds) -> _Blocks:

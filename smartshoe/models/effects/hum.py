@@ -22,6 +22,10 @@ HANN_CORRELATION = 1.944  # neighbouring bins behind a Hann window are worth hal
 SEGMENTS = 30
 STEADY, STEADIER = 0.4, 0.8  # least median over mean of a weak and of a strong tone's power in time; noise has 0.69
 BURST_SAMPLES = 64
+BLOCK_S = 1.0  # over which it is told whether the load rests
+STILL_PER_S = 0.004  # full scales a second: 3 N/s on 800 N
+LEAST_BLOCKS = 8
+QUIETER = 0.25  # of a tone's power while the load moves: half its amplitude
 
 
 @dataclass(frozen=True)
@@ -89,7 +93,8 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     Each bin of the periodogram over the mean of its neighbours, which has an F distribution where the noise is
     locally flat (Fisher's test with a local floor), at one false alarm in 1000 for the whole spectrum; on the whole
     record and on averages over segments of it, since the mains wander. A line that the ``prediction`` (n,) has as
-    well is the load's, and one that comes and goes is ringing.
+    well is the load's, one that comes and goes is ringing, and one that is quieter while the load rests is what the
+    load's moving makes.
     """
     best: tuple[float, float, float, float] | None = None
     levelled = _levelled(residual) if residual.size >= LEAST_SAMPLES else residual
@@ -104,6 +109,8 @@ def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_
     _, ratio, threshold, near_hz = best
     frequency = _refined(residual, near_hz, sample_time_s)
     if not _is_steady(residual, frequency, sample_time_s):
+        return None
+    if not _stands_at_rest(residual, conditions.load, frequency, sample_time_s):
         return None
     cosine, sine = _amplitudes(residual, frequency, sample_time_s)
     sources = tuple(
@@ -193,6 +200,32 @@ def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bo
         # Half the sampling rate shows of a tone what its phase leaves, which turns slowly.
         return bool(np.median(power) > 0.5 * STEADY * np.mean(power))
     return bool(np.median(power) > (STEADY + (STEADIER - STEADY) * over / (over + 3.0)) * np.mean(power))
+
+
+def _stands_at_rest(residual: Array, load: Array, frequency_hz: float, sample_time_s: float) -> bool:
+    """Whether the tone is as loud while the ``load`` (n,) rests as while it moves, where there is enough of both."""
+    length = max(round(BLOCK_S / sample_time_s), 8)
+    count = residual.size // length
+    parts, loads = (one[: count * length].reshape(count, length) for one in (residual, load))
+    half = length // 2
+    rates = np.abs(loads[:, half:].mean(axis=1) - loads[:, :half].mean(axis=1)) / (half * sample_time_s)
+    still = rates < STILL_PER_S
+    if min(still.sum(), (~still).sum()) < LEAST_BLOCKS:
+        return True
+    turns = -2j * np.pi * sample_time_s * np.arange(length)
+    window = np.hanning(length)
+    beside = 4.0 / (length * sample_time_s)
+
+    def powers(at_hz: float) -> Array:
+        centred = parts - parts.mean(axis=1, keepdims=True)
+        return np.asarray(np.abs(np.sum(centred * (np.exp(turns * at_hz) * window), axis=1)) ** 2)
+
+    whole, floor = powers(frequency_hz), 0.5 * (powers(frequency_hz + beside) + powers(frequency_hz + 1.5 * beside))
+    resting = float(whole[still].mean() - floor[still].mean())
+    moving = float(whole[~still].mean() - floor[~still].mean())
+    # A power's standard deviation is as large as the power itself.
+    unsure = 3.0 * float(floor[still].mean()) / math.sqrt(float(still.sum()))
+    return resting + unsure > QUIETER * moving
 
 
 def _levelled(residual: Array) -> Array:
