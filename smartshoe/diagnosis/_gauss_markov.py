@@ -58,6 +58,10 @@ class GaussMarkov:
         two_levels = -2.0 * (clear / (clear + 1.0)) ** 2  # excess kurtosis of two, each clear of their mean by noise
         return random and self.surprises > self._deviations and self.flatness < two_levels
 
+    def of_a_mean(self, duration_s: float) -> float:
+        """Standard deviation of its mean over ``duration_s``: what a memory covers counts once (Box and Jenkins)."""
+        return self.rms * math.sqrt(min(2.0 * self.tau_s / duration_s, 1.0))
+
     @property
     def _is_white(self) -> bool:
         """By the tail of Kolmogorov's distribution."""

@@ -171,7 +171,7 @@ def _diagnosed(
     names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
-    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds)
+    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, within.memory, thresholds)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
     past = [_said_of_the_past(one, scale) for one in zeros if one.is_past]
     zeros = tuple(one for one in zeros if not one.is_past)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Scale, Session, begins_unloaded
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -94,7 +95,7 @@ def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, th
     """
     moves = [_drifted(one, model) for one in sessions if one.fitted.any()]
     moved = float(np.mean([one[-1] - one[0] for one in moves]))
-    return 0.0 < value * moved and abs(value) <= thresholds.extrapolates * abs(moved)
+    return value * moved > 0.0 and abs(value) <= thresholds.extrapolates * abs(moved)
 
 
 def zeros_of(
@@ -103,11 +104,13 @@ def zeros_of(
     scale: Scale,
     left: float,
     remembered: float,
+    noise: GaussMarkov | None,
     thresholds: Thresholds,
 ) -> tuple[Zero, ...]:
     """What is named of the zeros, largest first; ``left``: rms of the structure that the model does not explain.
 
     Such structure may lie at rest as anywhere. ``remembered``: size of the effects with a memory of the wall.
+    ``noise``: what is left that remembers; where it is noise, a rest holds it as any other stretch does.
     """
     if scale.unit.quantity != "pressure":
         return ()
@@ -118,7 +121,8 @@ def zeros_of(
     loads, readings, drifted = rests.T
     sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
-    reading_sd = float(np.hypot(reading_sd, thresholds.departure * np.mean(np.abs(drifted))))
+    slow = noise.of_a_mean(thresholds.hold_s) / np.sqrt(len(rests)) if noise is not None and noise.is_noise else 0.0
+    reading_sd = float(np.linalg.norm([reading_sd, thresholds.departure * np.mean(np.abs(drifted)), slow]))
     load, reading = float(np.mean(loads)), float(np.mean(readings))
     many = largest_of_noise(1, thresholds)
     if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
