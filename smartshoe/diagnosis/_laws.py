@@ -75,10 +75,11 @@ def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[flo
     for law in available(likelihood.sessions):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
             continue
-        one = _begun(law, nothing.model, likelihood)
+        # A law that stands beside the block may do without it.
+        one = nothing if law.name in bare.names else _begun(law, nothing.model, likelihood)
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
-        most = thresholds.departure if _is_stretched(one.model) else thresholds.law_departure
+        most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
         missed = (one.cost + other - flexible) / max(nothing.cost - flexible, other, 1e-9)
         if missed < most**2:
             misses.append((missed, one))
@@ -94,9 +95,9 @@ def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
     return fit(likelihood, min((fit(likelihood, one, 1) for one in starts), key=lambda f: f.cost).model, FEW_STEPS)
 
 
-def _is_stretched(model: ExtendedModel) -> bool:
-    """Whether a shape of the last effect lies at a bound: beyond it the equation means something else."""
-    last = model.parts[-1]
+def _is_stretched(model: ExtendedModel, law: Effect) -> bool:
+    """Whether a shape of a law lies at a bound: beyond it the equation means something else."""
+    last = next(part for part in model.parts if part.name == law.name)
     return any(
         parameter.null is None and not parameter.lower < float(value) < parameter.upper
         for parameter, value in zip(last.effect.parameters, last.values, strict=True)
