@@ -87,9 +87,11 @@ def test_any_weights_within_the_bounds_are_undone(name: str, seed: int) -> None:
 def test_a_twin_presses_what_the_model_reads(name: str) -> None:
     one = effect(name)
     model = BASELINE.with_part(one, one.begun(sizes=1.0))
-    at = loading(4)
-    pressure_pa = TwinBladder(model).press(800.0 * at.load, 1.0 / STEP_S)
-    assert pressure_pa == pytest.approx(100.0 * model.reading(at), abs=1e-6)  # mbar
+    load = loading(4).load
+    since_rest = np.concatenate([[0.0], load])  # the twin's clock starts at rest, a step before its first load
+    at = Conditions(np.arange(since_rest.size) * STEP_S, since_rest, STEP_S)
+    pressure_pa = TwinBladder(model).press(800.0 * load, 1.0 / STEP_S)
+    assert pressure_pa == pytest.approx(100.0 * model.reading(at)[1:], abs=1e-6)  # mbar
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -295,3 +297,36 @@ def test_heat_that_leaves_in_one_time_is_that_of_the_law() -> None:
     np.testing.assert_allclose(one, effect("gas_heat").apply(at.load, at, np.array([0.05, 2.0, 0.0])), atol=1e-10)
     slowly = effect("flexible_heat").apply(at.load, at, np.array([0.05, 16.0, 0.9, 8.0]))
     assert np.max(np.abs(slowly - one)) < 0.3 * np.max(np.abs(one - at.load))  # nine tenths leave at 2 1/s too
+
+
+def at_rest_or_loaded(hours: float = 0.1) -> Conditions:
+    time_s = np.arange(0.0, 3600.0 * hours, 0.5)
+    return Conditions(time_s, 0.5 + 0.5 * np.sin(time_s), 0.5)
+
+
+def test_a_gain_that_drifts_at_its_own_pace_is_a_line_at_first_and_settles_at_its_change() -> None:
+    at = at_rest_or_loaded()
+    gain = effect("flexible_gain_drift").apply(at.load, at, np.array([0.1, 1000.0, 1.0])) / at.load
+    assert gain[0] == pytest.approx(1.0, abs=1e-12)
+    assert gain == pytest.approx(1.0 - 0.1 * np.expm1(-at.time_s / 1000.0), abs=1e-12)
+    settled = effect("flexible_gain_drift").apply(at.load, at, np.array([-0.2, 5.0, 0.8])) / at.load
+    assert settled[-1] == pytest.approx(0.8, abs=1e-6)
+
+
+@given(change=st.floats(-0.3, 0.3), tau_s=st.floats(20.0, 500.0))
+def test_below_a_stretch_of_one_half_a_drift_goes_by_the_root_of_time(change: float, tau_s: float) -> None:
+    at = at_rest_or_loaded()
+    early = at.time_s < 1e-3 * tau_s
+    for name, signal in (("flexible_gain_drift", np.ones_like(at.load)), ("flexible_zero_drift", at.load)):
+        moved = effect(name).apply(signal, at, np.array([change, tau_s, 0.5])) - signal
+        by_root = change * np.sqrt(2.0 * at.time_s / tau_s)  # the mean time of settling is twice s
+        assert moved[early] == pytest.approx(by_root[early], rel=0.05)
+
+
+def test_a_zero_that_drifts_at_its_own_pace_follows_the_laws_of_its_family() -> None:
+    at = at_rest_or_loaded()
+    law = effect("warm_up").apply(at.load, at, np.array([0.02, 60.0, 0.9]))
+    np.testing.assert_array_equal(effect("flexible_zero_drift").apply(at.load, at, np.array([0.02, 60.0, 0.9])), law)
+    line = effect("flexible_zero_drift").apply(at.load, at, np.array([0.4, 2000.0, 1.0])) - at.load
+    straight = np.polyval(np.polyfit(at.time_s, line, 1), at.time_s)
+    assert np.max(np.abs(line - straight)) < 0.05 * np.ptp(line)
