@@ -171,7 +171,7 @@ def _diagnosed(
     names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
-    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, within.memory, thresholds)
+    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds, within.memory)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
     past = [_said_of_the_past(one, scale) for one in zeros if one.is_past]
     zeros = tuple(one for one in zeros if not one.is_past)
@@ -182,7 +182,7 @@ def _diagnosed(
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
     known = _known_error(integrity, scale)
-    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, known, thresholds, follows)
+    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds, follows, known)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
@@ -238,13 +238,13 @@ def _verdict(
     causes: Sequence[Cause],
     before: ResidualStructure,
     after: ResidualStructure,
-    known: float,
     thresholds: Thresholds,
     follows: bool = True,
+    known: float = 0.0,
 ) -> Verdict:
-    """``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
+    """``follows``: every cause has a law, so that what is left may be what laws usually depart by.
 
-    ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
+    ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
     """
     left = after.rms if after.significant else 0.0
     least = max(thresholds.material, thresholds.tolerable, known)

@@ -104,8 +104,8 @@ def zeros_of(
     scale: Scale,
     left: float,
     remembered: float,
-    noise: GaussMarkov | None,
     thresholds: Thresholds,
+    noise: GaussMarkov | None = None,
 ) -> tuple[Zero, ...]:
     """What is named of the zeros, largest first; ``left``: rms of the structure that the model does not explain.
 

@@ -67,6 +67,45 @@ def test_the_size_of_slow_noise_is_that_of_its_part_which_remembers(sessions, ta
     assert np.mean(ratios, axis=0) == pytest.approx(1.0, abs=0.1)
 
 
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 999), st.floats(0.01, 0.05))
+def test_noise_that_grows_with_the_load_remembers_nothing(sessions, seed, loudest):
+    """White noise of any loudness: neighbours agree by chance alone (White 1980)."""
+    rng = np.random.default_rng(seed)
+    residuals = [loudest * one.conditions.load**3 * rng.standard_normal(one.reading.size) for one in sessions]
+    found = gauss_markov_of(sessions, residuals, STANDARD)
+    assert found is not None
+    assert not found.is_noise  # its loudness follows the load
+    assert found.rms < 0.05 * loudest
+
+
+def test_what_swings_is_foretold_though_neighbours_disagree(sessions):
+    """A sawtooth of 3 Hz while the load moves: blocks of a fifth of a second alternate."""
+    size = 0.01
+    residuals = []
+    for one, noise in zip(sessions, noises(sessions, 5), strict=True):
+        moving = np.abs(one.conditions.rate_per_s) > STANDARD.still_per_s
+        residuals.append(noise + size * moving * (2.0 * np.mod(3.1 * one.conditions.time_s, 1.0) - 1.0))
+    found = gauss_markov_of(sessions, residuals, STANDARD)
+    assert found is not None
+    assert not found.is_noise
+    assert found.rms > 0.1 * size
+    assert residual_structure(sessions, residuals, STANDARD).significant
+
+
+@pytest.mark.parametrize("tau_s", [0.4, 1.0])
+def test_a_mean_of_slow_noise_is_known_by_how_often_it_forgets(sessions, tau_s):
+    """Means over many memories scatter as first-order noise's do; one within a memory is a sample."""
+    found = gauss_markov_of(sessions, noises(sessions, 3, tau_s, 0.01), STANDARD)
+    assert found is not None
+    rng, step_s = np.random.default_rng(8), 0.02
+    keep = float(np.exp(-step_s / found.tau_s))
+    slow = found.rms * np.sqrt(1.0 - keep**2) * lfilter([1.0], [1.0, -keep], rng.standard_normal(400_000))
+    means = slow.reshape(-1, round(20.0 * tau_s / step_s)).mean(axis=1)
+    assert found.of_a_mean(20.0 * tau_s) == pytest.approx(float(means.std()), rel=0.1)
+    assert found.of_a_mean(0.01 * tau_s) == found.rms
+
+
 def averaged(rng: np.random.Generator, size: int, step_s: float, length_s: float) -> np.ndarray:
     """White noise through a running mean, of unit variance."""
     width = round(length_s / step_s)

@@ -125,3 +125,20 @@ def test_a_curve_that_gave_way_to_a_law_does_not_come_back_as_another_curve() ->
     assert curves
     for block in flexible:
         assert set(_laws._replaced_with(block)) == (curves if block.name in curves else {block.name})
+
+
+def test_a_law_that_stands_beside_a_block_may_do_without_it(costs: dict[str, tuple[float, float]]) -> None:
+    """It is not put in a second time: the model without the block is its fit."""
+    block, law = blocks()["gain_drift"][0], effect("gain_drift")
+    both = MODEL.with_part(law, law.start()).with_part(block)
+    state: Any = SimpleNamespace(
+        thresholds=STANDARD, fit=SimpleNamespace(model=both), evidence=SimpleNamespace(odds=10.0)
+    )
+    likelihood: Any = SimpleNamespace(cost=lambda model: NOTHING_COST - 1.0, sessions=())
+    member: Any = SimpleNamespace(effect=block, name=block.name)
+    costs["gain_drift"] = (0.0, USUAL)  # of a second one, were it tried
+    assert _laws._law_of(member, state, likelihood) is None
+    likelihood.cost = lambda model: NOTHING_COST + 1.0
+    found = _laws._law_of(member, state, likelihood)
+    assert found is not None
+    assert found[1].model.names == ("gain_drift",)

@@ -274,6 +274,16 @@ def test_what_is_left_is_measured_by_what_was_wrong_before() -> None:
     assert _verdict(causes, chance, _left(left), limits) == "partly_explained"
 
 
+def test_what_a_grid_adds_is_left_whatever_the_model() -> None:
+    limits = Thresholds()
+    left = 3.0 * limits.tolerable
+    for known, verdict in ((0.0, "unexplained"), (0.9 * left, "unexplained"), (1.1 * left, "adequate")):
+        assert _verdict([], _left(left), _left(left), limits, known=known) == verdict
+    causes: Any = [SimpleNamespace(name="dead_band")]
+    assert _verdict(causes, _left(left), _left(left), limits) == "partly_explained"
+    assert _verdict(causes, _left(left), _left(left), limits, known=1.1 * left) == "explained"
+
+
 def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list[Recording]) -> None:
     """So that it reads as was logged; once, whatever the gain at the chain's end."""
     usable = [run.sensor.present for run in runs]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of, lagged
+from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
 from smartshoe.models.core import USUAL_WALL_RATIO
@@ -138,6 +139,33 @@ def test_what_has_drifted_by_the_first_rest_is_no_zero() -> None:
     kept = STANDARD.hold_s > TIME_S
     assert rest[2] == pytest.approx(0.002 * float(np.mean(TIME_S[kept])), rel=0.05)
     assert rest[1] == pytest.approx(-rest[2], abs=1e-3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_offset_that_a_drift_of_the_zero_may_have_come_by_is_its_past(sign: float) -> None:
+    """It lies the way that the zero drifts, and within an order of magnitude of what it drifts by in a recording."""
+    duration_s = float(TIME_S[-1])
+    sessions, scale = _sessions(_run(offset=0.03 * sign, seed=1), _run(offset=0.03 * sign, seed=2))
+    for moved, is_past in ((0.006, True), (0.0015, False), (0.0, False), (-0.006, False)):
+        drift = np.array([sign * moved / duration_s, 0.0])
+        drifting = baseline_of(sessions, scale).with_part(effect("zero_drift"), drift)
+        (found,) = zeros_of(sessions, drifting, scale, 0.0, 0.0, STANDARD)
+        assert found.effect.name == "zero_offset"
+        assert found.is_past == is_past
+
+
+def test_an_offset_within_what_slow_noise_makes_of_a_rest_is_none() -> None:
+    noise = replace(GaussMarkov(0.0, 1.5, 0.0, 0.0, 0.0, 0.0, STANDARD), rms=0.02)
+    sessions, scale = _sessions(_run(offset=0.03, seed=1), _run(offset=0.03, seed=2))
+    model = baseline_of(sessions, scale)
+    (known,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD)
+    assert zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, noise) == ()
+    (quieter,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, replace(noise, rms=0.002))
+    of_the_mean = 0.002 / np.sqrt(2.0)  # a memory of half the rest's three seconds: each rest is one look at it
+    assert quieter.sd == pytest.approx(np.hypot(known.sd, of_the_mean), rel=1e-6)
+    structure = replace(noise, coloured=9.0)  # what is no noise is counted with the structure
+    (same,) = zeros_of(sessions, model, scale, 0.0, 0.0, STANDARD, structure)
+    assert (same.value, same.sd) == (known.value, known.sd)
 
 
 def test_each_recordings_own_offset_is_found_under_a_model() -> None:

@@ -147,6 +147,7 @@ def test_a_coarse_lattice_is_a_fault(protocol, seed, step_percent):
     assert kinds(found) == {"quantisation"}
     said = float(found.faults[0].says.split(" of ")[1].split(" mbar")[0])
     assert said == pytest.approx(step, rel=1e-3)
+    assert found.faults[0].error == pytest.approx(step / np.sqrt(12.0), rel=1e-3)
     assert found.usable[0].all()
 
 

@@ -208,6 +208,20 @@ def test_what_comes_and_goes_is_no_tone(noise: Callable[[np.random.Generator], n
         assert CASE.found(hum, _white(rng) + noise(rng)) is None
 
 
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 10**6), tone_hz=st.floats(4.0, 45.0), quieter=st.floats(0.0, 0.35))
+def test_what_is_quieter_while_the_load_rests_is_no_tone(seed: int, tone_hz: float, quieter: float) -> None:
+    """Three quarters of the record move, so that it is steady enough; as loud at rest it is a tone."""
+    rng = np.random.default_rng(seed)
+    case = Case(repeats=6)
+    resting = np.abs(np.gradient(case.load, STEP_S)) < 1e-9
+    assert 0.1 < resting.mean() < 0.4
+    white = FLOOR * rng.standard_normal(case.n)
+    tone = 0.004 * np.sin(2.0 * np.pi * tone_hz * case.time_s)
+    assert case.found(hum, white + np.where(resting, quieter * tone, tone)) is None
+    assert case.found(hum, white + tone) is not None
+
+
 @pytest.mark.parametrize(
     ("tone_hz", "logged_hz"), [(50.0, 50.0), (60.0, 40.0), (100.0, 0.0), (150.0, 50.0), (180.0, 20.0), (30.0, 30.0)]
 )
