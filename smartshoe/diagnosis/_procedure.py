@@ -29,6 +29,7 @@ from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
+from smartshoe.models.effects import Effect
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
@@ -129,6 +130,7 @@ class _Prepared:
     start: ExtendedModel
     excitation: Excitation
     is_no_unit: bool
+    clocks: Sequence[tuple[Effect, Array]]
 
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
@@ -147,7 +149,7 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit)
+    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts)
 
 
 @on_one_thread
@@ -170,6 +172,8 @@ def _diagnosed(
     silent = given.is_no_unit or not found.can_validate
     names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
+    parted = [said for one, values in given.clocks if (said := _parted(one, values, extended, thresholds))]
+    names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds, within.memory)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
@@ -208,7 +212,7 @@ def _diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
         ),
-        limits=(*given.limits, *past, *_refused_members(found)),
+        limits=(*given.limits, *parted, *past, *_refused_members(found)),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         model=with_zero,
@@ -232,6 +236,18 @@ def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[R
 def _known_error(integrity: Integrity, scale: Scale) -> float:
     """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
     return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
+
+
+def _parted(told: Effect, values: Array, model: ExtendedModel, thresholds: Thresholds) -> str | None:
+    """What is said of a lag between clocks that the fit sees otherwise than the edges of load and reading did."""
+    lag_s, unit = float(values[0]), told.parameters[0].unit
+    fitted_s = next((float(part.values[0]) for part in model.parts if part.name == told.name), lag_s)
+    if unit != "s" or abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
+        return None
+    return (
+        f"the reading is {lag_s:.3g} s late by the edges of load and reading, {fitted_s:.3g} s beside the other"
+        " effects: one of them imitates the rest (record both by one clock)"
+    )
 
 
 def _verdict(
