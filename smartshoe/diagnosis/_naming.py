@@ -44,7 +44,8 @@ def _named(one: Member, kind: float, left: float, thresholds: Thresholds) -> Nam
     margins = {a.effect: a.margin for a in one.laws}
     nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
-    sure = probability_of_kind(one, left, thresholds, lawless=True)
+    # Of a family of one law nothing follows better or worse than another.
+    sure = probability_of_kind(one, left, thresholds, lawless=bool(others))
     return Name(one, nearest, sure, 1.0 / len(family), others, True)
 
 

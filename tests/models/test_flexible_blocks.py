@@ -49,7 +49,6 @@ def test_blocks_stand_apart_from_the_effects_that_may_be_named() -> None:
     assert set(NAMES) == {
         "flexible_curve", "flexible_characteristic", "flexible_relaxation", "flexible_loop", "flexible_set",
         "flexible_asymmetry", "flexible_heat", "flexible_softening", "flexible_gain_drift",
-        "flexible_zero_drift",
     }  # fmt: skip
     assert not set(NAMES) & set(catalogue())
     assert not any(one.is_flexible for one in catalogue().values())
@@ -314,19 +313,9 @@ def test_a_gain_that_drifts_at_its_own_pace_is_a_line_at_first_and_settles_at_it
 
 
 @given(change=st.floats(-0.3, 0.3), tau_s=st.floats(20.0, 500.0))
-def test_below_a_stretch_of_one_half_a_drift_goes_by_the_root_of_time(change: float, tau_s: float) -> None:
+def test_at_a_stretch_of_one_half_a_drift_goes_by_the_root_of_time(change: float, tau_s: float) -> None:
     at = at_rest_or_loaded()
     early = at.time_s < 1e-3 * tau_s
-    for name, signal in (("flexible_gain_drift", np.ones_like(at.load)), ("flexible_zero_drift", at.load)):
-        moved = effect(name).apply(signal, at, np.array([change, tau_s, 0.5])) - signal
-        by_root = change * np.sqrt(2.0 * at.time_s / tau_s)  # the mean time of settling is twice s
-        assert moved[early] == pytest.approx(by_root[early], rel=0.05)
-
-
-def test_a_zero_that_drifts_at_its_own_pace_follows_the_laws_of_its_family() -> None:
-    at = at_rest_or_loaded()
-    law = effect("warm_up").apply(at.load, at, np.array([0.02, 60.0, 0.9]))
-    np.testing.assert_array_equal(effect("flexible_zero_drift").apply(at.load, at, np.array([0.02, 60.0, 0.9])), law)
-    line = effect("flexible_zero_drift").apply(at.load, at, np.array([0.4, 2000.0, 1.0])) - at.load
-    straight = np.polyval(np.polyfit(at.time_s, line, 1), at.time_s)
-    assert np.max(np.abs(line - straight)) < 0.05 * np.ptp(line)
+    moved = effect("flexible_gain_drift").apply(np.ones_like(at.load), at, np.array([change, tau_s, 0.5])) - 1.0
+    by_root = change * np.sqrt(2.0 * at.time_s / tau_s)  # the mean time of settling is twice s
+    assert moved[early] == pytest.approx(by_root[early], rel=0.05)
