@@ -131,6 +131,14 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.law == pytest.approx(1.0 / len(family))
 
 
+def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
+    """No law of it follows better or worse than another, so that nothing speaks for a kind that is not there."""
+    (block,) = blocks()["gain_drift"]
+    name = only(names_of([member(block)], 0.0, STANDARD))
+    assert (name.effect.name, name.equivalents, name.kind_only) == ("gain_drift", (), True)
+    assert name.confidence == probability_of_kind(name.member, 0.0, STANDARD)
+
+
 # -- what each number decides -----------------------------------------------------------------------------------
 def test_material_is_the_size_from_which_on_a_member_is_named() -> None:
     small = [member(size=1e-3)]

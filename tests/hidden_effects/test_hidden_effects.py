@@ -20,6 +20,7 @@ from bank_scoring import FAULT_IS, Score, score
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
+from simulators.hidden.cases import case
 from simulators.hidden.effects import EFFECTS
 from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe.diagnosis import Diagnosis, diagnose
@@ -204,6 +205,24 @@ def test_two_effects_are_both_named(effects, protocol):
     assert one.gain_percent > 0
     assert one.removed is not None
     assert one.removed > 0.9
+
+
+def test_a_gain_that_settles_with_the_clock_is_a_drift_of_the_gain_and_no_conditioning() -> None:
+    made = case("single", 558)
+    assert [(effect["id"], effect["law"]) for effect in made.truth["effects"]] == [("gain_drift", "settling")]
+    found = diagnose(made.recordings, hold_out=made.hold_out)
+    assert [cause.effect.family for cause in found.causes] == ["gain_drift"]
+    assert found.explained_percent > 0.9 * found.explainable_percent
+
+
+def test_a_zero_that_drifted_before_the_recordings_began_is_no_offset_beside_its_drift() -> None:
+    made = case("single", 543)
+    assert [effect["id"] for effect in made.truth["effects"]] == ["warm_up"]
+    found = diagnose(made.recordings, hold_out=made.hold_out)
+    assert "warm_up" in {cause.name for cause in found.causes}
+    assert not {"zero_offset", "load_cell_tare"} & {cause.name for cause in found.causes}
+    assert any("may have begun before" in said for said in found.limits)
+
 
 
 @pytest.mark.parametrize("kind", ["grid", "single", "pair", "none", "outside", "calibrate"])
