@@ -30,7 +30,7 @@ from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, MOST_MEMBERS, additions
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
-from smartshoe.diagnosis._validation import LeftOut, apart, error_of, extrapolating
+from smartshoe.diagnosis._validation import LeftOut, apart, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
@@ -109,6 +109,14 @@ def _judged(
         for one in (given.candidates[m].effect for m in best.members):
             model = fit(likelihood, begun_with(one, model, likelihood), FEW_STEPS).model
         extended = fit(likelihood, model)
+    while undone := cancelling(sessions, extended.model, state.thresholds):
+        less = {name: fit(likelihood, extended.model.without(name)) for name in undone}
+        idle = min(undone, key=lambda name: less[name].cost)
+        if error_of(sessions, less[idle].model) ** 2 > state.thresholds.clear * error_of(sessions, extended.model) ** 2:
+            break  # each is needed, though they pull in opposite ways
+        refused.append(idle)
+        extended = less[idle]
+        best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != idle))
     while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))

@@ -107,6 +107,29 @@ def extrapolating(sessions: Sequence[Session], model: ExtendedModel, thresholds:
     return None
 
 
+def cancelling(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> list[str]:
+    """Effects that undo each other: each moves the reading by more than all of them do together, or nearly so.
+
+    Powers of independent effects add up to that of all; where they are clear of it, most of what the effects do is
+    undone by one another, and they fit by their difference, which is neither's.
+    """
+    bare = model
+    for part in model.parts:
+        bare = bare.without(part.name)
+    seen = [one.fitted for one in sessions]
+    whole = [model.simulate(one.conditions) for one in sessions]
+
+    def moved(less: ExtendedModel) -> float:
+        by = [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
+        return _spread(by, seen)
+
+    sizes = {part.name: moved(model.without(part.name)) for part in model.parts}
+    together = moved(bare)
+    if sum(size**2 for size in sizes.values()) <= thresholds.clear * together**2:
+        return []
+    return [name for name, size in sizes.items() if size > (1.0 - thresholds.same) * together]
+
+
 def error_of(sessions: Sequence[Session], model: ExtendedModel) -> float:
     """Rms of what is left of what is fitted."""
     return _fitted_rms(sessions, lambda session: residual_of(session, model))

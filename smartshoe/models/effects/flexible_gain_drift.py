@@ -23,7 +23,7 @@ class FlexibleGainDrift(Effect):
     parameters = (
         EffectParameter("change", "1", "share of the gain gained once settled", 0.0, -0.5, 0.5, 0.01),
         EffectParameter("time_constant", "s", "mean time of settling", None, 5.0, 1000.0, 60.0),
-        EffectParameter("stretch", "1", "exponent of the settling, 1 for a single time constant", None, 0.5, 1.4, 0.2),
+        EffectParameter("stretch", "1", "exponent of the settling, 1 for a single time constant", None, 0.5, 1.0, 0.2),
     )
     shapes = tuple({"time_constant": tau, "stretch": 1.0} for tau in (30.0, 100.0, 300.0))
     exposed_by = by("repeats", "peaks", "pauses")
