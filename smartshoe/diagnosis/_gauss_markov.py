@@ -120,7 +120,8 @@ def gauss_markov_of(
     tau_s = _memory_s(weights, lags, float(np.median([one.step_s for one in blocks])))
     tests = coloured, float(kurtosis), float(follows)
     foretold = max(float(covariance[0]) - float(np.mean(unscaled)), 0.0)
-    rms = math.sqrt(max(_remembered(blocks, thresholds), foretold))
+    one, two = (_lagged(blocks, lag, thresholds) / there for lag in (1, 2))
+    rms = math.sqrt(max(_remembered(float(covariance[0]), one, two), foretold))
     return GaussMarkov(rms, tau_s, *tests, flatness, thresholds)
 
 
@@ -178,20 +179,19 @@ def _memory_s(weights: Array, lags: int, step_s: float) -> float:
     return float(fallen[0]) * step_s if fallen.size and fallen[0] < lags else math.inf
 
 
-def _remembered(blocks: Sequence[_Blocks], thresholds: Thresholds) -> float:
-    """Variance of the part that remembers: neighbours' covariance a step back, as it falls from one to the next.
+def _remembered(whole: float, one: float, two: float) -> float:
+    """Variance of the part that remembers: neighbours' covariance ``one`` step back, as it falls to the next.
 
-    A covariance counts where it stands out of what noise without a memory would show, however its loudness changes
-    (White 1980, errors that hold under any heteroscedasticity); one step is not led back by a second that does not.
+    No more than the ``whole`` variance; one step is not led back by a second that noise alone would show.
     """
-    one, two = (_lagged(blocks, lag, thresholds) for lag in (1, 2))
-    whole = sum(float(block.residual @ block.residual) for block in blocks)
-    remembered = min(one * one / two, whole) if 0.0 < two < one else one
-    return remembered / sum(int(block.there.sum()) for block in blocks)
+    return min(one * one / two, whole) if 0.0 < two < one else one
 
 
 def _lagged(blocks: Sequence[_Blocks], lag: int, thresholds: Thresholds) -> float:
-    """Sum of the products of blocks that lie ``lag`` apart, 0 where noise alone would make it as large."""
+    """Sum of the products of blocks that lie ``lag`` apart, 0 where noise without a memory would make it as large.
+
+    However the noise's loudness changes (White 1980, errors that hold under any heteroscedasticity).
+    """
     products = np.concatenate([one.residual[lag:] * one.residual[: one.residual.size - lag] for one in blocks])
     found = float(products.sum())
     return found if found > largest_of_noise(1, thresholds) * math.sqrt(float(products @ products)) else 0.0

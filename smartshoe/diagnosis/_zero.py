@@ -94,7 +94,7 @@ def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, th
     may have been under way for a few of its time constants.
     """
     moves = [_drifted(one, model) for one in sessions if one.fitted.any()]
-    moved = float(np.mean([one[-1] - one[0] for one in moves]))
+    moved = sum(float(one[-1] - one[0]) for one in moves) / max(len(moves), 1)
     return value * moved > 0.0 and abs(value) <= thresholds.extrapolates * abs(moved)
 
 

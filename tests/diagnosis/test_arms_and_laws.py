@@ -203,4 +203,4 @@ def test_only_a_shape_within_its_bounds_is_not_stretched() -> None:
             if parameter.null is None:
                 values[j] = 0.5 * (parameter.lower + parameter.upper)
         values[k] = value
-        assert _is_stretched(MODEL.with_part(law, values)) is stretched
+        assert _is_stretched(MODEL.with_part(law, values), law) is stretched

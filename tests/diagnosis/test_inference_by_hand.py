@@ -171,6 +171,8 @@ class _Judge:
         self.errors: dict[tuple[str, ...], float] = {(): 1.0}
         self.follows: tuple[str, ...] = ("a", "b")
         self.beyond: list[str] = []
+        self.undone: list[list[str]] = []
+        self.costs: dict[tuple[str, ...], float] = {}
         self.stands = True
         names = ("a", "b", "clock")
         self.candidates = [candidate(name) for name in names]
@@ -193,8 +195,13 @@ class _Judge:
         monkeypatch.setattr(_inference, "LeftOut", Left)
         monkeypatch.setattr(_inference, "with_members", lambda *given: self.model("a", "b"))
         monkeypatch.setattr(
-            _inference, "fit", lambda likelihood, model, *steps: SimpleNamespace(model=model, how=steps)
+            _inference,
+            "fit",
+            lambda likelihood, model, *steps: SimpleNamespace(
+                model=model, how=steps, cost=self.costs.get(model.names, 0.0)
+            ),
         )
+        monkeypatch.setattr(_inference, "cancelling", lambda *given: self.undone.pop() if self.undone else [])
         monkeypatch.setattr(_inference, "begun_with", lambda one, model, likelihood: self.model(*model.names, one.name))
         monkeypatch.setattr(_inference, "extrapolating", lambda *given: self.beyond.pop() if self.beyond else None)
         monkeypatch.setattr(
@@ -226,6 +233,19 @@ def test_what_does_not_follow_what_is_left_out_is_refused(monkeypatch: pytest.Mo
     judge.follows, judge.beyond = ("a", "b"), ["b"]
     fit, members, refused = judge.judged()
     assert (fit.model.names, members, refused) == (("a",), ((0,), ("b",)), ("b",))
+
+
+def test_of_effects_that_undo_one_another_the_idle_one_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without which the fit is likeliest, unless the squared error is clear of what it was: then each is needed."""
+    judge = _Judge(monkeypatch)
+    judge.costs, judge.undone = {("a",): 3.0, ("b",): 2.0}, [["a", "b"]]
+    fit, members, refused = judge.judged()
+    assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
+    enough = 0.5 * np.sqrt(STANDARD.clear)
+    for error, is_needed in ((0.999 * enough, False), (1.001 * enough, True)):
+        judge.errors[("b",)], judge.undone = error, [["a", "b"]]
+        fit, members, refused = judge.judged()
+        assert (fit.model.names == ("a", "b"), refused == ()) == (is_needed, is_needed)
 
 
 @pytest.mark.parametrize("error", [1.0, 1.5])

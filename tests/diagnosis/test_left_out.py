@@ -13,7 +13,7 @@ from smartshoe.diagnosis import Thresholds, _validation
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._session import Session, full_scale, prepare
-from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of
+from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, cancelling, error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
@@ -154,3 +154,40 @@ def test_of_two_that_fail_that_one_goes_first_without_which_the_error_is_least(m
     monkeypatch.setattr(_validation, "fit", kept)
     impossible.following(fit(Likelihood(sessions, SD, MODEL, STANDARD), model))
     assert fitted == [("gas_compression",), ()]
+
+
+@pytest.mark.parametrize("reverse", [1.0, -1.0])
+def test_effects_that_fit_by_their_difference_undo_one_another(reverse: float) -> None:
+    """A drift of the zero that another one takes back: powers of 10 and 9 beside that of 1."""
+    sessions = _sessions([MODEL] * 2)
+    per_s = reverse * 0.01 / TIME_S[-1]
+    drift, warm, gain = effect("zero_drift"), effect("warm_up"), effect("gain_drift")
+    slow = np.array([-reverse * 0.009 * 300.0 / TIME_S[-1], 300.0, 1.0])  # a line with the other sign, nearly
+    along = slow * np.array([-1.0, 1.0, 1.0])
+    against = MODEL.with_part(drift, np.array([per_s, 0.0])).with_part(warm, slow)
+    assert cancelling(sessions, against, STANDARD) == ["zero_drift", "warm_up"]
+    together = MODEL.with_part(drift, np.array([per_s, 0.0])).with_part(warm, along)
+    assert cancelling(sessions, together, STANDARD) == []
+    # A small one beside them has no part in it.
+    beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0]))
+    assert cancelling(sessions, beside, STANDARD) == ["zero_drift", "warm_up"]
+    assert cancelling(sessions, MODEL, STANDARD) == []
+    assert cancelling(sessions, MODEL.with_part(warm, slow), STANDARD) == []
+
+
+def test_they_do_where_their_powers_are_clear_of_that_of_all_together() -> None:
+    sessions = _sessions([MODEL] * 2)
+    drift, warm = effect("zero_drift"), effect("warm_up")
+    first, other = (np.array([1e-4, 0.0]), np.array([-1e-4 * 300.0, 300.0, 1.0]))
+
+    def size(model: ExtendedModel) -> float:
+        """Rms of a drift, each recording's mean aside."""
+        moved = [model.simulate(one.conditions) - MODEL.simulate(one.conditions) for one in sessions]
+        return float(np.sqrt(np.mean([np.var(one) for one in moved])))
+
+    both = MODEL.with_part(drift, first).with_part(warm, 0.4 * other + np.array([0.0, 180.0, 0.6]))
+    alone = (MODEL.with_part(drift, first), MODEL.with_part(warm, both.parts[1].values))
+    ratio = sum(size(one) ** 2 for one in alone) / size(both) ** 2
+    assert ratio > 1.5
+    assert cancelling(sessions, both, replace(STANDARD, clear=1.01 * ratio)) == []
+    assert cancelling(sessions, both, replace(STANDARD, clear=0.99 * ratio)) == ["zero_drift"]

@@ -475,11 +475,13 @@ def test_a_rate_that_an_effect_bent_is_found_anew_without_it() -> None:
 
 def test_a_shape_at_a_bound_is_stretched() -> None:
     for softness, is_stretched in ((0.2, False), (0.03, True), (1.0, True)):
-        assert _is_stretched(MODEL.with_part(effect("dead_band"), np.array([0.05, softness]))) is is_stretched
-    # A strength at its bound is no shape, nor are an earlier effect's.
-    assert not _is_stretched(MODEL.with_part(effect("linear_leak"), np.array([0.0])))
+        law = effect("dead_band")
+        assert _is_stretched(MODEL.with_part(law, np.array([0.05, softness])), law) is is_stretched
+    # A strength at its bound is no shape, nor are another effect's.
+    leak = effect("linear_leak")
+    assert not _is_stretched(MODEL.with_part(leak, np.array([0.0])), leak)
     below = MODEL.with_part(effect("dead_band"), np.array([0.05, 0.03]))
-    assert not _is_stretched(below.with_part(effect("linear_leak"), np.array([0.01])))
+    assert not _is_stretched(below.with_part(leak, np.array([0.01])), leak)
 
 
 # -- what to run next ---------------------------------------------------------------------------------------------

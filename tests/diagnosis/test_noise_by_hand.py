@@ -20,6 +20,7 @@ from smartshoe.diagnosis._gauss_markov import (
     _blocks,
     _covariance,
     _kolmogorov,
+    _lagged,
     _memory_s,
     _past_is_known,
     _remembered,
@@ -226,14 +227,23 @@ def test_a_memory_that_lasts_beyond_what_is_looked_at_has_no_end() -> None:
 
 def test_the_part_that_remembers_is_what_its_fall_leads_back_to() -> None:
     """With white noise beside it: covariances 3, 1.6, 1.28 are those of 2 times 0.8 to the lag, and of 1 white."""
-    assert _remembered(np.array([3.0, 1.6, 1.28, 9.0])) == pytest.approx(2.0)
+    assert _remembered(3.0, 1.6, 1.28) == pytest.approx(2.0)
     # No more than there is, no less than what a neighbour shares, and nothing where it shares none.
-    assert _remembered(np.array([1.8, 1.6, 1.28])) == pytest.approx(1.8)
-    assert _remembered(np.array([3.0, 1.6, 1.9])) == pytest.approx(1.6)
-    assert _remembered(np.array([3.0, 1.6, 0.0])) == pytest.approx(1.6)
-    assert _remembered(np.array([3.0, 1.6, -0.5])) == pytest.approx(1.6)
-    assert _remembered(np.array([3.0, -1.0, 0.5])) == pytest.approx(2.0)
-    assert _remembered(np.array([3.0, -1.0, -0.5])) == 0.0
+    assert _remembered(1.8, 1.6, 1.28) == pytest.approx(1.8)
+    assert _remembered(3.0, 1.6, 1.9) == pytest.approx(1.6)
+    assert _remembered(3.0, 1.6, 0.0) == pytest.approx(1.6)
+    assert _remembered(3.0, 0.0, 0.5) == 0.0
+
+
+def test_neighbours_agree_where_noise_alone_would_not() -> None:
+    """Sum of products over the root of the sum of their squares: of n alike their root, of noise chance alone."""
+    for count, sign, is_told in ((14, 1.0, False), (17, 1.0, True), (40, 1.0, True), (40, -1.0, False)):
+        products = 2.0 * np.cumprod(np.full(count + 1, sign))
+        block: Any = SimpleNamespace(residual=products)
+        told = 4.0 * count if is_told else 0.0
+        assert _lagged([block], 1, STANDARD) == pytest.approx(told)
+    alternating: Any = SimpleNamespace(residual=np.resize([1.0, -1.0], 50))
+    assert [_lagged([alternating, alternating], lag, STANDARD) for lag in (1, 2)] == [0.0, pytest.approx(96.0)]
 
 
 def test_the_cumulative_periodogram_leaves_the_straight_line_by_a_lone_frequency() -> None:

@@ -44,6 +44,7 @@ STANDARD = Thresholds()
 MODEL = ExtendedModel(1.2, 0.08, 0.22, 800.0, 140.0, "mbar")
 SCALE = Scale(800.0, -140.0, MILLIBAR, 3.0)
 BEFORE = Errors(np.array([4.0, 12.0]), np.array([100.0, 300.0]), 0.8)
+FAULT: Any = SimpleNamespace(kind="gaps", error=0.0)
 AFTER = Errors(np.array([1.0, 3.0]), np.array([100.0, 300.0]), 0.8)
 
 
@@ -372,6 +373,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
         is_no_unit=False,
+        clocks=(),
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5)
@@ -422,7 +424,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def _run_diagnosis(parts: Any) -> Any:
     said: list[str] = []
-    integrity: Any = SimpleNamespace(faults=("fault",))
+    integrity: Any = SimpleNamespace(faults=(FAULT,))
     result = _diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
     assert said == ["judging on held-out data"]
     return result
@@ -439,7 +441,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert [one.name for one in told.causes] == ["delay", "zero", "linear_leak"]  # the largest first, no immaterial one
     assert (told.unit, told.full_scale_load_n, told.full_scale_reading) == ("mbar", 800.0, 140.0)
     assert (told.verdict, told.says, told.minor) == ("explained", "sentence", ())
-    assert told.data_faults == ("fault", "noise")
+    assert told.data_faults == (FAULT, "noise")
     assert (told.baseline.rmse, told.extended.rmse) == (pytest.approx(28.0), pytest.approx(14.0))
     assert (told.baseline.force_rmse_n, told.extended.force_rmse_n) == (9.0, 7.0)
     assert (told.baseline.structure_rms, told.extended.structure_rms) == (pytest.approx(42.0), pytest.approx(2.8))

@@ -20,7 +20,7 @@ from bank_scoring import FAULT_IS, Score, score
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from simulators.hidden.cases import case
+from simulators.hidden.cases import case as bank_case
 from simulators.hidden.effects import EFFECTS
 from simulators.hidden.recordings import HiddenCase, hide
 from smartshoe.diagnosis import Diagnosis, diagnose
@@ -208,7 +208,7 @@ def test_two_effects_are_both_named(effects, protocol):
 
 
 def test_a_gain_that_settles_with_the_clock_is_a_drift_of_the_gain_and_no_conditioning() -> None:
-    made = case("single", 558)
+    made = bank_case("single", 558)
     assert [(effect["id"], effect["law"]) for effect in made.truth["effects"]] == [("gain_drift", "settling")]
     found = diagnose(made.recordings, hold_out=made.hold_out)
     assert [cause.effect.family for cause in found.causes] == ["gain_drift"]
@@ -216,13 +216,12 @@ def test_a_gain_that_settles_with_the_clock_is_a_drift_of_the_gain_and_no_condit
 
 
 def test_a_zero_that_drifted_before_the_recordings_began_is_no_offset_beside_its_drift() -> None:
-    made = case("single", 543)
+    made = bank_case("single", 543)
     assert [effect["id"] for effect in made.truth["effects"]] == ["warm_up"]
     found = diagnose(made.recordings, hold_out=made.hold_out)
     assert "warm_up" in {cause.name for cause in found.causes}
     assert not {"zero_offset", "load_cell_tare"} & {cause.name for cause in found.causes}
     assert any("may have begun before" in said for said in found.limits)
-
 
 
 @pytest.mark.parametrize("kind", ["grid", "single", "pair", "none", "outside", "calibrate"])
