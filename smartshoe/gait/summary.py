@@ -53,8 +53,7 @@ def steps_of(contacts: Mapping[str, Contacts], strides: Sequence[Stride]) -> dic
         begin = np.array([stride.start_s for stride in strides if stride.foot == foot])
         at = np.searchsorted(other, own) - 1
         there = at >= 0
-        step_s = own[there] - other[at[there]] if other.size else np.zeros(0)
-        inside = other[at[there]] > begin[there] if other.size else np.zeros(0, dtype=bool)
+        step_s, inside = own[there] - other[at[there]], other[at[there]] > begin[there]
         found[foot] = step_s[inside & (step_s < LONGEST_STEP_S)]
     return found
 

@@ -254,6 +254,12 @@ def test_the_feet_are_added_at_the_first_ones_times() -> None:
     assert not total_of(feet, {name: one.time_s for name, one in feet.items()}).missing.any()
 
 
+def test_a_third_of_a_stride_of_three_samples_is_too_much() -> None:
+    total = TotalForce(np.arange(4.0), np.zeros(4), np.array([False, True, False, False]))
+    assert whole_strides(total, [stride(0.0, 3.0)]) == []
+    assert whole_strides(replace(total, missing=np.zeros(4, dtype=bool)), [stride(0.0, 3.0)]) == [stride(0.0, 3.0)]
+
+
 @pytest.mark.parametrize(("gone", "is_whole"), [(60, True), (61, False)])
 def test_of_a_whole_stride_three_tenths_may_be_missing(gone: int, is_whole: bool) -> None:
     missing = np.zeros(2001, dtype=bool)

@@ -137,8 +137,8 @@ def test_what_a_stride_misses_is_counted_from_its_first_sample(count: int, gap: 
 def test_a_stride_runs_where_it_and_the_nearest_of_the_other_foot_are_down_less_than_half(
     left: float, right: float, right_start_s: float, runs: bool
 ) -> None:
-    far = stride(-50.0, foot="right", percent=99.0)
-    given = [far, stride(right_start_s, foot="right", percent=right), stride(0.0, percent=left)]
+    far = stride(-10.0, foot="right", percent=99.0)
+    given = [far, stride(10.0 + right_start_s, foot="right", percent=right), stride(10.0, percent=left)]
     found = with_runs(given)
     assert [one.start_s for one in found] == sorted(one.start_s for one in given)
     (own,) = [one for one in found if one.foot == "left"]
@@ -147,7 +147,8 @@ def test_a_stride_runs_where_it_and_the_nearest_of_the_other_foot_are_down_less_
 
 
 def test_of_two_strides_of_the_other_foot_the_nearest_counts() -> None:
-    given = [stride(0.0, percent=40.0), stride(0.4, foot="right", percent=70.0), stride(-0.5, foot="right", percent=30)]
+    starts = [("left", 10.0, 40.0), ("right", 10.4, 70.0), ("right", 9.5, 30.0)]
+    given = [stride(start_s, foot=foot, percent=percent) for foot, start_s, percent in starts]
     assert [one.runs for one in with_runs(given) if one.foot == "left"] == [False]
     assert with_runs([]) == []
     assert [one.foot for one in with_runs([stride(0.0, foot="right"), stride(0.0)])] == ["left", "right"]
@@ -195,6 +196,10 @@ def test_a_stance_cut_by_the_record_or_without_an_event_has_what_is_seen_of_it()
     )
     at = [0.1, 0.39, 0.4, 0.59, 0.6, 1.0, 1.59, 1.6, 2.0, 50.0]
     assert phases_at(own, at) == "ffppsffshh"
+    assert [PHASES[state] for state in crisp(own, np.array([-5.0, 0.2]))] == [
+        "flat",
+        "flat",
+    ]  # from its first sample on
     flat = contacts([2.0], [NAN], [[2.0, 2.2]], [[NAN, NAN]])
     assert phases_at(flat, [1.9, 2.0, 2.2, 50.0]) == "shff"
 

@@ -71,7 +71,9 @@ def test_the_summary_and_the_indices_are_of_the_main_activity() -> None:
         "right": {"sequence_error_percent": None, "deviation_percent": None, "abnormality_percent": None},
     }
     sums.add(window(made, strides=runs[:1]))
-    assert sums.summary()["strides"] == {"left": 2, "right": 0}  # as many of either: walking
+    assert sums.summary()["strides"] == {"left": 2, "right": 0}
+    assert sums.summary()["stride_time_s"]["left"]["mean"] == pytest.approx(1.0)  # as many of either: walking
+    assert sums.indices()["left"]["abnormality_percent"] == pytest.approx(25.0)
     sums.add(window(made, strides=runs[:1]))
     assert sums.summary()["strides"] == {"left": 3, "right": 0}
     assert sums.summary()["stride_time_s"]["left"]["mean"] == pytest.approx(0.5)
