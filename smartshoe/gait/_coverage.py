@@ -61,8 +61,8 @@ class Coverage:
         """What passes beside the coils passes through the midfoot, as it does in walking at an ordinary speed."""
         percent, beside = np.array(MIDFOOT).T
         at = np.interp(np.arange(POINTS), percent, np.arange(percent.size))
-        from_, part = at.astype(int), at % 1.0
-        course = beside[from_] + np.append(np.diff(beside), 0.0)[from_] * (0.5 - 0.5 * np.cos(np.pi * part))
+        from_ = np.minimum(at.astype(int), percent.size - 2)
+        course = beside[from_] + np.diff(beside)[from_] * (0.5 - 0.5 * np.cos(np.pi * (at - from_)))
         course *= (1.0 / cls(share).share - 1.0) / course.mean()
         return cls(share, tuple(float(value) for value in course), WALKING_STANCE_S)
 

@@ -324,7 +324,7 @@ def test_double_support_is_the_mean_over_the_strides_of_both_feet() -> None:
     assert both_down(feet, []) is None
 
 
-@pytest.mark.parametrize(("shared_s", "percent"), [(2e-9, 2e-7), (0.5e-9, 0.0)])
+@pytest.mark.parametrize(("shared_s", "percent"), [(1.5e-9, 1.5e-7), (0.5e-9, 0.0)])
 def test_what_is_shared_by_rounding_alone_is_none(shared_s: float, percent: float) -> None:
     feet = {"left": contacts([0.0], [0.6]), "right": contacts([0.6 - shared_s], [1.0])}
     both, neither = both_down(feet, [stride(0.0)]) or (NAN, NAN)
