@@ -20,8 +20,9 @@ from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import joint_parameters, parameters_of
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
-from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
+from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis._verdict import known_error, parted_clocks, past_of, refusals_of, sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
@@ -172,12 +173,12 @@ def _diagnosed(
     silent = given.is_no_unit or not found.can_validate
     names = names_of(found.members, everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
-    parted = [said for one, values in given.clocks if (said := _parted(one, values, extended, thresholds))]
+    parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds, within.memory)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
-    past = [_said_of_the_past(one, scale) for one in zeros if one.is_past]
+    past = [past_of(one, scale) for one in zeros if one.is_past]
     zeros = tuple(one for one in zeros if not one.is_past)
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
     causes = [_cause(name, found, fine, best, given) for name in names]
@@ -185,8 +186,8 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
-    known = _known_error(integrity, scale)
-    verdict = "unexplained" if given.is_no_unit else _verdict(causes, before, after, thresholds, follows, known)
+    known = known_error(integrity, scale)
+    verdict = "unexplained" if given.is_no_unit else verdict_of(causes, before, after, thresholds, follows, known)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
@@ -196,7 +197,7 @@ def _diagnosed(
     force = force_rmse_n(fine, extended)
     return Diagnosis(
         verdict,
-        _sentence(verdict, causes, baseline, best, after, thresholds),
+        sentence_of(verdict, causes, baseline, best, after, thresholds),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
@@ -212,7 +213,7 @@ def _diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
         ),
-        limits=(*given.limits, *parted, *past, *_refused_members(found)),
+        limits=(*given.limits, *parted, *past, *refusals_of(found)),
         leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         model=with_zero,
@@ -231,84 +232,6 @@ def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[R
     values = next(part.values for part in model.parts if part.name == name.member.name)
     step_s = max(recording.sample_time_s for recording in recordings)
     return abs(float(values[0])) < UNIFORM_SD * step_s
-
-
-def _known_error(integrity: Integrity, scale: Scale) -> float:
-    """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
-    return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
-
-
-def _parted(told: Effect, values: Array, model: ExtendedModel, thresholds: Thresholds) -> str | None:
-    """What is said of a lag between clocks that the fit sees otherwise than the edges of load and reading did."""
-    lag_s, unit = float(values[0]), told.parameters[0].unit
-    fitted_s = next((float(part.values[0]) for part in model.parts if part.name == told.name), lag_s)
-    if unit != "s" or abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
-        return None
-    return (
-        f"the reading is {lag_s:.3g} s late by the edges of load and reading, {fitted_s:.3g} s beside the other"
-        " effects: one of them imitates the rest (record both by one clock)"
-    )
-
-
-def _verdict(
-    causes: Sequence[Cause],
-    before: ResidualStructure,
-    after: ResidualStructure,
-    thresholds: Thresholds,
-    follows: bool = True,
-    known: float = 0.0,
-) -> Verdict:
-    """``follows``: every cause has a law, so that what is left may be what laws usually depart by.
-
-    ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
-    """
-    left = after.rms if after.significant else 0.0
-    least = max(thresholds.material, thresholds.tolerable, known)
-    if causes:
-        wrong = before.rms if before.significant else 0.0
-        least = max(least, thresholds.departure * wrong if follows else 0.0)
-        return "partly_explained" if left > least else "explained"
-    return "unexplained" if left > least else "adequate"
-
-
-def _sentence(
-    verdict: Verdict,
-    causes: Sequence[Cause],
-    baseline: Errors,
-    best: Errors,
-    after: ResidualStructure,
-    thresholds: Thresholds,
-) -> str:
-    names = [cause.name.replace("_", " ") for cause in causes]
-    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-    good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
-    left = after.rms if after.significant else 0.0
-    rest = f"{100 * left:.2g} % {after.how} and is not explained"
-    if verdict == "adequate":
-        return good if left <= thresholds.material else f"{good}; {rest}"
-    if verdict == "unexplained":
-        return f"{good}; {rest}, and no effect of the catalogue accounts for it"
-    said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
-    return said if verdict == "explained" else f"{said}; {rest}"
-
-
-def _said_of_the_past(zero: Zero, scale: Scale) -> str:
-    value = zero.value * abs(scale.reading)
-    return (
-        f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
-        " may have begun before, or there is an offset beside (record from where the unit is switched on)"
-    )
-
-
-def _refused_members(found: Inference) -> list[str]:
-    if not found.can_validate:
-        return [
-            "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
-        ]
-    if not found.refused:
-        return []
-    names = ", ".join(dict.fromkeys(name.replace("_", " ") for name in found.refused))
-    return [f"fitted well but made recordings left out worse, and so were taken out again: {names}"]
 
 
 def _percent_less(after: float, before: float) -> float:

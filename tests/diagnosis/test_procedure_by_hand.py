@@ -24,14 +24,12 @@ from smartshoe.diagnosis._procedure import (
     _percent_less,
     _prepared,
     _refused,
-    _refused_members,
-    _sentence,
     _trace,
-    _verdict,
     _with_offset,
     _zero_cause,
 )
 from smartshoe.diagnosis._session import Scale, prepare
+from smartshoe.diagnosis._verdict import refusals_of, sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, effect
@@ -114,25 +112,25 @@ def test_what_is_left_is_held_against_what_laws_depart_by_and_what_a_good_unit_l
         (0.03, True, replace(STANDARD, tolerable=0.03)),
         (0.05, True, replace(STANDARD, material=0.05)),
     ):
-        told = [_verdict(CAUSES, wrong, _left(by * bound), thresholds, follows) for by in (1.0, 1.0001)]
+        told = [verdict_of(CAUSES, wrong, _left(by * bound), thresholds, follows) for by in (1.0, 1.0001)]
         assert told == ["explained", "partly_explained"]
-    assert _verdict(CAUSES, wrong, _left(0.5, significant=False), STANDARD) == "explained"
+    assert verdict_of(CAUSES, wrong, _left(0.5, significant=False), STANDARD) == "explained"
     hidden = _left(0.04, significant=False)
-    assert _verdict(CAUSES, hidden, _left(0.9 * STANDARD.tolerable), STANDARD) == "explained"
-    assert _verdict(CAUSES, hidden, _left(1.1 * STANDARD.tolerable), STANDARD) == "partly_explained"
+    assert verdict_of(CAUSES, hidden, _left(0.9 * STANDARD.tolerable), STANDARD) == "explained"
+    assert verdict_of(CAUSES, hidden, _left(1.1 * STANDARD.tolerable), STANDARD) == "partly_explained"
 
 
 def test_without_a_cause_it_is_adequate_up_to_what_is_tolerable_or_material() -> None:
     for thresholds in (STANDARD, replace(STANDARD, material=0.02)):
         bound = max(thresholds.tolerable, thresholds.material)
-        told = [_verdict([], _left(0.5), _left(by * bound), thresholds) for by in (1.0, 1.0001)]
+        told = [verdict_of([], _left(0.5), _left(by * bound), thresholds) for by in (1.0, 1.0001)]
         assert told == ["adequate", "unexplained"]
-    assert _verdict([], _left(0.5), _left(0.5, significant=False), STANDARD) == "adequate"
+    assert verdict_of([], _left(0.5), _left(0.5, significant=False), STANDARD) == "adequate"
 
 
 def _said(verdict: Any, *names: str, left: Any = None) -> str:
     causes: Any = [SimpleNamespace(name=name) for name in names]
-    return _sentence(verdict, causes, BEFORE, AFTER, left or _left(0.034), STANDARD)
+    return sentence_of(verdict, causes, BEFORE, AFTER, left or _left(0.034), STANDARD)
 
 
 def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
@@ -151,12 +149,12 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
 
 def test_what_was_taken_out_again_is_said_once() -> None:
     found: Any = SimpleNamespace(can_validate=True, refused=())
-    assert _refused_members(found) == []
+    assert refusals_of(found) == []
     found.refused = ("linear_leak", "delay", "linear_leak")
-    (said,) = _refused_members(found)
+    (said,) = refusals_of(found)
     assert said.endswith(": linear leak, delay")
     found.can_validate = False
-    (said,) = _refused_members(found)
+    (said,) = refusals_of(found)
     assert "no cause can be told" in said
 
 
@@ -418,7 +416,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("force_rmse_n", lambda fine, model: 7.0 if len(model.parts) else 9.0)
     answer("next_experiment", "next")
     answer("_trace", "trace")
-    answer("_sentence", "sentence")
+    answer("sentence_of", "sentence")
     return made
 
 

@@ -17,10 +17,11 @@ from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._procedure import _is_within_a_sample, _verdict
+from smartshoe.diagnosis._procedure import _is_within_a_sample
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._validation import LeftOut, extrapolating
+from smartshoe.diagnosis._verdict import verdict_of
 from smartshoe.diagnosis._zero import zeros_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -133,7 +134,7 @@ def test_a_delay_below_the_uncertainty_of_a_time_stamp_is_none(samples: float, w
 
 def test_tolerable_is_the_structure_that_a_good_unit_may_leave() -> None:
     left: Any = SimpleNamespace(rms=1e-3, significant=True)
-    assert decides("tolerable", 5e-4, 2e-3, lambda t: _verdict([], left, left, t)) == ("unexplained", "adequate")
+    assert decides("tolerable", 5e-4, 2e-3, lambda t: verdict_of([], left, left, t)) == ("unexplained", "adequate")
 
 
 def test_extrapolates_is_how_far_beyond_what_was_fitted_an_effect_is_believed() -> None:

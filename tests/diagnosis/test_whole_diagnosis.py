@@ -14,9 +14,10 @@ from smartshoe import Recording, compensate, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._lack_of_fit import LackOfFit
-from smartshoe.diagnosis._procedure import _outside, _sentence, _verdict, _with_offset
+from smartshoe.diagnosis._procedure import _outside, _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._verdict import sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Conditions, effect
@@ -242,8 +243,8 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     large, small = 10.0 * limits.tolerable, 0.1 * limits.material
 
     def said(causes: Any, left: float) -> tuple[str, str]:
-        verdict = _verdict(causes, _left(large), _left(left), limits)
-        return verdict, _sentence(verdict, causes, before, after, _left(left), limits)
+        verdict = verdict_of(causes, _left(large), _left(left), limits)
+        return verdict, sentence_of(verdict, causes, before, after, _left(left), limits)
 
     good = "the baseline simulation is good to 2 % of full scale on data it was not fitted to"
     assert said([], small) == ("adequate", good)
@@ -255,8 +256,8 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     # What laws usually depart by may be left, but not where no law of the kind follows.
     usual = 0.9 * limits.departure * large
     assert usual > limits.tolerable
-    assert _verdict(causes[:1], _left(large), _left(usual), limits) == "explained"
-    assert _verdict(causes[:1], _left(large), _left(usual), limits, follows=False) == "partly_explained"
+    assert verdict_of(causes[:1], _left(large), _left(usual), limits) == "explained"
+    assert verdict_of(causes[:1], _left(large), _left(usual), limits, follows=False) == "partly_explained"
     between = 0.5 * (limits.material + limits.tolerable)
     assert said([], between) == ("adequate", f"{good}; {100 * between:.2g} % repeats and is not explained")
 
@@ -268,20 +269,20 @@ def test_what_is_left_is_measured_by_what_was_wrong_before() -> None:
     left = 2.0 * max(limits.material, limits.tolerable)
     large, small = _left(1.5 * left / limits.departure), _left(0.5 * left / limits.departure)
     chance = replace(large, repeating=replace(large.repeating, z=0.0))
-    assert _verdict(causes, large, _left(left), limits) == "explained"
-    assert _verdict(causes, small, _left(left), limits) == "partly_explained"
+    assert verdict_of(causes, large, _left(left), limits) == "explained"
+    assert verdict_of(causes, small, _left(left), limits) == "partly_explained"
     assert not chance.significant
-    assert _verdict(causes, chance, _left(left), limits) == "partly_explained"
+    assert verdict_of(causes, chance, _left(left), limits) == "partly_explained"
 
 
 def test_what_a_grid_adds_is_left_whatever_the_model() -> None:
     limits = Thresholds()
     left = 3.0 * limits.tolerable
     for known, verdict in ((0.0, "unexplained"), (0.9 * left, "unexplained"), (1.1 * left, "adequate")):
-        assert _verdict([], _left(left), _left(left), limits, known=known) == verdict
+        assert verdict_of([], _left(left), _left(left), limits, known=known) == verdict
     causes: Any = [SimpleNamespace(name="dead_band")]
-    assert _verdict(causes, _left(left), _left(left), limits) == "partly_explained"
-    assert _verdict(causes, _left(left), _left(left), limits, known=1.1 * left) == "explained"
+    assert verdict_of(causes, _left(left), _left(left), limits) == "partly_explained"
+    assert verdict_of(causes, _left(left), _left(left), limits, known=1.1 * left) == "explained"
 
 
 def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list[Recording]) -> None:

@@ -1,0 +1,100 @@
+"""What is said of a diagnosis: its verdict, one sentence, and what limits it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._held_out import Errors
+from smartshoe.diagnosis._inference import Inference
+from smartshoe.diagnosis._residual_structure import ResidualStructure
+from smartshoe.diagnosis._result import Cause, Verdict
+from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._zero import Zero
+from smartshoe.integrity import Integrity
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import Effect
+from smartshoe.models.extended import ExtendedModel
+
+
+def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds: Thresholds) -> str | None:
+    """What is said of a lag between clocks that the fit sees otherwise than the edges of load and reading did."""
+    lag_s, unit = float(values[0]), told.parameters[0].unit
+    fitted_s = next((float(part.values[0]) for part in model.parts if part.name == told.name), lag_s)
+    if unit != "s" or abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
+        return None
+    return (
+        f"the reading is {lag_s:.3g} s late by the edges of load and reading, {fitted_s:.3g} s beside the other"
+        " effects: one of them imitates the rest (record both by one clock)"
+    )
+
+
+def known_error(integrity: Integrity, scale: Scale) -> float:
+    """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
+    return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
+
+
+def verdict_of(
+    causes: Sequence[Cause],
+    before: ResidualStructure,
+    after: ResidualStructure,
+    thresholds: Thresholds,
+    follows: bool = True,
+    known: float = 0.0,
+) -> Verdict:
+    """What is left, against what was wrong ``before`` and what is tolerable.
+
+    ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
+
+    ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
+    """
+    left = after.rms if after.significant else 0.0
+    least = max(thresholds.material, thresholds.tolerable, known)
+    if causes:
+        wrong = before.rms if before.significant else 0.0
+        least = max(least, thresholds.departure * wrong if follows else 0.0)
+        return "partly_explained" if left > least else "explained"
+    return "unexplained" if left > least else "adequate"
+
+
+def sentence_of(
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    baseline: Errors,
+    best: Errors,
+    after: ResidualStructure,
+    thresholds: Thresholds,
+) -> str:
+    """The answer in a sentence: size before judgement."""
+    names = [cause.name.replace("_", " ") for cause in causes]
+    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
+    left = after.rms if after.significant else 0.0
+    rest = f"{100 * left:.2g} % {after.how} and is not explained"
+    if verdict == "adequate":
+        return good if left <= thresholds.material else f"{good}; {rest}"
+    if verdict == "unexplained":
+        return f"{good}; {rest}, and no effect of the catalogue accounts for it"
+    said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
+    return said if verdict == "explained" else f"{said}; {rest}"
+
+
+def past_of(zero: Zero, scale: Scale) -> str:
+    """What is said of a zero that may have drifted to where it stands."""
+    value = zero.value * abs(scale.reading)
+    return (
+        f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
+        " may have begun before, or there is an offset beside (record from where the unit is switched on)"
+    )
+
+
+def refusals_of(found: Inference) -> list[str]:
+    """What is said of effects that were taken out again."""
+    if not found.can_validate:
+        return [
+            "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
+        ]
+    if not found.refused:
+        return []
+    names = ", ".join(dict.fromkeys(name.replace("_", " ") for name in found.refused))
+    return [f"fitted well but made recordings left out worse, and so were taken out again: {names}"]
