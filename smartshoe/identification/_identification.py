@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +68,7 @@ class Identification(Summarised):
     rate_range_n_per_s: tuple[float, float]
     sources: tuple[str, ...]
     remarks: tuple[str, ...]
-    fit: ParameterFit = field(repr=False)
+    fit: ParameterFit
 
     # -- what is left ----------------------------------------------------------------------------------------
     @cached_property

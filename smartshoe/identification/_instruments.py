@@ -64,7 +64,7 @@ class Instruments:
         problem, experiment = self.problem, self.problem.experiments[index]
         inverse = problem.settings.direction == "inverse"
         delay_s = problem.delay_s(theta)
-        if self.source == "cycles" and self.readings is not None:
+        if self.readings is not None:
             reading = np.where(np.isfinite(self.readings[index]), self.readings[index], experiment.reading)
             reading = reading - (problem.settings.offset or 0.0)
             u, slope = shifted(reading, experiment.time_s, experiment.step, delay_s)

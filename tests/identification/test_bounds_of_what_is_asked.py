@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from presses import press
+from scipy.special import gammaincc
 
 from smartshoe.errors import InputError, NotIdentifiableError, UsageError
-from smartshoe.identification import identify
+from smartshoe.identification import consistency_test, identify
+from smartshoe.identification._consistency import ConsistencyTest
 from smartshoe.identification._experiment import (
     Experiment,
     _largest_rises,
@@ -317,3 +319,35 @@ def test_what_is_missing_in_either_signal_or_not_asked_for_does_not_count() -> N
     assert (found.n_missing, unit.symbol, found.time_s[0], found.rows) == (10, "mbar", 0.0, None)
     assert found.load_n[301] == pytest.approx(load[299] + (load[304] - load[299]) * 2.0 / 5.0)
     assert found.command_n is None
+
+
+# -- of c and the gains ----------------------------------------------------------------------------------------------
+def test_a_pole_that_is_none_and_another_shape_are_refused_and_the_rest_is_tested_by_hand() -> None:
+    for a1, covariance in ((0.0, np.eye(3)), (-0.1, np.eye(3)), (0.2, np.eye(2))):
+        with pytest.raises(UsageError, match="give a1 above 0"):
+            consistency_test((a1, 1.6, 0.3), covariance)
+    # b0 - b1/a1 - s X c a1 = 2.4 - 1.5 - 2 x 0.5 x 1.2 x 0.2 = 0.66; its slopes are 0.3/0.04 - 1.2, 1 and -5.
+    covariance = np.array([[0.01, 0.002, 0.0], [0.002, 0.04, 0.001], [0.0, 0.001, 0.0009]])
+    slope = np.array([6.3, 1.0, -5.0])
+    found = consistency_test((0.2, 2.4, 0.3), covariance, scale=2.0, c=1.2, x_over_nrt=0.5)
+    statistic = 0.66**2 / float(slope @ covariance @ slope)
+    assert found.statistic == pytest.approx(statistic)
+    assert found.p_value == pytest.approx(float(gammaincc(0.5, statistic / 2.0)))
+    assert (found.k2_from_gains, found.k2_from_pole) == (pytest.approx(0.9), pytest.approx(0.24))
+    assert found.consistent
+    assert found.to_dict() == {
+        "statistic": found.statistic, "p_value": found.p_value, "degrees": 1, "k2_from_gains": found.k2_from_gains,
+        "k2_from_pole": found.k2_from_pole, "says": found.says,
+    }  # fmt: skip
+    assert " agree (" in found.says
+    sharp = consistency_test((0.2, 2.4, 0.3), 1e-4 * covariance, scale=2.0, c=1.2, x_over_nrt=0.5)
+    assert not sharp.consistent
+    assert " do not agree (" in sharp.says
+    exact = consistency_test((0.25, 1.75, 0.375), np.zeros((3, 3)), x_over_nrt=1.0)
+    assert (exact.statistic, exact.p_value) == (0.0, 1.0)
+    assert consistency_test((0.25, 1.8, 0.375), np.zeros((3, 3)), x_over_nrt=1.0).p_value == 0.0
+
+
+@pytest.mark.parametrize(("p_value", "is_consistent"), [(0.0099, False), (0.01, True), (0.02, True)])
+def test_a_form_is_rejected_below_one_percent(p_value: float, is_consistent: bool) -> None:
+    assert ConsistencyTest(1.0, p_value, 0.2, 0.3).consistent is is_consistent

@@ -325,6 +325,32 @@ def test_a_coarse_delay_is_one_of_twentieths_of_a_second(direction: str, places:
     assert coarse_delay(problem, A1) == pytest.approx(0.05 * places)
 
 
+@pytest.mark.parametrize("places", [0, 3, -6])
+def test_what_a_slow_part_lags_behind_is_no_delay(places: int) -> None:
+    """A reading that is the load behind a lag of half a second alone, about a level that is large beside it."""
+    time_s = 0.01 * np.arange(6000)
+    rng = np.random.default_rng(3)
+    load = 500.0 + 3.0 * np.cumsum(rng.standard_normal(7000))
+    reading = lag(load, 2.0, 0.01)[500 - 5 * places :][:6000]
+    recording = Recording.from_arrays(time_s=time_s, force_n=load[500:6500], pressure_mbar=reading)
+    problem = PredictionError(prepare([recording])[0], Settings(direction="forward"))
+    assert coarse_delay(problem, 2.0) == pytest.approx(0.05 * places)
+
+
+@pytest.mark.parametrize(("noise", "is_seen"), [(0.2, True), (1.5, False)])
+def test_a_delay_counts_that_takes_half_of_the_error_away(noise: float, is_seen: bool) -> None:
+    """Of a white load the delayed one explains all but the noise: a 25th of the power, or two thirds of it."""
+    rng = np.random.default_rng(3)
+    rough = np.repeat(rng.standard_normal(1400), 5)
+    time_s = 0.01 * np.arange(6000)
+    reading = rough[485:6485] + noise * rng.standard_normal(6000)
+    recording = Recording.from_arrays(time_s=time_s, force_n=rough[500:6500], pressure_mbar=reading)
+    problem = PredictionError(prepare([recording])[0], Settings(direction="forward"))
+    assert coarse_delay(problem, 2.0) == pytest.approx(0.15 if is_seen else 0.0)
+    short = Recording.from_arrays(time_s=time_s[:99], force_n=rough[500:599], pressure_mbar=reading[:99])
+    assert coarse_delay(PredictionError(prepare([short])[0], Settings()), 2.0) == 0.0
+
+
 def test_srivc_finds_the_truth_around_a_gap_and_fills_it_with_its_own_model() -> None:
     problem = _problem(delay_s=0.0)
     alpha, p1, p2, nuisances, steps, settled = srivc(problem, prefilter_rad_s=1.0, tolerance=1e-6, max_iterations=30)

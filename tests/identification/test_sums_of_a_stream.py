@@ -68,16 +68,16 @@ def _pushed(cuts: list[int], inverse: bool, free: Columns = COLUMNS) -> tuple[Su
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.lists(st.integers(0, 60), max_size=6), st.booleans())
-def test_however_it_is_cut_the_sums_are_those_of_the_whole(cuts: list[int], inverse: bool) -> None:
-    sums, u, y, at = _pushed(cuts, inverse)
+@given(st.lists(st.integers(0, 60), min_size=1, max_size=6), st.booleans(), st.booleans())
+def test_however_it_is_cut_the_sums_are_those_of_the_whole(cuts: list[int], inverse: bool, steady: bool) -> None:
+    sums, u, y, at = _pushed(cuts, inverse, Columns.of(not steady, True))
     seen = np.isfinite(y)
     time_s = 0.5 * at
     bridged = np.interp(np.arange(at[-1] + 1), at, u)
     before = np.concatenate([np.full(at[0], u[0]), bridged[at[0] :]])
     lags = np.stack([lag(before, pole, 0.5)[at] for pole in BANK], axis=1)
     starts = np.exp(-np.outer(time_s, BANK))
-    table = np.column_stack([starts, lags, u, np.ones(60), y])[seen]
+    table = np.column_stack([*([] if steady else [starts]), lags, u, np.ones(60), y])[seen]
     scale = np.sqrt(np.einsum("ij,ij->j", table, table)) + 1e-300
     gram = (table / scale).T @ (table / scale)
     assert (sums.root / scale).T @ (sums.root / scale) == pytest.approx(gram, abs=1e-9)

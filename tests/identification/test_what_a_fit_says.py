@@ -169,6 +169,8 @@ def test_a_figure_shows_the_load_or_the_reading(inverse: Identification, forward
         upper, lower = figure.axes[:2]
         assert (upper.get_ylabel(), lower.get_ylabel()) == (f"{quantity} ({unit})", f"residual ({unit})")
         assert [line.get_label() for line in upper.lines] == ["measured", "model"]
+        assert [text.get_text() for text in upper.get_legend().get_texts()] == ["measured", "model"]
+        assert (upper.get_title(), lower.get_xlabel()) == ("a", "time (s)")
         measured, model = (np.asarray(line.get_ydata(), dtype=float) for line in upper.lines)
         left = np.asarray(lower.lines[0].get_ydata(), dtype=float)
         seen = np.isfinite(left)
