@@ -108,6 +108,17 @@ def test_a_stance_that_is_cut_is_as_long_as_the_usual_one(
     assert later == pytest.approx(expected, abs=3.0)  # a sample more or less
 
 
+def test_a_whole_stance_beside_the_records_ends_lasts_as_long_as_it_does() -> None:
+    made, borne = Coverage(0.8, tuple(np.linspace(0.0, 1.0, 101))), np.full(1000, 100.0)
+    spans = ((0.1, 0.5), (3.0, 3.8), (5.0, 5.8), (9.4, 9.9))  # 0.8 s is more than the first and the last
+    found = made.whole(borne, TIME_S, contacts(*zip(*spans, strict=True)))
+    for strike_s, off_s in spans:
+        first, last = round(100.0 * strike_s), round(100.0 * off_s)
+        part = (TIME_S[first:last] - strike_s) / (off_s - strike_s)
+        assert found[first:last] == pytest.approx(100.0 + 100.0 * part)
+    assert found[[9, 55, 935, 995]] == pytest.approx([125.0] * 4)
+
+
 def test_without_a_whole_stance_a_cut_one_has_the_even_share() -> None:
     made, borne = Coverage(0.5, tuple(np.linspace(0.0, 1.0, 101))), np.full(1000, 100.0)
     for cut in (contacts([NAN], [0.5]), contacts([9.5], [NAN]), contacts([1.001], [1.002]), contacts()):
@@ -127,7 +138,7 @@ def test_what_is_no_course_is_told(tmp_path: Any) -> None:
     Coverage.midfoot(0.8).save(path)
     whole = path.read_text().splitlines()
     plain = [line for line in whole if "least" not in line]
-    path.write_text("\n".join(["# a remark", *plain]).replace("# c", "#c"))
+    path.write_text("\n".join(["# a remark", "# learned: on 2026-03-31T14:30", *plain]).replace("# c", "#c"))
     assert Coverage.load(path) == replace(Coverage.midfoot(0.8), least_stance_s=0.0)
     for lines, says in (
         (whole[1:], "give a '# coverage:' line"), (whole[:-1], "101 rows"), ([*whole, "101,0.0"], "101 rows"),
@@ -152,12 +163,15 @@ def test_a_course_is_learned_from_what_the_plates_say_beyond_the_units() -> None
     load = np.where(part < 1.0, 100.0, 0.0)[:, None] * np.array([1.0, 3.0])
     plate = load.sum(axis=1) * (1.0 + 0.6 * np.minimum(part, 1.0))
     # A seventh stance stands, and an eighth is cut by the end.
-    found = trial(load, [*strikes, 6.0, 9.5], [*(strike_s + 0.5 for strike_s in strikes), 9.0, NAN])
+    steps = ([*strikes, 6.0, 9.5], [*(strike_s + 0.5 for strike_s in strikes), 9.0, NAN])
+    found = trial(load, *steps)
     made = learn_coverage(found, {"left": plate})
     # The first sample lies at a hundredth, the last at 99: beyond them the course is held.
     assert made.course == pytest.approx(0.6 * np.clip(np.linspace(0.0, 1.0, 101), 0.01, 0.99), abs=1e-9)
     assert made.share == pytest.approx(1.0 / 1.3)
     assert made.least_stance_s == 0.0
+    slight = learn_coverage(trial(1e-6 * load, *steps), {"left": 1e-6 * plate})
+    assert (slight.share, slight.course) == (pytest.approx(made.share), pytest.approx(made.course))
     # One of the six may lack a sample of its plate, two not.
     plate[120] = np.nan
     assert learn_coverage(found, {"left": plate}).share == pytest.approx(1.0 / 1.3)

@@ -55,6 +55,13 @@ def test_of_a_first_foot_without_whole_strides_the_other_ones_weigh() -> None:
     assert four(summed(window(BOTH, RISING)).forces(None)) == (None, None, None, None)
 
 
+def test_a_stride_from_the_first_sample_to_the_last_has_all_of_its_impulse() -> None:
+    for one, mean_n in ((stride(0.0), 625.0), (stride(19.0), 1575.0), (stride(0.0, 20.0), 1100.0)):
+        weight = summed(window(BOTH, RISING, [one])).forces(None).body_weight
+        assert weight is not None
+        assert weight.value == pytest.approx(mean_n)
+
+
 def test_windows_add_up() -> None:
     parts = [window(BOTH, RISING, [stride(at)]) for at in (0.5, 1.5, 2.5)]
     weight = summed(*parts).forces(None).body_weight

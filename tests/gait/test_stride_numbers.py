@@ -166,6 +166,9 @@ def test_of_two_strides_of_the_other_foot_the_nearest_counts() -> None:
         ([300.0, 600.0, 0.0, 0.0], 0.6 * 600.0 / 0.006),
         # 100 N at 0.5 of the first step, 400 N at 0.5 of the third: two steps.
         ([0.0, 200.0, 300.0, 500.0, 0.0, 0.0, 0.0, 0.0], 300.0 / 0.02),
+        # A load that stays at a fifth, or at four fifths: from when it came to it.
+        ([0.0, 100.0, 100.0, 500.0, 0.0, 0.0, 0.0, 0.0], 300.0 / 0.0175),
+        ([0.0, 400.0, 400.0, 500.0, 0.0, 0.0, 0.0, 0.0], 300.0 / 0.0075),
         ([500.0, 600.0, 0.0, 0.0], None), ([0.0, 0.0, 0.0, 0.0], None), ([-5.0, -1.0, -4.0, -4.0], None),
         ([-1.0, 0.0, -1.0, -1.0], None), ([600.0], None), ([600.0, 500.0, 400.0, 300.0], None),
     ],
@@ -264,7 +267,8 @@ def test_a_distance_is_over_all_units_and_hundredths_of_the_foots_mean_peak() ->
     # The mean peak is 900 N: one of the two is 1/9 of it above the pattern, the other 1/9 below.
     away = np.array([600.0 / 900.0 - 0.6, 400.0 / 900.0 - 0.4, 480.0 / 900.0 - 0.6, 320.0 / 900.0 - 0.4]) ** 2
     expected = 100.0 * np.sqrt([away[:2].sum() / 202.0, away[2:].sum() / 202.0])
-    assert deviations(each, reference) == pytest.approx(expected)
+    for scale in (1e-6, 1.0):
+        assert deviations(scale * each, reference) == pytest.approx(expected)
     assert deviations(0.0 * each, reference).tolist() == deviations(-each, reference).tolist() == [0.0, 0.0]
 
 
@@ -287,11 +291,11 @@ def test_an_asymmetry_is_taken_over_the_mean() -> None:
 
 
 def test_a_step_is_less_than_two_seconds_and_begins_within_the_stride() -> None:
-    strides = [stride(0.0, 3.0), stride(3.0, 3.0), stride(6.0, 3.0), stride(9.0, 3.0)]
-    own = contacts([0.0, 3.0, 6.0, 9.0, 12.0], [1.0] * 5)
+    strides = [stride(0.0, 3.0), stride(3.0, 3.0), stride(6.0, 3.0), stride(9.0, 3.0), stride(12.0, 1.5)]
+    own = contacts([0.0, 3.0, 6.0, 9.0, 12.0, 13.5], [1.0] * 6)
     other = contacts([NAN, 1.001, 3.0, 4.0, 5.5, 8.99, 12.0], [1.0] * 7)
     found = steps_of({"left": own, "right": other}, strides)
-    # To 3 s from 1.001; to 6 s from the last before it; to 9 s from 8.99; of the last stride none begins within it.
+    # To 3 s from 1.001; to 6 s from the last before it; to 9 s from 8.99; of the last two none begins within them.
     assert found["left"] == pytest.approx([1.999, 0.5, 0.01])
     assert found["right"].size == 0
     assert steps_of({"left": own, "right": contacts([1.0], [1.5])}, strides)["left"].size == 0  # two seconds

@@ -43,6 +43,7 @@ def test_standing_is_counted_within_each_window() -> None:
     assert trial_sums(first, second).standing_s == pytest.approx(7.0)
     assert trial_sums(first).moved
     assert trial_sums(first).activity() == "standing"
+    assert trial_sums(window(BOTH, spans=[(1.0, 1.5)])).moved
 
 
 @pytest.mark.parametrize(
@@ -92,6 +93,7 @@ def test_each_windows_strides_are_compared_with_the_pattern_up_to_it() -> None:
     pattern = {"left": np.full((101, 1), 0.5)}
     against = trial_sums(of(flat), reference=pattern).indices()["left"]["deviation_percent"]
     assert against == pytest.approx(50.0)
+    assert trial_sums(of(0.0 * flat)).indices()["left"]["deviation_percent"] is None  # it has no peak to be a share of
     for other in ({"right": pattern["left"]}, {"left": np.full((101, 2), 0.5)}):
         assert trial_sums(of(flat), reference=other).indices()["left"]["deviation_percent"] is None
 
