@@ -23,8 +23,8 @@ from smartshoe.identification._cycles import (
 from smartshoe.identification._experiment import prepare
 from smartshoe.identification._parametrisation import Shape, coefficients_of
 from smartshoe.identification._prediction_error import PredictionError, Settings
-from smartshoe.identification._srivc import _nuisance, coarse_delay, srivc
-from smartshoe.identification._start import POLES_RAD_S, _linear, _response, start, theta_at
+from smartshoe.identification._srivc import _nuisance, _step, coarse_delay, srivc
+from smartshoe.identification._start import _linear, _response, start, theta_at
 from smartshoe.identification.leave_out import (
     _compensated,
     _error_of_unseen,
@@ -363,7 +363,20 @@ def test_srivc_finds_the_truth_around_a_gap_and_fills_it_with_its_own_model() ->
     assert nuisances[:, 0] == pytest.approx([-4.0 * B1 / A1, 2.0 * B1 / A1], abs=0.5)
     few = srivc(problem, prefilter_rad_s=1.0, tolerance=1e-6, max_iterations=1)
     assert few[4:] == (1, False)
-    assert 0.01 in POLES_RAD_S
+
+
+@pytest.mark.parametrize("constant", [True, False])
+def test_srivc_ends_where_its_model_without_zero_and_start_is_its_own_instrument(constant: bool) -> None:
+    problem = _problem(steady=False, free_constant=constant, offset=None if constant else 0.0, delay_s=0.0)
+    problem.experiments[1] = replace(problem.experiments[1], mask=np.ones_like(problem.experiments[1].mask))
+    alpha, p1, p2, _, _, settled = srivc(problem, prefilter_rad_s=1.0, tolerance=1e-11, max_iterations=60)
+    assert settled
+    inputs = problem.inputs_at(0.0)
+    models = [
+        simulate(alpha, p1, p2 * alpha, u, one.time_s) for u, one in zip(inputs, problem.experiments, strict=True)
+    ]
+    told = _step(problem, inputs, problem.outputs, models, alpha)
+    assert told[:3] == pytest.approx([alpha, p1, p2 * alpha], rel=1e-7)
 
 
 @pytest.mark.parametrize("steady", [True, False])

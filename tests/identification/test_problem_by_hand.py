@@ -67,6 +67,32 @@ def test_what_noise_adds_to_the_gradients_products_is_taken_off_the_curvature(
     assert seen.normal / np.outer(scale, scale) == pytest.approx(left / np.outer(scale, scale), abs=1e-9)
 
 
+def test_of_noise_alone_a_hundredth_of_the_products_is_left_as_curvature() -> None:
+    """Where chance has more in the products than what is foretold, so that a step is still of some length."""
+    count, rng = 4000, np.random.default_rng(2)
+    u, y = np.sqrt(0.3) * rng.standard_normal(count), rng.standard_normal(count)
+    noise = Experiment("noise", 0.01 * np.arange(count), 0.01, y, u, np.ones(count, dtype=bool), 0)
+    options = Settings(noise_ratio=0.3, free_constant=False, offset=0.0, steady=True)
+    problem, theta = PredictionError([noise], options), np.array([np.log(2.0), *THETA["inverse"][1:], 0.0])
+    jacobian = problem.jacobian(theta)
+    seen = problem.evaluate(theta)
+    products = jacobian.T @ jacobian
+    root = np.linalg.inv(np.linalg.cholesky(products))
+    shares = np.linalg.eigvalsh(root @ (seen.cost * problem._noise_of_gradient(theta)) @ root.T)
+    left = np.linalg.eigvalsh(root @ seen.normal @ root.T)
+    assert shares.max() > 0.99
+    assert left == pytest.approx(np.sort(np.maximum(1.0 - shares, 0.01)), rel=1e-6)
+
+
+@pytest.mark.parametrize(("samples", "dropped"), [(32, 0), (33, 8), (60, 8)])
+def test_of_a_short_recording_the_ends_count(samples: int, dropped: int) -> None:
+    time_s = 0.01 * np.arange(samples)
+    short = Experiment("short", time_s, 0.01, np.sin(time_s), np.cos(time_s), np.ones(samples, dtype=bool), 0)
+    (mask,) = PredictionError([short], Settings()).masks
+    assert np.flatnonzero(mask).tolist() == list(range(dropped, samples - dropped))
+    assert PredictionError([short], Settings(delay_s=0.01)).count == samples
+
+
 def test_what_stands_at_a_missing_sample_does_not_matter_behind_the_filter(noisy: Experiment) -> None:
     theta = np.array([*THETA["inverse"], 1.0, 2.0])
     options = Settings(noise_ratio=0.4, delay_s=0.0)
