@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._baseline import POLES_PER_S, _wall_ratio, baseline_of, lagged, with_usual_arm
+from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, lagged, with_usual_arm
 from smartshoe.diagnosis._held_out import Errors, _percent, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._sensitivity import (
@@ -320,6 +320,8 @@ def test_a_reading_that_falls_under_load_has_a_plain_baseline() -> None:
     assert (found.gain, found.relaxing_share, found.relaxation_rate_per_s) == (1.0, 0.0, 0.2)
     usual = with_usual_arm(found)
     assert (usual.gain, usual.relaxing_share, usual.relaxation_rate_per_s) == (1.0, 0.08, 0.22)
+    # A unit as the paper's are: what a held full scale of 800 N reads is all of it.
+    assert (USUAL.gain, USUAL.full_scale_load_n, USUAL.full_scale_reading) == (1.0, 800.0, 100.0)
     assert POLES_PER_S[[0, -1]] == pytest.approx([0.01, 50.0])
 
 

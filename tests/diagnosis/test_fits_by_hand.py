@@ -307,6 +307,9 @@ def test_slopes_are_computed_anew_every_other_step_and_at_the_end() -> None:
             assert [way for way, _ in little.asked] == ["anew"]
         else:
             assert [way for way, _ in little.asked] == ["anew", "renewed", "anew"]
+    ever = _Told(2.0, 1e20)
+    fit(ever, _Slope(0.0))  # type: ignore[arg-type]
+    assert len(ever.asked) == 25
     stuck = _Told(0.01)
     assert (_went(stuck, 9), len(stuck.asked)) == (0.0, 1)
 

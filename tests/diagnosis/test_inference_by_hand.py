@@ -96,6 +96,39 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
     assert found == tuple((f"n{k}", float(k)) for k in range(11, 1, -1))
 
 
+@pytest.mark.parametrize(("odds", "chosen"), [(10.0, "plain"), (1.0, "curved")])
+def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_its_strengths(
+    monkeypatch: pytest.MonkeyPatch, odds: float, chosen: str
+) -> None:
+    """Of fits of six steps: each strength of an effect must be worth the odds."""
+    counts = {"plain": 1, "curved": 3}
+    costs = {"plain": 100.0, "curved": 95.0}
+
+    def state(name: str, improved: float) -> Any:
+        return SimpleNamespace(
+            name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
+            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), improved=improved,
+            evidence=SimpleNamespace(odds=odds), thresholds=STANDARD, banned=("z",), likelihood=lambda _: "likelihood",
+        )  # fmt: skip
+
+    monkeypatch.setattr(_inference, "_promising", lambda state: ["curved", "plain"])
+    monkeypatch.setattr(_inference, "with_members", lambda given, one, model, likelihood: one)
+    monkeypatch.setattr(_inference, "_strengths", lambda model: counts[model])
+    monkeypatch.setattr(
+        _inference, "fit", lambda _, model, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
+    )
+    taken: list[Any] = []
+
+    def stated(found: Any, sessions: Any, thresholds: Any, banned: Any) -> Any:
+        taken.append((found.model, found.steps, banned))
+        return state("next", 0.0)
+
+    monkeypatch.setattr(_inference, "state_at", stated)
+    said: list[str] = []
+    assert _inference._settled(state("first", 50.0), [], said.append).name == "next"  # type: ignore[attr-defined]
+    assert (taken, said) == ([(chosen, 6, ("z",))], ["fitting a, b c"])
+
+
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:

@@ -312,4 +312,4 @@ def test_a_correlation_time_is_the_sum_of_covariances_up_to_the_first_that_is_no
     alternating = np.resize([1.0, -1.0], 100)
     assert correlated_sd([alternating], [np.ones(100, dtype=bool)]) == pytest.approx(1.0)
     nothing = correlated_sd([np.ones(20)], [np.ones(20, dtype=bool)])
-    assert nothing == FLOOR == correlated_sd([], [])
+    assert nothing == FLOOR == correlated_sd([], []) == 1e-9

@@ -78,6 +78,7 @@ def test_a_refusal_says_why_and_what_is_known_without_a_model() -> None:
     found = _refused([falling, constant, pressed], SimpleNamespace(faults=()), ("no load", "nor else"), STANDARD)  # type: ignore[arg-type]
     assert (found.verdict, found.says, found.unit) == ("refused", "no diagnosis: no load", "mbar")
     assert (found.full_scale_load_n, found.full_scale_reading) == (0.0, 0.0)
+    assert (found.explainable_percent, found.explained_percent) == (0.0, 0.0)
     assert found.limits[:2] == ("no load", "nor else")
     decay, curve = found.limits[2:]
     assert "falls by" in decay
