@@ -17,7 +17,7 @@ from smartshoe.diagnosis._aligned import _on_one_clock, _one_pair, aligned
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._session import Scale
-from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, shift_of, zeros_of
+from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, shift_of, zeros_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
@@ -138,6 +138,19 @@ def test_an_unseen_zero_is_told_between_its_deviations_and_what_is_foreign(monke
     bound = MANY * STANDARD.zero_sd
     assert [told(by * bound) for by in (0.999, 1.001, -0.999, -1.001)] == [False, True, False, True]
     assert [told(by * 0.3) for by in (0.999, 1.001, -1.001)] == [True, False, False]
+
+
+def test_offsets_are_of_what_is_fitted_without_what_a_past_adds() -> None:
+    """A reading that is off by an offset and by what an earlier load left, which fades."""
+    time_s = 0.1 * np.arange(400)
+    load = np.abs((time_s / 4.0) % 2.0 - 1.0)
+    sessions = []
+    for offset, fitted in ((0.3, True), (9.0, False), (-0.2, True)):
+        one = _session(load, np.full(400, fitted))
+        one.held_out, one.usable = ~one.fitted, np.ones(400, dtype=bool)
+        one.reading = MODEL.simulate(one.conditions) + offset + 0.05 * np.exp(-0.22 * time_s)
+        sessions.append(one)
+    assert offsets(sessions, MODEL) == pytest.approx([0.3, -0.2], abs=2e-3)
 
 
 # -- first rests ------------------------------------------------------------------------------------------------------
