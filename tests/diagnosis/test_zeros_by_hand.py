@@ -100,13 +100,13 @@ def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(mo
     # Past: begun at 0.3 on the mean, a quarter of the arm's tenth and what is remembered; lowest 0.207; drifts 0.3.
     past = 0.3 * (0.25 * 0.1 + 0.02)
     drifted = 0.25 * np.mean([0.2, 0.4])
-    for offsets in ([0.2], [0.25, 0.27], [0.2, 0.24, 0.25]):
-        scatter = np.std(offsets, ddof=1) / math.sqrt(len(offsets)) if len(offsets) > 1 else 0.0
+    for shown in ([0.2], [0.25, 0.27], [0.2, 0.24, 0.25]):
+        scatter = np.std(shown, ddof=1) / math.sqrt(len(shown)) if len(shown) > 1 else 0.0
         sd = math.sqrt(scatter**2 + 4e-4**2 + 0.003**2 + past**2 + (0.25 * 0.207) ** 2 + drifted**2)
-        mean = float(np.mean(offsets))
+        mean = float(np.mean(shown))
         assert mean < MANY * sd
-        assert _told(monkeypatch, offsets, 0.003, 0.02) == ()
-        (zero,) = _scaled_down(monkeypatch, offsets)
+        assert _told(monkeypatch, shown, 0.003, 0.02) == ()
+        (zero,) = _scaled_down(monkeypatch, shown)
         assert zero.sd == pytest.approx(0.1 * sd)
         assert (zero.value, zero.size) == (pytest.approx(mean), pytest.approx(abs(mean)))
         assert (zero.effect.shifts, zero.alternatives) == ("reading", (shift_of("load").name,))
@@ -117,7 +117,7 @@ def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(mo
 
 def _scaled_down(monkeypatch: pytest.MonkeyPatch, offsets: list[float]) -> Any:
     """All that may lie in it a tenth as large, the scatter's share by more recordings like these."""
-    mean = float(np.mean(offsets))
+    mean = float(np.mean(shown))
     small = [mean + 0.1 * (one - mean) for one in offsets]
     monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(small))
     monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
