@@ -115,10 +115,10 @@ def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(mo
         assert (zero.value, zero.size) == (pytest.approx(sign * 0.2), pytest.approx(0.2))
 
 
-def _scaled_down(monkeypatch: pytest.MonkeyPatch, offsets: list[float]) -> Any:
+def _scaled_down(monkeypatch: pytest.MonkeyPatch, shown: list[float]) -> Any:
     """All that may lie in it a tenth as large, the scatter's share by more recordings like these."""
     mean = float(np.mean(shown))
-    small = [mean + 0.1 * (one - mean) for one in offsets]
+    small = [mean + 0.1 * (one - mean) for one in shown]
     monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(small))
     monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
     sessions = [_session(0.1 * np.linspace(0.2, 0.9, 101)), _session(-0.1 * np.linspace(0.4, 0.9, 101))]
