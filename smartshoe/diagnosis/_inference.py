@@ -49,7 +49,8 @@ RIVALS = 2  # that are fitted beside a set that bends
 class Inference:
     """``baseline`` and ``fit``: the plain and the extended model; ``likelihood`` they were fitted by.
 
-    ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score.
+    ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score; ``undone``:
+    members that fit by their difference, and none of them goes without the others' doing so too.
     """
 
     baseline: Fit
@@ -59,6 +60,7 @@ class Inference:
     screening: tuple[tuple[str, float], ...]
     refused: tuple[str, ...] = ()
     can_validate: bool = True
+    undone: tuple[str, ...] = ()
 
 
 def infer(
@@ -109,14 +111,15 @@ def _judged(
         for one in (given.candidates[m].effect for m in best.members):
             model = fit(likelihood, begun_with(one, model, likelihood), FEW_STEPS).model
         extended = fit(likelihood, model)
-    while undone := cancelling(sessions, extended.model, state.thresholds):
+    if undone := cancelling(sessions, extended.model, state.thresholds):
         less = {name: fit(likelihood, extended.model.without(name)) for name in undone}
         idle = min(undone, key=lambda name: less[name].cost)
-        if error_of(sessions, less[idle].model) ** 2 > state.thresholds.clear * error_of(sessions, extended.model) ** 2:
-            break  # each is needed, though they pull in opposite ways
-        refused.append(idle)
-        extended = less[idle]
-        best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != idle))
+        growth = (error_of(sessions, less[idle].model) / error_of(sessions, extended.model)) ** 2
+        # Where each is needed, or others undo one another without it, no one of them is at fault.
+        if growth <= state.thresholds.clear and not cancelling(sessions, less[idle].model, state.thresholds):
+            refused.append(idle)
+            extended = less[idle]
+            best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != idle))
     while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
@@ -127,7 +130,8 @@ def _judged(
         own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
         extended, best = plain, evidence.posterior(own)
     members = members_of(evidence, best, refused, likelihood, extended)
-    return Inference(plain, extended, likelihood, members, screening, tuple(refused))
+    undone = tuple(cancelling(sessions, extended.model, state.thresholds))
+    return Inference(plain, extended, likelihood, members, screening, tuple(refused), undone=undone)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

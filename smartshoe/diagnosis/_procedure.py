@@ -171,7 +171,7 @@ def _diagnosed(
     within = residual_structure([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
     everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
-    names = names_of(found.members, everything, thresholds)
+    names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import Errors
@@ -89,12 +89,21 @@ def past_of(zero: Zero, scale: Scale) -> str:
 
 
 def refusals_of(found: Inference) -> list[str]:
-    """What is said of effects that were taken out again."""
+    """What is said of effects that are not named for what others do: taken out again, or undone by one another."""
     if not found.can_validate:
         return [
             "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
         ]
-    if not found.refused:
-        return []
-    names = ", ".join(dict.fromkeys(name.replace("_", " ") for name in found.refused))
-    return [f"fitted well but made recordings left out worse, and so were taken out again: {names}"]
+    said = []
+    if found.undone:
+        said.append(f"undo one another, so that none of them is named: {_listed(found.undone)}")
+    if found.refused:
+        said.append(
+            "fitted well but made recordings left out worse, and so were taken out again:"
+            f" {_listed(dict.fromkeys(found.refused))}"
+        )
+    return said
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)

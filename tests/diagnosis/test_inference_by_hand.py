@@ -246,13 +246,16 @@ class _Judge:
         made.without = lambda name: self.model(*(one for one in names if one != name))
         return made
 
-    def judged(self) -> tuple[Any, Any, Any]:
+    def inference(self) -> Any:
         best = self.evidence.posterior((0, 1))
         state: Any = SimpleNamespace(
             given=self.evidence.given, evidence=self.evidence, best=best, thresholds=STANDARD,
             fit=SimpleNamespace(model=self.start), likelihood=lambda sessions: "likelihood",
         )  # fmt: skip
-        found = _judged(state, self.plain, [], ())
+        return _judged(state, self.plain, [], ())
+
+    def judged(self) -> tuple[Any, Any, Any]:
+        found = self.inference()
         return found.fit, found.members, found.refused
 
 
@@ -279,6 +282,16 @@ def test_of_effects_that_undo_one_another_the_idle_one_goes(monkeypatch: pytest.
         judge.errors[("b",)], judge.undone = error, [["a", "b"]]
         fit, members, refused = judge.judged()
         assert (fit.model.names == ("a", "b"), refused == ()) == (is_needed, is_needed)
+
+
+def test_effects_of_which_none_is_idle_stay_and_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Others undo one another without it, or each is needed."""
+    judge = _Judge(monkeypatch)
+    judge.undone = [["a"], ["b"], ["a", "b"]]  # in the end, without the idle one, at first
+    found = judge.inference()
+    assert (found.fit.model.names, found.refused, found.undone) == (("a", "b"), (), ("a",))
+    judge.undone = []
+    assert judge.inference().undone == ()
 
 
 @pytest.mark.parametrize("error", [1.0, 1.5])

@@ -149,11 +149,13 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
 
 
 def test_what_was_taken_out_again_is_said_once() -> None:
-    found: Any = SimpleNamespace(can_validate=True, refused=())
+    found: Any = SimpleNamespace(can_validate=True, refused=(), undone=())
     assert refusals_of(found) == []
     found.refused = ("linear_leak", "delay", "linear_leak")
     (said,) = refusals_of(found)
     assert said.endswith(": linear leak, delay")
+    found.undone = ("rate_gain", "delay")
+    assert refusals_of(found) == ["undo one another, so that none of them is named: rate gain, delay", said]
     found.can_validate = False
     (said,) = refusals_of(found)
     assert "no cause can be told" in said
@@ -371,15 +373,14 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held")
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
-        is_no_unit=False,
-        clocks=(),
+        is_no_unit=False, clocks=(),
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
-    core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5)
-    other = SimpleNamespace(effect=effect("dead_band"), size=0.25)
+    core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
+    other = SimpleNamespace(effect=effect("dead_band"), size=0.25, name="dead_band")
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
-        can_validate=True, refused=(), screening=tuple((f"n{k}", float(k)) for k in range(6)),
+        can_validate=True, refused=(), undone=(), screening=tuple((f"n{k}", float(k)) for k in range(6)),
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size = "memory", 0.07
@@ -514,6 +515,12 @@ def test_what_is_material_at_the_least_is_a_zero(parts: Any) -> None:
         parts.seen.clear()
         parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, size)]
         assert len(_run_diagnosis(parts).causes) == count
+
+
+def test_what_effects_undo_is_offered_no_name(parts: Any) -> None:
+    parts.found.undone = ("dead_band",)
+    _run_diagnosis(parts)
+    assert [one.name for one in parts.seen["names_of"][0][0]] == ["second_relaxation", "second_relaxation"]
 
 
 def test_what_is_left_beyond_the_error_leaves_no_noise(parts: Any) -> None:
