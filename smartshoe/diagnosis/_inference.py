@@ -130,8 +130,8 @@ def _judged(
         own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
         extended, best = plain, evidence.posterior(own)
     members = members_of(evidence, best, refused, likelihood, extended)
-    undone = tuple(cancelling(sessions, extended.model, state.thresholds))
-    return Inference(plain, extended, likelihood, members, screening, tuple(refused), undone=undone)
+    left = tuple(cancelling(sessions, extended.model, state.thresholds))
+    return Inference(plain, extended, likelihood, members, screening, tuple(refused), undone=left)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:
