@@ -89,11 +89,21 @@ def _slow_twin(sessions: list[Any], residuals: list[Array]) -> dict[str, float]:
             power = power[:-1]
         along = [float(np.sum(power[: k + 1]) / np.sum(power)) - (k + 1) / power.size for k in range(power.size)]
         coloured = max(coloured, float(np.max(np.abs(along))) * math.sqrt(power.size))
+    # What remembers is what is foretold, or what neighbours share and lead back to a step, where that is no chance.
+    shared = []
+    for lag in (1, 2):
+        products = [level[i + lag] * level[i] for level, *_ in parts for i in range(level.size - lag)]
+        is_chance = sum(products) <= LARGEST * math.sqrt(sum(one**2 for one in products))
+        shared.append(0.0 if is_chance else sum(products) / total)
+    one, two = shared
+    remembered = min(one * one / two, covariance[0]) if 0.0 < two < one else one
+    rms = math.sqrt(max(remembered, covariance[0] - np.mean(squares), 0.0))
     square = np.array(squares) / np.mean(squares)
     count = square.size
     clipped = np.minimum(square, LARGEST**2)
     level = np.concatenate([level[there] for level, there, _, _ in parts])
     return {
+        "rms": rms,
         "coloured": coloured,
         "surprises": (float(np.mean(square**2)) - 3.0) / math.sqrt(24.0 / count),
         "follows": max(abs(float(np.corrcoef(one, clipped)[0, 1])) for one in (loads, rates)) * math.sqrt(count),

@@ -1,0 +1,197 @@
+"""What is said of clocks, pasts and known faults, and effects that undo each other: at the very bounds that decide."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from told_evidence import STANDARD, ToldEvidence, candidate, worth
+
+from smartshoe.diagnosis import _inference, _zero
+from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
+from smartshoe.diagnosis._inference import _judged
+from smartshoe.diagnosis._residual_structure import ResidualStructure
+from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._validation import cancelling
+from smartshoe.diagnosis._verdict import known_error, parted_clocks, past_of, verdict_of
+from smartshoe.diagnosis._zero import Zero, _is_past, shift_of
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import MILLIBAR
+
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
+SCALE = Scale(800.0, -140.0, MILLIBAR)
+
+
+# -- what is said -----------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("lag_s", "off_s"), [(1.0, 0.25), (0.2, 0.1)])
+def test_a_lag_that_a_fit_sees_otherwise_is_said(sign: float, lag_s: float, off_s: float) -> None:
+    """By more than a quarter of it, and than an echo's tenth of a second."""
+    told, value = effect("delay"), np.array([sign * lag_s])
+    for by, is_said in ((0.999, False), (1.001, True)):
+        for side in (1.0, -1.0):
+            fitted = sign * lag_s + side * by * off_s
+            model = MODEL.with_part("dead_band").with_part(told, np.array([fitted]))
+            said = parted_clocks(told, value, model, STANDARD)
+            assert (said is not None) is is_said
+            if said is not None:
+                assert f"is {sign * lag_s:.3g} s late by the edges of load and reading, {fitted:.3g} s beside" in said
+    # One that is no longer in the model is as it was; a rate is no lag.
+    assert parted_clocks(told, value, MODEL, STANDARD) is None
+    drift = effect("clock_drift")
+    assert parted_clocks(drift, np.array([5.0]), MODEL.with_part(drift, np.array([0.0])), STANDARD) is None
+
+
+def test_what_faults_add_is_the_most_of_them_in_shares_of_the_reading() -> None:
+    def told(*errors: float) -> float:
+        faults = tuple(SimpleNamespace(error=one) for one in errors)
+        return known_error(SimpleNamespace(faults=faults), SCALE)  # type: ignore[arg-type]
+
+    assert told(7.0, 14.0, 1.4) == pytest.approx(0.1)
+    assert told() == 0.0
+
+
+def test_what_is_known_to_be_wrong_with_the_data_is_not_seen_below() -> None:
+    def left(rms: float) -> Any:
+        return SimpleNamespace(rms=rms, significant=True)
+
+    causes: Any = [SimpleNamespace(name="delay")]
+    for given, verdicts in ((causes, ("explained", "partly_explained")), ([], ("adequate", "unexplained"))):
+        told = [verdict_of(given, left(0.01), left(by * 0.02), STANDARD, True, 0.02) for by in (1.0, 1.001)]
+        assert tuple(told) == verdicts
+
+
+def test_a_past_is_said_in_the_readings_unit() -> None:
+    zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
+    assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, SCALE)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_offset_that_a_drift_may_have_brought_is_of_its_past(monkeypatch: pytest.MonkeyPatch, sign: float) -> None:
+    """The same way, and up to ten times what it drifts by in a recording, on the mean."""
+    moves = {"a": (0.3, 0.31), "b": (0.1, 0.13), "unfitted": (0.0, 9.0)}
+
+    def drifted(one: Any, model: Any) -> Any:
+        first, last = moves[one.name]
+        return sign * np.array([first, 7.0, last])
+
+    monkeypatch.setattr(_zero, "_drifted", drifted)
+    kept = {"a": [True, True], "b": [False, True], "unfitted": [False, False]}
+    sessions: Any = [SimpleNamespace(name=name, fitted=np.array(mask)) for name, mask in kept.items()]
+    for value, is_past in ((0.1999, True), (0.2001, False), (-0.1, False), (0.0, False)):
+        assert _is_past(sign * value, sessions, MODEL, STANDARD) is is_past
+    assert not _is_past(0.1, sessions[2:], MODEL, STANDARD)
+
+
+# -- what remembers ---------------------------------------------------------------------------------------------------
+def test_a_memory_counts_once_in_a_mean() -> None:
+    noise = GaussMarkov(0.004, 0.375, 0.1, 0.1, 0.1, 0.0, STANDARD)
+    assert noise.of_a_mean(3.0) == pytest.approx(0.002)
+    assert noise.of_a_mean(0.75) == pytest.approx(0.004)
+    assert noise.of_a_mean(0.1) == pytest.approx(0.004)
+
+
+def test_what_neighbours_share_is_the_sum_of_their_products() -> None:
+    """A sum of products against the root of their squares' sum: 3.89 of it."""
+    rng = np.random.default_rng(1)
+    signals = [np.cumsum(rng.standard_normal(90)), rng.standard_normal(30)]
+    blocks: Any = [SimpleNamespace(residual=one) for one in signals]
+    for lag in (1, 2):
+        products = [one[i + lag] * one[i] for one in signals for i in range(one.size - lag)]
+        score = sum(products) / math.sqrt(sum(one**2 for one in products))
+        assert score > 3.9
+        assert _lagged(blocks, lag, STANDARD) == pytest.approx(sum(products))
+
+
+def test_what_remembers_nothing_is_no_structure() -> None:
+    nothing: Any = SimpleNamespace(significant=False, rms=0.0)
+    memory: Any = SimpleNamespace(is_noise=False, rms=0.003)
+    for rms, size, found in ((0.003, 0.002, 0.002), (0.0, 0.002, 0.0), (0.003, 0.0, 0.0)):
+        memory.rms = rms
+        left = ResidualStructure(nothing, nothing, memory, "", size)
+        assert (left.rms, left.significant) == (found, found > 0.0)
+
+
+# -- what undoes one another ------------------------------------------------------------------------------------------
+def _moving(**sizes: float) -> Any:
+    """A model whose effects each add a wave, all of one shape."""
+    wave = np.resize([1.0, -1.0], 40)
+    return SimpleNamespace(
+        parts=tuple(SimpleNamespace(name=name) for name in sizes),
+        without=lambda name: _moving(**{other: by for other, by in sizes.items() if other != name}),
+        simulate=lambda conditions: 3.0 + sum(sizes.values()) * wave,
+    )
+
+
+def _session(fitted: bool = True) -> Any:
+    return SimpleNamespace(conditions=None, fitted=np.full(40, fitted))
+
+
+def test_effects_undo_each_other_where_their_powers_are_twice_that_of_all() -> None:
+    """Of one shape their sum is that of their sizes."""
+
+    def told(**sizes: float) -> list[str]:
+        return cancelling([_session(), _session(False)], _moving(**sizes), STANDARD)
+
+    assert told(a=3.0, b=-2.0) == ["a", "b"]
+    assert told(a=3.0, b=1.0) == []
+    # 1 and -x: 1 + x^2 against 2 (1 - x)^2, beyond x = 2 - sqrt(3).
+    bound = 2.0 - math.sqrt(3.0)
+    assert told(a=1.0, b=-0.999 * bound) == []
+    assert told(a=1.0, b=-1.001 * bound) == ["a"]
+    # And of these such as move it by three quarters of all together: of 1 - x, from 3/7 on.
+    assert told(a=1.0, b=-0.999 * 3.0 / 7.0) == ["a"]
+    assert told(a=1.0, b=-1.001 * 3.0 / 7.0) == ["a", "b"]
+    assert told() == []
+
+
+@pytest.mark.parametrize(("error", "names"), [(math.sqrt(2.0) - 1e-9, ("a",)), (math.sqrt(2.0) + 1e-9, ("a", "b"))])
+def test_of_effects_that_undo_each_other_the_idler_goes(
+    monkeypatch: pytest.MonkeyPatch, error: float, names: tuple[str, ...]
+) -> None:
+    """That without which the fit is cheapest, unless it leaves twice the power."""
+    candidates = [candidate("a"), candidate("b")]
+    evidence: Any = ToldEvidence(candidates, worth(1.0, 1.0))
+    evidence.noise_sd = 0.1
+
+    def model(*own: str) -> Any:
+        made = SimpleNamespace(names=own, parts=own)
+        made.without = lambda name: model(*(one for one in own if one != name))
+        return made
+
+    left = {("a", "b"): 1.0, ("a",): error, ("b",): 0.1, (): 10.0}
+    costs = {("a",): 5.0, ("b",): 7.0}
+
+    class Left:
+        def __init__(self, *given: Any) -> None: ...
+
+        def following(self, found: Any) -> Any:
+            return SimpleNamespace(model=model("a", "b"))
+
+        def stands(self, one: Any, plain: Any) -> bool:
+            return True
+
+    monkeypatch.setattr(_inference, "error_of", lambda sessions, one: left[one.names])
+    monkeypatch.setattr(_inference, "LeftOut", Left)
+    monkeypatch.setattr(_inference, "with_members", lambda *given: model("a", "b"))
+    monkeypatch.setattr(
+        _inference, "fit", lambda _, one, *steps: SimpleNamespace(model=one, cost=costs.get(one.names, 9.0))
+    )
+    monkeypatch.setattr(
+        _inference, "cancelling", lambda sessions, one, thresholds: list(one.names) if len(one.names) > 1 else []
+    )
+    monkeypatch.setattr(_inference, "extrapolating", lambda *given: None)
+    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, refused, *rest: (best.members, tuple(refused)))
+    state: Any = SimpleNamespace(
+        given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
+        fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda sessions: "likelihood",
+    )  # fmt: skip
+    found: Any = _judged(state, SimpleNamespace(model=model()), [], ())  # type: ignore[arg-type]
+    assert found.fit.model.names == names
+    gone = () if len(names) > 1 else ("b",)
+    assert (found.members, found.refused) == ((tuple(range(len(names))), gone), gone)
