@@ -131,6 +131,15 @@ def test_what_repeats_is_said_and_what_does_not_is_not() -> None:
     )
 
 
+@pytest.mark.parametrize(("seed", "lacks"), [(18, True), (154, True), (239, False), (249, False)])
+def test_a_lack_is_said_below_one_percent(seed: int, lacks: bool) -> None:
+    """Of white noise by chance: p is 0.005, 0.007, 0.013 and 0.015."""
+    found = lack_of_fit_of({"r": _noise(0.0, seed)}, [RECORDING], unknowns=0)
+    assert 0.004 < found.p_value < 0.02
+    assert (found.p_value < 0.01) is lacks
+    assert ("the model lacks something" in found.says) is lacks
+
+
 def test_without_any_noise_all_of_it_repeats() -> None:
     """Of a residual that is the same in all repeats rounding takes the noise's place."""
     found = lack_of_fit_of({"r": np.full(len(RECORDING), 3.0)}, [RECORDING], unknowns=2)
