@@ -183,6 +183,25 @@ def test_the_sd_at_the_top_is_that_of_both_units_errors(
     assert found.sd_n == pytest.approx(math.sqrt(variance), rel=2e-3)
 
 
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_what_is_told_in_newtons_does_not_know_the_unit_of_the_readings(scale: float) -> None:
+    """Of a reading whose numbers are so many times smaller both gains are so many times larger."""
+    row = np.array([1.0, scale, scale])
+    pairs = []
+    for factor in (1.0, 1.01):
+        made = calibration((A1, factor * B0, factor * B1))
+        covariance = tuple(map(tuple, np.outer(row, row) * covariance_of()))
+        pairs.append((made, replace(made, b0=scale * made.b0, b1=scale * made.b1, covariance=covariance)))
+    (plain,), (scaled,) = (compare(*pair, (200.0,)).forces for pair in zip(*pairs, strict=True))
+    assert scaled.sd_n == pytest.approx(plain.sd_n, rel=1e-4)
+    assert scaled.largest_n == pytest.approx(plain.largest_n)
+
+
+def test_a_load_may_come_as_slowly_as_it_likes() -> None:
+    (found,) = compare(calibration(), calibration((A1, 1.03 * B0, 1.03 * B1)), (0.5,)).forces
+    assert (found.rate_n_per_s, found.largest_n) == (0.5, pytest.approx(24.0, rel=1e-3))
+
+
 def test_where_one_has_no_covariance_no_sd_is_told() -> None:
     bare = calibration(has_errors=False)
     for pair in ((bare, calibration()), (calibration(), bare), (bare, bare)):

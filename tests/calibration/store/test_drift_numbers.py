@@ -183,6 +183,14 @@ def test_every_jump_is_told_and_in_order_of_time() -> None:
     assert found.repairs == ()
 
 
+@pytest.mark.parametrize("at", [3, 6, 9])
+def test_a_large_jump_is_told_where_it_is_and_once(at: int) -> None:
+    days = [30.0 * k for k in range(12)]
+    values = 40.0 + 0.05 * np.resize([1.0, -1.0, 0.5], 12) + 5.0 * (np.arange(12) >= at)
+    found = trend_of(values, np.full(12, np.nan), days)
+    assert [jump.date for jump in found.jumps] == [FIRST_DAY + timedelta(days=days[at])]
+
+
 @pytest.mark.parametrize(("shift", "is_told"), [(0.06, True), (-0.06, False)])
 def test_a_jump_beside_a_repair_is_one_of_the_gaps_within_its_pieces(shift: float, is_told: bool) -> None:
     days, lives = [30.0 * k for k in range(11)], [0] * 7 + [1] * 4
