@@ -1,0 +1,220 @@
+"""A diagnosis put together from what each of its parts answers, and recordings prepared for it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, TIME_S, _left
+
+from smartshoe import Recording
+from smartshoe.diagnosis import _procedure
+from smartshoe.diagnosis._procedure import _diagnosed, _prepared
+from smartshoe.diagnosis._zero import Zero, shift_of
+from smartshoe.models.effects import effect
+
+Array = NDArray[np.float64]
+
+FAULT: Any = SimpleNamespace(kind="gaps", error=0.0)
+
+
+def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
+    def run(seed: int) -> Recording:
+        noise = 0.1 * np.random.default_rng(seed).standard_normal(600)
+        return Recording.from_arrays(
+            time_s=TIME_S, force_n=800.0 * LOAD, pressure_mbar=140.0 * LOAD + noise, name=f"run_{seed}"
+        )
+
+    runs = [run(seed) for seed in range(3)]
+    usable = tuple(np.ones(600, dtype=bool) for _ in runs)
+
+    def integrity(lag_s: float) -> Any:
+        return SimpleNamespace(clock_offset_s=(lag_s,) * 3, clock_rate=(0.0,) * 3, usable=usable)
+
+    found = _prepared(runs, 2, integrity(0.0), STANDARD)
+    assert [bool(one.held_out.all()) for one in found.sessions] == [False, False, True]
+    assert [one.thinned for one in found.fine] == [1, 1, 1]
+    assert not found.is_no_unit
+    assert found.start.parts == ()
+    within = _prepared(runs, 3, integrity(0.0), STANDARD)
+    assert all(0.1 < float(one.held_out.mean()) < 0.6 for one in within.sessions)
+    late = _prepared(runs, 3, integrity(0.3), STANDARD)
+    ((name, value),) = [(one.name, one.values) for one in late.start.parts]
+    assert (name, value) == ("delay", pytest.approx([0.3]))
+    assert (late.start.relaxing_share, late.start.relaxation_rate_per_s) == (0.08, 0.22)
+    # Friction in each recording is no unit's; in one of them it is said.
+    rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
+    assert _prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
+    mixed = _prepared([runs[0], rubbed[1], runs[2]], 3, integrity(0.0), STANDARD)
+    assert not mixed.is_no_unit
+    assert sum("friction; Coulomb" in said for said in mixed.limits) == 1
+    assert sum("friction; Coulomb" in said for said in _prepared(runs, 3, integrity(0.0), STANDARD).limits) == 0
+
+
+def replace_reading(one: Recording, reading: Array) -> Recording:
+    return Recording.from_arrays(time_s=one.time_s, force_n=one.force_n, pressure_mbar=reading, name=one.name)
+
+
+@pytest.fixture
+def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Every step of a diagnosis by what it is told to answer."""
+    fitted = SimpleNamespace(fitted=np.ones(3, dtype=bool), name="fitted")
+    held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held")
+    given = SimpleNamespace(
+        sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
+        is_no_unit=False, clocks=(),
+    )  # fmt: skip
+    extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
+    core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
+    other = SimpleNamespace(effect=effect("dead_band"), size=0.25, name="dead_band")
+    found = SimpleNamespace(
+        fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
+        can_validate=True, refused=(), undone=(), screening=tuple((f"n{k}", float(k)) for k in range(6)),
+    )  # fmt: skip
+    kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
+    kinds[2].memory, kinds[2].size = "memory", 0.07
+    made = SimpleNamespace(
+        given=given, found=found, kinds=kinds, names=[], zeros=[], seen={}, sizes={"linear_leak": 0.1, "delay": 0.3}
+    )
+
+    def structure(sessions: Any, residuals: Any, thresholds: Any) -> Any:
+        made.seen.setdefault("structure", []).append((list(sessions), list(residuals)))
+        return made.kinds[len(made.seen["structure"]) - 1]
+
+    def answer(name: str, value: Any) -> None:
+        def called(*args: Any, **named: Any) -> Any:
+            made.seen[name] = (args, named)
+            return value(*args) if callable(value) else value
+
+        monkeypatch.setattr(_procedure, name, called)
+
+    def cause(name: Any, *_: Any) -> Any:
+        return SimpleNamespace(name=name.name, size=made.sizes[name.name], rivals=(f"rival of {name.name}",))
+
+    answer("_prepared", given)
+    answer("infer", found)
+    answer("residual_of", lambda session, model: f"{session.name} {len(model.parts)}")
+    monkeypatch.setattr(_procedure, "residual_structure", structure)
+    answer("names_of", lambda *_: tuple(made.names))
+    answer("_is_within_a_sample", lambda name, *_: name.name == "short")
+    answer("zeros_of", lambda *_: tuple(made.zeros))
+    answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
+    answer("_cause", cause)
+    answer("_zero_cause", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
+    answer("_with_offset", "with offset")
+    answer("noise_kinds", ["noise"])
+    answer("joint_parameters", ({"p": 1}, ((1.0,),)))
+    answer("force_rmse_n", lambda fine, model: 7.0 if len(model.parts) else 9.0)
+    answer("next_experiment", "next")
+    answer("_trace", "trace")
+    answer("sentence_of", "sentence")
+    return made
+
+
+def _run_diagnosis(parts: Any) -> Any:
+    said: list[str] = []
+    integrity: Any = SimpleNamespace(faults=(FAULT,))
+    result = _diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
+    assert said == ["judging on held-out data"]
+    return result
+
+
+def _name(name: str, kind_only: bool = False) -> Any:
+    return SimpleNamespace(name=name, kind_only=kind_only)
+
+
+def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
+    parts.names = [_name("linear_leak"), _name("short"), _name("delay")]
+    parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, 0.2), Zero(shift_of("reading"), 0.2, 0.1, 1e-4)]
+    told = _run_diagnosis(parts)
+    assert [one.name for one in told.causes] == ["delay", "zero", "linear_leak"]  # the largest first, no immaterial one
+    assert (told.unit, told.full_scale_load_n, told.full_scale_reading) == ("mbar", 800.0, 140.0)
+    assert (told.verdict, told.says, told.minor) == ("explained", "sentence", ())
+    assert told.data_faults == (FAULT, "noise")
+    assert (told.baseline.rmse, told.extended.rmse) == (pytest.approx(28.0), pytest.approx(14.0))
+    assert (told.baseline.force_rmse_n, told.extended.force_rmse_n) == (9.0, 7.0)
+    assert (told.baseline.structure_rms, told.extended.structure_rms) == (pytest.approx(42.0), pytest.approx(2.8))
+    assert told.gain.gain_percent == pytest.approx(50.0)
+    # Of the error's variance 0.04 there is noise 0.01 less what structure is left of it.
+    assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - 0.02**2) / 0.04))
+    assert told.explained_percent == pytest.approx(75.0)
+    assert (told.rivals, told.next_experiment) == (("rival of delay",), "next")
+    assert (told.limits, told.leftover, told.screening) == (("limit",), None, parts.found.screening)
+    assert (told.model, told.baseline_model, told.parameters) == ("with offset", MODEL, {"p": 1})
+    assert (told.covariance, told.traces, told.thresholds) == (((1.0,),), ("trace",), STANDARD)
+    seen = parts.seen
+    assert [residuals for _, residuals in seen["structure"]] == [
+        ["held 0", "fitted 0"], ["held 2", "fitted 2"], ["fitted 2"],
+    ]  # fmt: skip
+    assert [one.name for one in seen["structure"][2][0]] == ["fitted"]
+    assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
+    assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
+    assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
+    assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
+    assert seen["next_experiment"][1] == {"open_": True}
+    assert seen["infer"][0][4] is True
+
+
+def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) -> None:
+    told = _run_diagnosis(parts)
+    assert (told.verdict, told.leftover, told.causes) == ("unexplained", "here", ())
+    assert [one.effect for one in told.rivals] == ["n0", "n1", "n2", "n3"]
+    assert [one.margin for one in told.rivals] == [0.0, 1.0, 2.0, 3.0]
+    assert told.minor == ("linear_leak", "delay")
+    assert parts.seen["noise_kinds"][0][3] is False
+    parts.seen.clear()
+    parts.kinds[1].is_noise = True
+    _run_diagnosis(parts)
+    assert parts.seen["noise_kinds"][0][3] is True
+
+
+def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
+    parts.kinds[1].significant = False
+    told = _run_diagnosis(parts)
+    assert (told.verdict, told.leftover) == ("adequate", None)
+    assert told.explainable_percent == pytest.approx(75.0)
+    assert parts.seen["next_experiment"][1] == {"open_": False}
+    assert parts.seen["noise_kinds"][0][3] is True
+
+
+def test_a_kind_without_a_law_leaves_no_more_than_what_is_tolerable(parts: Any) -> None:
+    for kind_only, verdict in ((False, "explained"), (True, "partly_explained")):
+        parts.seen.clear()
+        parts.names = [_name("linear_leak"), _name("delay", kind_only)]
+        told = _run_diagnosis(parts)
+        assert (told.verdict, told.leftover is None) == (verdict, verdict == "explained")
+
+
+def test_of_what_is_no_unit_or_one_cycle_no_zero_is_told(parts: Any) -> None:
+    parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, 0.2)]
+    parts.given.is_no_unit = True
+    told = _run_diagnosis(parts)
+    assert (told.causes, told.verdict) == ((), "unexplained")
+    assert parts.seen["infer"][0][4] is False
+    parts.seen.clear()
+    parts.given.is_no_unit, parts.found.can_validate = False, False
+    assert _run_diagnosis(parts).causes == ()
+    parts.seen.clear()
+    parts.found.can_validate = True
+    assert [one.name for one in _run_diagnosis(parts).causes] == ["zero"]
+
+
+def test_what_is_material_at_the_least_is_a_zero(parts: Any) -> None:
+    for size, count in ((STANDARD.material, 1), (0.999 * STANDARD.material, 0)):
+        parts.seen.clear()
+        parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, size)]
+        assert len(_run_diagnosis(parts).causes) == count
+
+
+def test_what_effects_undo_is_offered_no_name(parts: Any) -> None:
+    parts.found.undone = ("dead_band",)
+    _run_diagnosis(parts)
+    assert [one.name for one in parts.seen["names_of"][0][0]] == ["second_relaxation", "second_relaxation"]
+
+
+def test_what_is_left_beyond_the_error_leaves_no_noise(parts: Any) -> None:
+    parts.kinds[1].rms = 0.5
+    assert _run_diagnosis(parts).explainable_percent == 100.0
