@@ -77,7 +77,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
     order_ci95: tuple[float, float] | None = None
     course: Course = "undecided"
     if lost > slight:
-        towards = _fit(_to_plateau, t, v, [high - low, guess, low])
+        towards = _fit(_to_plateau, t, v, [high - low, _guess(t, v - low), low])
         ordered = _fit(_of_order, t, v, [high, float(one.at[1]), 1.05])
         earned = towards.square < min(one.square / thresholds.clear, ordered.square)
         if earned and towards.at[2] > slight * high:

@@ -213,7 +213,7 @@ def _slow_found(reading: Array, model: str) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("noise", [1e-3, 0.3])
-@pytest.mark.parametrize(("waits_s", "tau_s"), [(0.0, 20.0), (7.0, 12.0)])
+@pytest.mark.parametrize(("waits_s", "tau_s"), [(0.0, 20.0), (7.0, 12.0), (0.0, 12.0)])
 def test_a_plateau_and_a_time_constant_are_those_of_a_fit_from_the_onset_on(
     waits_s: float, tau_s: float, noise: float
 ) -> None:

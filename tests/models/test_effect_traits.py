@@ -89,7 +89,7 @@ def test_a_latency_moves_the_reading_in_time_and_changes_nothing_that_lasts() ->
 def test_what_is_seen_at_rest_moves_the_reading_without_load() -> None:
     time_s = 0.02 * np.arange(4000)
     load = np.interp(time_s, [0.0, 10.0, 20.0, 30.0, 80.0], [0.0, 0.0, 1.0, 0.0, 0.0])
-    at = Conditions(time_s, load, 0.02)
+    at = Conditions(time_s, load, 0.02, neighbour=np.ones_like(load))
     for one in EVERY:
         if one.is_seen_at_rest:
             values = np.array(

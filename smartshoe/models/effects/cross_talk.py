@@ -23,6 +23,7 @@ class CrossTalk(Effect):
         "contact_area": by("neighbour"),
         "zero_drift": by("neighbour"),
     }
+    is_seen_at_rest = True
     departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
