@@ -65,7 +65,7 @@ class Minimum:
 
 def solve_normal(normal: Array, right: Array) -> Array:
     """x with normal x = right, columns scaled by their norm; the smallest x where it is singular."""
-    scale = np.sqrt(normal.diagonal())
+    scale = np.sqrt(np.maximum(normal.diagonal(), 0.0))  # a column of nothing, rounded
     if not scale.all():
         scale = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(normal / (scale[:, np.newaxis] * scale))
@@ -205,7 +205,7 @@ class _TrustRegion(_GaussNewton):
         self.last = first, np.zeros(first.gradient.size)  # and the full step from there
 
     def step(self, now: Evaluation, newton: Array, free: Mask) -> Array:
-        self.scale = np.maximum(self.scale, np.sqrt(now.normal.diagonal()))
+        self.scale = np.sqrt(np.maximum(self.scale**2, now.normal.diagonal()))
         self.last = now, newton
         if self.radius == np.inf or _length(self.scale * newton) <= self.radius:
             return newton

@@ -162,6 +162,8 @@ def test_what_a_step_promises_is_what_the_parabola_falls_by() -> None:
 def test_of_columns_that_are_one_each_takes_half() -> None:
     assert solve_normal(np.array([[4.0, 4.0], [4.0, 4.0]]), np.array([8.0, 8.0])) == pytest.approx([1.0, 1.0])
     assert solve_normal(np.diag([0.0, 1e-30]), np.array([5.0, 3e-30])) == pytest.approx([0.0, 3.0])
+    # What rounding makes of a column of nothing.
+    assert solve_normal(np.diag([-6e-22, 4.0]), np.array([0.0, 8.0])) == pytest.approx([0.0, 2.0])
 
 
 # -- Gauss and Newton ----------------------------------------------------------------------------------------------
