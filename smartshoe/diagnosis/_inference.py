@@ -50,7 +50,7 @@ class Inference:
     """``baseline`` and ``fit``: the plain and the extended model; ``likelihood`` they were fitted by.
 
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score; ``undone``:
-    members that fit by their difference, and none of them goes without the others' doing so too.
+    members that fit by their difference, of which one is idle, and others undo one another without it.
     """
 
     baseline: Fit
@@ -111,12 +111,14 @@ def _judged(
         for one in (given.candidates[m].effect for m in best.members):
             model = fit(likelihood, begun_with(one, model, likelihood), FEW_STEPS).model
         extended = fit(likelihood, model)
-    if undone := cancelling(sessions, extended.model, state.thresholds):
+    undone = cancelling(sessions, extended.model, state.thresholds)
+    if undone:
         less = {name: fit(likelihood, extended.model.without(name)) for name in undone}
         idle = min(undone, key=lambda name: less[name].cost)
-        growth = (error_of(sessions, less[idle].model) / error_of(sessions, extended.model)) ** 2
-        # Where each is needed, or others undo one another without it, no one of them is at fault.
-        if growth <= state.thresholds.clear and not cancelling(sessions, less[idle].model, state.thresholds):
+        if error_of(sessions, less[idle].model) ** 2 > state.thresholds.clear * error_of(sessions, extended.model) ** 2:
+            undone = []  # each is needed, though they pull in opposite ways
+        elif not cancelling(sessions, less[idle].model, state.thresholds):
+            undone = []
             refused.append(idle)
             extended = less[idle]
             best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != idle))
@@ -130,7 +132,7 @@ def _judged(
         own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
         extended, best = plain, evidence.posterior(own)
     members = members_of(evidence, best, refused, likelihood, extended)
-    left = tuple(cancelling(sessions, extended.model, state.thresholds))
+    left = tuple(name for name in undone if name in extended.model.names)
     return Inference(plain, extended, likelihood, members, screening, tuple(refused), undone=left)
 
 

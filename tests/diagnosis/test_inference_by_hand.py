@@ -284,12 +284,16 @@ def test_of_effects_that_undo_one_another_the_idle_one_goes(monkeypatch: pytest.
         assert (fit.model.names == ("a", "b"), refused == ()) == (is_needed, is_needed)
 
 
-def test_effects_of_which_none_is_idle_stay_and_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Others undo one another without it, or each is needed."""
+def test_effects_that_others_undo_without_the_idle_one_stay_and_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = _Judge(monkeypatch)
-    judge.undone = [["a"], ["b"], ["a", "b"]]  # in the end, without the idle one, at first
+    judge.undone = [["b"], ["a", "b"]]  # without the idle one, at first
     found = judge.inference()
-    assert (found.fit.model.names, found.refused, found.undone) == (("a", "b"), (), ("a",))
+    assert (found.fit.model.names, found.refused, found.undone) == (("a", "b"), (), ("a", "b"))
+    judge.undone, judge.follows = [["b"], ["a", "b"]], ("b",)  # what has gone for another reason is not told
+    assert judge.inference().undone == ("b",)
+    judge.undone, judge.follows, judge.errors[("b",)] = [["a", "b"]], ("a", "b"), 0.9  # each is needed
+    found = judge.inference()
+    assert (found.fit.model.names, found.refused, found.undone) == (("a", "b"), (), ())
     judge.undone = []
     assert judge.inference().undone == ()
 
