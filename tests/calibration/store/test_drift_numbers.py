@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from smartshoe.calibration.store import CalibrationStore, HistoryEvent
 from smartshoe.calibration.store.dates import moment
-from smartshoe.calibration.store.drift import DriftStep, Trend, _trend, drift
+from smartshoe.calibration.store.drift import DriftStep, Trend, _jump, _trend, drift
 from smartshoe.errors import UsageError
 from smartshoe.models.parameter import Parameter
 from smartshoe.units import VOLT
@@ -189,6 +189,18 @@ def test_a_large_jump_is_told_where_it_is_and_once(at: int) -> None:
     values = 40.0 + 0.05 * np.resize([1.0, -1.0, 0.5], 12) + 5.0 * (np.arange(12) >= at)
     found = trend_of(values, np.full(12, np.nan), days)
     assert [jump.date for jump in found.jumps] == [FIRST_DAY + timedelta(days=days[at])]
+
+
+@pytest.mark.parametrize("at", [5, 9, 13])
+def test_of_gaps_that_all_look_like_jumps_the_strongest_is_one(at: int) -> None:
+    """Beside a step each of its neighbours divides the values nearly as well."""
+    rng = np.random.default_rng(at)
+    days = np.cumsum(rng.uniform(5.0, 60.0, 18))
+    values = 2.0 * (np.arange(18) >= at) + 0.1 * rng.standard_normal(18)
+    whole = np.zeros(18, dtype=np.intp)
+    assert _jump(days, values, np.full(18, 0.1), whole) == at
+    beside = np.delete(np.arange(18), at)  # without the first value behind it the next gap is
+    assert _jump(days[beside], values[beside], np.full(17, 0.1), whole[beside]) == at
 
 
 @pytest.mark.parametrize(("shift", "is_told"), [(0.06, True), (-0.06, False)])
