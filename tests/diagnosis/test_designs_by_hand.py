@@ -170,10 +170,11 @@ class _Linear:
         return self.simulate(at), np.column_stack([at.load, 0.0 * at.load])
 
 
-@pytest.mark.parametrize("variance", [1e-6, 1e-2, 0.0])
-def test_a_margin_is_what_a_rival_cannot_make_up_within_what_it_was_fitted_to(variance: float) -> None:
+@pytest.mark.parametrize(("variance", "other"), [(1e-6, 0.0), (1e-2, 0.0), (0.0, 0.0), (1e-2, 1e-20)])
+def test_a_margin_is_what_a_rival_cannot_make_up_within_what_it_was_fitted_to(variance: float, other: float) -> None:
+    """A parameter that moves nothing, and of which nothing is known beside the others, has no part in it."""
     truth: Any = SimpleNamespace(model=_Linear(1.2))
-    rival: Any = SimpleNamespace(model=_Linear(0.9), covariance=np.diag([variance, 0.0]))
+    rival: Any = SimpleNamespace(model=_Linear(0.9), covariance=np.diag([variance, other]))
     protocol = Protocol("ramp", (Segment("ramp", 400.0, 2.0), Segment("ramp", 0.0, 1.0)))
     like: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.1, load_noise=0.0))
     load = protocol.load_at(0.1 * np.arange(30)) / 400.0

@@ -220,6 +220,9 @@ def test_a_cycle_begins_with_the_last_sample_of_the_rest_before_its_rise() -> No
     assert list(small) == list(cycle)
     large = _cycles(_conditions(1.5 * _course(*rise * 6)), STANDARD)
     assert large[-1] == 5
+    # Beyond full scale it is of full scale: a dip of 0.0975 is more than 0.08, though less than 0.08 of 1.5.
+    dipped = ((10, 0.0), (20, 1.0), (5, 0.935), (5, 1.0), (20, 0.0))
+    assert _cycles(_conditions(1.5 * _course(*dipped * 6)), STANDARD)[-1] == 11
 
 
 @pytest.mark.parametrize(("rises", "count"), [(5, 12), (6, 6)])
