@@ -107,8 +107,8 @@ def gauss_markov_of(
     new = [lfilter([1.0, *-weights], [1.0], one.residual) for one in blocks]
     coloured = max(_kolmogorov(np.where(known, one, 0.0)) for one, known in zip(new, good, strict=True))
     square = np.concatenate([one[known] for one, known in zip(new, good, strict=True)]) ** 2
-    unscaled = square
-    square = square / square.mean()
+    surprise = float(square.mean())
+    square /= surprise
     kurtosis = (float(np.mean(square**2)) - 3.0) / np.sqrt(24.0 / count)
     drives = [
         np.concatenate([one[known] for one, known in zip(drive, good, strict=True)])
@@ -119,7 +119,7 @@ def gauss_markov_of(
     flatness = float(np.mean(level**4) / np.mean(level**2) ** 2) - 3.0
     tau_s = _memory_s(weights, lags, float(np.median([one.step_s for one in blocks])))
     tests = coloured, float(kurtosis), float(follows)
-    foretold = max(float(covariance[0]) - float(np.mean(unscaled)), 0.0)
+    foretold = max(float(covariance[0]) - surprise, 0.0)
     one, two = (_lagged(blocks, lag, thresholds) / there for lag in (1, 2))
     rms = math.sqrt(max(_remembered(float(covariance[0]), one, two), foretold))
     return GaussMarkov(rms, tau_s, *tests, flatness, thresholds)

@@ -121,11 +121,10 @@ def _judged(
             undone = []
             refused.append(idle)
             extended = less[idle]
-            best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != idle))
     while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
-        best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name != beyond))
         extended = fit(likelihood, extended.model.without(beyond))
+    best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name not in refused))
     went_astray = extended.model.names == plain.model.names or error_of(sessions, extended.model) >= most
     if went_astray or not left_out.stands(extended.model, plain.model):
         # What the baseline itself holds, two clocks, was told before any model.

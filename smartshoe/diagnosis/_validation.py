@@ -99,8 +99,7 @@ def extrapolating(sessions: Sequence[Session], model: ExtendedModel, thresholds:
     """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide."""
     whole = [model.simulate(one.conditions) for one in sessions]
     for part in model.parts:
-        less = model.without(part.name)
-        by = [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
+        by = _moved(sessions, whole, model.without(part.name))
         within = _spread(by, [one.fitted for one in sessions])
         if _spread(by, [one.judged for one in sessions]) > thresholds.extrapolates * max(within, thresholds.material):
             return part.name
@@ -113,18 +112,10 @@ def cancelling(sessions: Sequence[Session], model: ExtendedModel, thresholds: Th
     Powers of independent effects add up to that of all; where they are clear of it, most of what the effects do is
     undone by one another, and they fit by their difference, which is neither's.
     """
-    bare = model
-    for part in model.parts:
-        bare = bare.without(part.name)
     seen = [one.fitted for one in sessions]
     whole = [model.simulate(one.conditions) for one in sessions]
-
-    def moved(less: ExtendedModel) -> float:
-        by = [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
-        return _spread(by, seen)
-
-    sizes = {part.name: moved(model.without(part.name)) for part in model.parts}
-    together = moved(bare)
+    sizes = {name: _spread(_moved(sessions, whole, model.without(name)), seen) for name in model.names}
+    together = _spread(_moved(sessions, whole, replace(model, parts=())), seen)
     if sum(size**2 for size in sizes.values()) <= thresholds.clear * together**2:
         return []
     return [name for name, size in sizes.items() if size > (1.0 - thresholds.same) * together]
@@ -138,6 +129,11 @@ def error_of(sessions: Sequence[Session], model: ExtendedModel) -> float:
 def apart(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
     """Rms of the difference of two models' readings over what is fitted, each recording's own offset aside."""
     return _fitted_rms(sessions, lambda session: residual_of(session, first) - residual_of(session, second))
+
+
+def _moved(sessions: Sequence[Session], whole: Sequence[Array], less: ExtendedModel) -> list[Array]:
+    """By how much the readings ``whole``, (n,) each, lie beside those of a model that lacks something."""
+    return [reading - less.simulate(one.conditions) for reading, one in zip(whole, sessions, strict=True)]
 
 
 def _spread(signals: Sequence[Array], seen: Sequence[Mask]) -> float:

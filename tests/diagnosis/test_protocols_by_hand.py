@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from courses import course
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
@@ -134,18 +135,9 @@ def _session(load: Array, step_s: float = 0.1, thinned: int = 2, resting: Any = 
     )
 
 
-def _course(*corners: tuple[int, float]) -> Array:
-    """Straight lines of so many steps to such a load."""
-    parts, at = [np.zeros(1)], 0.0
-    for steps, share in corners:
-        parts.append(np.linspace(at, share, steps + 1)[1:])
-        at = share
-    return np.concatenate(parts)
-
-
 def test_a_rise_is_told_by_its_middle_half() -> None:
     """Slow at first and last, fast between a quarter and three quarters."""
-    load = _course((10, 0.0), (20, 0.18), (12, 0.62), (30, 0.8), (20, 0.0), (10, 0.0))
+    load = course((10, 0.0), (20, 0.18), (12, 0.62), (30, 0.8), (20, 0.0), (10, 0.0))
     (rise,) = _rises(_session(load), STANDARD)
     # The first at 0.2 or more is the first of the twelve, the first at 0.6 or more the last of them.
     assert rise.samples == 11
@@ -162,7 +154,7 @@ def test_a_step_within_a_sample_took_half_of_one() -> None:
     assert (rise.samples, rise.rate) == (0, pytest.approx(0.5 / 0.05))
     # Where nothing was thinned a sample more or less would make another rate of four or fewer.
     for steps, is_told in ((6, False), (7, True)):  # three and four from a quarter to three quarters
-        ramp = _course((20, 0.0), (steps, 1.0), (20, 1.0), (20, 0.0), (20, 0.0))
+        ramp = course((20, 0.0), (steps, 1.0), (20, 1.0), (20, 0.0), (20, 0.0))
         (thinned,) = _rises(_session(ramp), STANDARD)
         assert thinned.samples == steps // 2 + steps % 2
         assert bool(list(_rises(_session(ramp, thinned=1), STANDARD))) is is_told
@@ -171,22 +163,22 @@ def test_a_step_within_a_sample_took_half_of_one() -> None:
 @pytest.mark.parametrize(("height", "is_told"), [(0.235, False), (0.245, True)])
 def test_a_rise_is_clear_of_what_makes_a_cycle(height: float, is_told: bool) -> None:
     """Three times 0.08 of the span, in a load that goes to one beside it."""
-    load = _course((10, 0.0), (20, 1.0), (20, 0.0), (20, height), (20, 0.0), (10, 0.0))
+    load = course((10, 0.0), (20, 1.0), (20, 0.0), (20, height), (20, 0.0), (10, 0.0))
     assert len(list(_rises(_session(load), STANDARD))) == 1 + is_told
     # Of a load that moves by little the span is its own; of one that goes beyond the full scale it is that.
     assert len(list(_rises(_session(0.1 * load + 0.5), STANDARD))) == 1 + is_told
-    tall = _course((10, 0.0), (20, 3.0), (20, 0.0), (20, height), (20, 0.0), (10, 0.0))
+    tall = course((10, 0.0), (20, 3.0), (20, 0.0), (20, height), (20, 0.0), (10, 0.0))
     assert len(list(_rises(_session(tall), STANDARD))) == 1 + is_told
 
 
 @pytest.mark.parametrize(("foot", "is_minor"), [(0.155, False), (0.165, True)])
 def test_a_minor_loop_begins_clear_of_the_least_load(foot: float, is_minor: bool) -> None:
-    load = _course((10, 0.0), (20, 1.0), (20, foot), (20, 0.9), (20, 0.0), (10, 0.0))
+    load = course((10, 0.0), (20, 1.0), (20, foot), (20, 0.9), (20, 0.0), (10, 0.0))
     assert [one.is_minor for one in _rises(_session(load - 0.3), STANDARD)] == [False, is_minor]
 
 
 def test_a_rise_that_ends_at_no_load_bears_none() -> None:
-    load = _course((10, 0.0), (20, 1.0), (20, 0.0), (10, 0.0))
+    load = course((10, 0.0), (20, 1.0), (20, 0.0), (10, 0.0))
     assert list(_rises(_session(load - 1.0), STANDARD)) == []
     assert len(list(_rises(_session(load - 0.999), STANDARD))) == 1
     assert list(_rises(_session(np.full(50, 0.3)), STANDARD)) == []
@@ -280,7 +272,7 @@ def _rising(*rises: tuple[float, float]) -> Any:
     corners: list[tuple[int, float]] = [(20, 0.0)]
     for rate, peak in rises:
         corners += [(max(round(peak / rate / 0.1), 1), peak), (20, 0.0), (20, 0.0)]
-    return _session(_course(*corners))
+    return _session(course(*corners))
 
 
 def test_steps_low_loads_and_repeats() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from courses import course
 from numpy.typing import NDArray
 from scipy.stats import norm
 
@@ -47,14 +48,6 @@ def _run(load: Array, reading: Array | None = None, step_s: float = STEP_S, **mo
     return Recording.from_arrays(
         time_s=step_s * np.arange(load.size), force_n=800.0 * load, pressure_mbar=shown, **more
     )
-
-
-def _course(*corners: tuple[int, float]) -> Array:
-    parts, at = [np.zeros(1)], 0.0
-    for steps, share in corners:
-        parts.append(np.linspace(at, share, steps + 1)[1:])
-        at = share
-    return np.concatenate(parts)
 
 
 # -- windows ----------------------------------------------------------------------------------------------------------
@@ -152,7 +145,7 @@ def test_the_fastest_ramp_keeps_so_many_samples() -> None:
 
 @pytest.mark.parametrize(("count", "factor"), [(12_000, 1), (12_001, 2), (60_001, 6), (100_000, 6)])
 def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(count: int, factor: int) -> None:
-    load = np.resize(_course((10, 1.0), (10, 0.0)), count)
+    load = np.resize(course((10, 1.0), (10, 0.0)), count)
     assert thinning([_run(load)], SCALE) == factor
     half = count // 2
     assert thinning([_run(load[:half]), _run(load[half:])], SCALE) == factor
@@ -206,28 +199,28 @@ def _conditions(load: Array, step_s: float = STEP_S, before: Any = None) -> Cond
 
 def test_a_cycle_begins_with_the_last_sample_of_the_rest_before_its_rise() -> None:
     rise = ((10, 0.0), (20, 1.0), (20, 0.0))
-    cycle = _cycles(_conditions(_course(*rise * 6)), STANDARD)
+    cycle = _cycles(_conditions(course(*rise * 6)), STANDARD)
     # Rests end at 10, 60, 110, ...; the foot is left once a quarter of what makes a cycle (0.02 of 0.05 a step) is.
     assert list(np.flatnonzero(np.diff(cycle)) + 1) == [60, 110, 160, 210, 260]
     assert (cycle[0], cycle[-1]) == (0, 5)
     slowly = ((10, 0.0), (200, 1.0), (20, 0.0))  # 0.005 a step: four steps more within a quarter of 0.08
-    later = _cycles(_conditions(_course(*slowly * 6)), STANDARD)
+    later = _cycles(_conditions(course(*slowly * 6)), STANDARD)
     assert list(np.flatnonzero(np.diff(later)) + 1) == [244 + 230 * k for k in range(5)]
     # A ripple of less than that is none; of a load that moves by little it is as much of its own span.
-    rippled = _course(*rise * 6) + 0.07 * np.resize([0.0, 1.0], 301)
+    rippled = course(*rise * 6) + 0.07 * np.resize([0.0, 1.0], 301)
     assert _cycles(_conditions(rippled), STANDARD)[-1] == 5
-    small = _cycles(_conditions(0.7 + 0.05 * _course(*rise * 6)), STANDARD)
+    small = _cycles(_conditions(0.7 + 0.05 * course(*rise * 6)), STANDARD)
     assert list(small) == list(cycle)
-    large = _cycles(_conditions(1.5 * _course(*rise * 6)), STANDARD)
+    large = _cycles(_conditions(1.5 * course(*rise * 6)), STANDARD)
     assert large[-1] == 5
     # Beyond full scale it is of full scale: a dip of 0.0975 is more than 0.08, though less than 0.08 of 1.5.
     dipped = ((10, 0.0), (20, 1.0), (5, 0.935), (5, 1.0), (20, 0.0))
-    assert _cycles(_conditions(1.5 * _course(*dipped * 6)), STANDARD)[-1] == 11
+    assert _cycles(_conditions(1.5 * course(*dipped * 6)), STANDARD)[-1] == 11
 
 
 @pytest.mark.parametrize(("rises", "count"), [(5, 12), (6, 6)])
 def test_fewer_than_six_cycles_make_twelve_parts_of_the_time(rises: int, count: int) -> None:
-    load = _course(*((10, 0.0), (20, 1.0), (20, 0.0)) * rises)
+    load = course(*((10, 0.0), (20, 1.0), (20, 0.0)) * rises)
     cycle = _cycles(_conditions(load), STANDARD)
     assert int(cycle[-1]) + 1 == count
     if count == 12:
@@ -237,7 +230,7 @@ def test_fewer_than_six_cycles_make_twelve_parts_of_the_time(rises: int, count: 
 
 
 def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
-    load = _course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
+    load = course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
     dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in itertools.pairwise(load))
     first = _left_behind(_conditions(load), STANDARD)
     assert first == pytest.approx({"largest_load": 0.9, "cycles": 2.0, "time_s": 90 * STEP_S, "dose": dose})
@@ -255,7 +248,7 @@ def _sessions(*runs: Recording, factor: int = 1, usable: Any = None, held: Any =
     return prepare(runs, kept, held, SCALE, factor, STANDARD)
 
 
-PRESSES = _course(*((40, 0.0), (60, 1.0), (60, 0.0)) * 7)
+PRESSES = course(*((40, 0.0), (60, 1.0), (60, 0.0)) * 7)
 
 
 def test_of_two_channels_in_the_readings_unit_the_first_is_the_neighbour_but_no_reference() -> None:
@@ -338,7 +331,7 @@ def _best_line(load: Array, step_s: float, sd: float) -> tuple[Array, float]:
 
 @pytest.mark.parametrize("step_s", [0.004, 0.02, 0.1])
 def test_each_sample_is_of_the_longest_line_that_leaves_noise(step_s: float) -> None:
-    load = 3.0 + _course((30, 0.0), (25, 1.0), (20, 1.0), (25, 0.0), (20, 0.0))
+    load = 3.0 + course((30, 0.0), (25, 1.0), (20, 1.0), (25, 0.0), (20, 0.0))
     noisy = load + 0.003 * np.random.default_rng(4).standard_normal(load.size)
     found, expected = without_noise(noisy, step_s, 0.003, STANDARD), _best_line(noisy, step_s, 0.003)
     assert found[0] == pytest.approx(expected[0], abs=1e-9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -118,14 +118,21 @@ def test_what_remembers_nothing_is_no_structure() -> None:
 
 
 # -- what undoes one another ------------------------------------------------------------------------------------------
-def _moving(**sizes: float) -> Any:
+@dataclass(frozen=True)
+class _Moving:
     """A model whose effects each add a wave, all of one shape."""
-    wave = np.resize([1.0, -1.0], 40)
-    return SimpleNamespace(
-        parts=tuple(SimpleNamespace(name=name) for name in sizes),
-        without=lambda name: _moving(**{other: by for other, by in sizes.items() if other != name}),
-        simulate=lambda conditions: 3.0 + sum(sizes.values()) * wave,
-    )
+
+    parts: tuple[tuple[str, float], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(name for name, _ in self.parts)
+
+    def without(self, name: str) -> _Moving:
+        return _Moving(tuple(part for part in self.parts if part[0] != name))
+
+    def simulate(self, conditions: None) -> Any:
+        return 3.0 + sum(size for _, size in self.parts) * np.resize([1.0, -1.0], 40)
 
 
 def _session(fitted: bool = True) -> Any:
@@ -136,7 +143,7 @@ def test_effects_undo_each_other_where_their_powers_are_twice_that_of_all() -> N
     """Of one shape their sum is that of their sizes."""
 
     def told(**sizes: float) -> list[str]:
-        return cancelling([_session(), _session(False)], _moving(**sizes), STANDARD)
+        return cancelling([_session(), _session(False)], _Moving(tuple(sizes.items())), STANDARD)  # type: ignore[arg-type]
 
     assert told(a=3.0, b=-2.0) == ["a", "b"]
     assert told(a=3.0, b=1.0) == []

@@ -14,7 +14,7 @@ from smartshoe import __all__ as public
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 FENCED = re.compile(r"^(`{3,}).*?^\1", re.DOTALL | re.MULTILINE)
 PAGES = sorted(path for path in DOCS.rglob("*.md") if not {"api", "tutorial"} & set(path.parts[len(DOCS.parts) : -1]))
-FRONT = [DOCS.parent / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")]
+FRONT = [DOCS.parent / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
 
 
 def listed() -> list[str]:

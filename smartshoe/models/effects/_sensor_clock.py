@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects.effect import Conditions
 
 LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
@@ -35,14 +36,19 @@ def drift(conditions: Conditions, values: Array) -> Array:
     return moved
 
 
-def settling_scale(tau_s: float, stretch: float) -> float:
+def settled(time_s: Array, tau_s: float, stretch: float) -> Array:
+    """(n,) what has settled of a whole, 1 - exp(-(t/s)^stretch) (Kohlrausch 1854), in the mean time ``tau_s``."""
+    return np.asarray(-np.expm1(-((time_s / _settling_scale(tau_s, stretch)) ** stretch)))
+
+
+def unsettled_in_c(tau_s: float, stretch: float) -> str:
+    """A C expression of ``t`` in s: what has settled, with the other sign."""
+    return f"expm1(-pow(t / {c_number(_settling_scale(tau_s, stretch))}, {c_number(stretch)}))"
+
+
+def _settling_scale(tau_s: float, stretch: float) -> float:
     """s of exp(-(t/s)^stretch) whose mean time of settling is ``tau_s``."""
     return tau_s / math.gamma(1.0 + 1.0 / stretch)
-
-
-def settled(time_s: Array, tau_s: float, stretch: float) -> Array:
-    """(n,) what has settled of a whole, 1 - exp(-(t/s)^stretch) (Kohlrausch 1854)."""
-    return np.asarray(-np.expm1(-((time_s / settling_scale(tau_s, stretch)) ** stretch)))
 
 
 def _warmer_k(conditions: Conditions) -> Array:

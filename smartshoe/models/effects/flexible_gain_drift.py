@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import running_time_s, settled, settling_scale
+from smartshoe.models.effects._sensor_clock import running_time_s, settled, unsettled_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -41,8 +41,7 @@ class FlexibleGainDrift(Effect):
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Divide by the gain; exact while that stays above a hundredth of its first value."""
         change, tau, stretch = (float(value) for value in values)
-        scale = c_number(settling_scale(tau, stretch))
-        gain = f"1.0 - {c_number(change)} * expm1(-pow(t / {scale}, {c_number(stretch)}))"
+        gain = f"1.0 - {c_number(change)} * {unsettled_in_c(tau, stretch)}"
         return Memoryless(
             lambda signal, time_s: signal / np.maximum(1.0 + change * settled(time_s, tau, stretch), LEAST_GAIN),
             f"x /= fmax({gain}, {c_number(LEAST_GAIN)});",

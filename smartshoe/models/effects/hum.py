@@ -179,6 +179,13 @@ def _line(
     return None
 
 
+def _tone_powers(parts: Array, at_hz: float, sample_time_s: float) -> Array:
+    """(segments,) power of a tone in each of ``parts`` (segments, length), behind a Hann window."""
+    length = parts.shape[1]
+    turned = np.exp(-2j * np.pi * sample_time_s * at_hz * np.arange(length)) * np.hanning(length)
+    return np.asarray(np.abs(np.sum(parts * turned, axis=1)) ** 2)
+
+
 def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bool:
     """Whether the tone's power in segments of a thirtieth of the record is much the same throughout.
 
@@ -186,15 +193,9 @@ def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bo
     """
     length = residual.size // SEGMENTS
     parts = residual[: SEGMENTS * length].reshape(SEGMENTS, length)
-    turns = -2j * np.pi * sample_time_s * np.arange(length)
-    window = np.hanning(length)
-
-    def powers(at_hz: float) -> Array:
-        return np.asarray(np.abs(np.sum(parts * (np.exp(turns * at_hz) * window), axis=1)) ** 2)
-
     beside = 4.0 / (length * sample_time_s)
-    power = powers(frequency_hz)
-    floor = 0.5 * float(np.mean(powers(frequency_hz - beside)) + np.mean(powers(frequency_hz - 1.5 * beside)))
+    power, *below = (_tone_powers(parts, frequency_hz - away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
+    floor = 0.5 * float(sum(np.mean(one) for one in below))
     over = max(float(np.mean(power)) / max(floor, 1e-300) - 1.0, 0.0)
     if frequency_hz > 0.5 / sample_time_s - beside:
         # Half the sampling rate shows of a tone what its phase leaves, which turns slowly.
@@ -212,15 +213,10 @@ def _stands_at_rest(residual: Array, load: Array, frequency_hz: float, sample_ti
     still = rates < STILL_PER_S
     if min(still.sum(), (~still).sum()) < LEAST_BLOCKS:
         return True
-    turns = -2j * np.pi * sample_time_s * np.arange(length)
-    window = np.hanning(length)
     beside = 4.0 / (length * sample_time_s)
-
-    def powers(at_hz: float) -> Array:
-        centred = parts - parts.mean(axis=1, keepdims=True)
-        return np.asarray(np.abs(np.sum(centred * (np.exp(turns * at_hz) * window), axis=1)) ** 2)
-
-    whole, floor = powers(frequency_hz), 0.5 * (powers(frequency_hz + beside) + powers(frequency_hz + 1.5 * beside))
+    centred = parts - parts.mean(axis=1, keepdims=True)
+    whole, *above = (_tone_powers(centred, frequency_hz + away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
+    floor = 0.5 * (above[0] + above[1])
     resting = float(whole[still].mean() - floor[still].mean())
     moving = float(whole[~still].mean() - floor[~still].mean())
     # A power's standard deviation is as large as the power itself.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import running_time_s, settled, settling_scale
+from smartshoe.models.effects._sensor_clock import running_time_s, settled, unsettled_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -42,8 +42,7 @@ class WarmUp(Effect):
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Subtract it; exact."""
         change, tau, stretch = (float(value) for value in values)
-        scale = c_number(settling_scale(tau, stretch))
         return Memoryless(
             lambda signal, time_s: signal - change * settled(time_s, tau, stretch),
-            f"x += {c_number(change)} * expm1(-pow(t / {scale}, {c_number(stretch)}));",
+            f"x += {c_number(change)} * {unsettled_in_c(tau, stretch)};",
         )
