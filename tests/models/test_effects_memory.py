@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._wall_memory import dead_zone
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import Conditions
 
@@ -141,6 +143,34 @@ def test_only_the_first_loading_to_a_level_is_stiff() -> None:
     assert out[1250] == pytest.approx(out[750], abs=1e-12)  # as it was on the way down
     assert out[1900] == pytest.approx(load[1900], abs=1e-12)  # beyond the largest so far: virgin again
     assert out[2250] / load[2250] == pytest.approx(1.05, abs=1e-3)  # half of full scale after full scale
+
+
+@given(
+    gained=st.floats(1e-3, 1.0), width=st.floats(0.02, 3.0), before=st.floats(0.0, 1.5),
+    loads=st.lists(st.floats(-0.5, 1.5), min_size=2, max_size=6), noise=st.sampled_from([0.0, 1e-3]),
+)  # fmt: skip
+@settings(max_examples=40)
+def test_softened_rubber_bears_the_load_to_the_last_digit(
+    gained: float, width: float, before: float, loads: list[float], noise: float
+) -> None:
+    """The kernel against bisection, sample by sample: steep bends, jumps, pulls, whatever came before."""
+    load = between(loads, 15) + noise * np.random.default_rng(1).standard_normal(15 * len(loads) + 1)
+    out = run("mullins_softening", np.array([gained, width]), load, noise, largest_load=before)
+    zone = dead_zone(Conditions(np.zeros(1), load, STEP_S, noise))
+    amount = gained / (1.0 + gained) / np.tanh(0.75 / width)
+    largest = before
+    for f, u in zip(load, out, strict=True):
+        largest = max(largest, f)
+        most = max(largest - zone, 0.0)
+        if f >= most:  # virgin
+            assert u == f
+            continue
+
+        def off(v: float, f: float = f, most: float = most) -> float:
+            return float(v * (1.0 - amount * np.tanh(max(most**2 - v * v, 0.0) / width)) - f)
+
+        low, high = (f, most) if f > 0.0 else (f / (1.0 - amount), f)
+        assert u == pytest.approx(brentq(off, low, high, xtol=1e-14), abs=1e-10)
 
 
 def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not() -> None:

@@ -16,9 +16,6 @@ from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter,
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
 
-NEWTON_STEPS = 3
-SETTLED = 1e-6  # of full scale: the next step would be a square of it
-
 
 class MullinsSoftening(Effect):
     """f = u (1 - c tanh((M^2 - u^2)/width)), M the largest load so far (after Ogden and Roxburgh 1999).
@@ -48,25 +45,17 @@ class MullinsSoftening(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without softening would need; ``before["largest_load"]`` counts."""
+        from smartshoe.kernels.memory import softened
+
         if values[0] == 0.0:
             return signal.copy()
         amount, width = _amount(values)
         zone, before = dead_zone(conditions), float(conditions.before.get("largest_load", 0.0))
 
         def static(load: Array) -> Array:
-            largest = np.maximum(np.maximum.accumulate(load), before) - zone
-            square = np.maximum(largest, 0.0) ** 2
-            most = np.maximum(largest, load)
-            u: Array = load / (1.0 - amount * np.tanh(np.maximum(square - load * load, 0.0) / width))
-            for _ in range(NEWTON_STEPS):
-                u = np.minimum(u, most)
-                bend = np.tanh(np.maximum(square - u * u, 0.0) / width)
-                steeper = np.where(bend > 0.0, 2.0 * amount / width * u * u * (1.0 - bend * bend), 0.0)
-                off = (u * (1.0 - amount * bend) - load) / (1.0 - amount * bend + steeper)
-                u = u - off
-                if np.max(np.abs(off), initial=0.0) < SETTLED:
-                    break
-            return u
+            out = np.empty(load.size)
+            softened(np.array(load, dtype=float), amount, width, before, zone, out)
+            return out
 
         spring, arm = shared(static, signal, conditions)
         return static(spring) + arm
