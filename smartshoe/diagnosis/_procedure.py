@@ -22,8 +22,17 @@ from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
-from smartshoe.diagnosis._verdict import known_error, parted_clocks, past_of, refusals_of, sentence_of, verdict_of
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
+from smartshoe.diagnosis._verdict import (
+    crept_of,
+    known_error,
+    parted_clocks,
+    past_of,
+    refusals_of,
+    sentence_of,
+    unexplained_of,
+    verdict_of,
+)
+from smartshoe.diagnosis._zero import Zero, creeping, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
@@ -180,6 +189,8 @@ def _diagnosed(
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
     past = [past_of(one, scale) for one in zeros if one.is_past]
     zeros = tuple(one for one in zeros if not one.is_past)
+    crept = [(one, tare) for one in names if (tare := creeping(zeros, one.effect, one.member.size, thresholds))]
+    names = tuple(one for one in names if one not in [drift for drift, _ in crept])
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
     causes = [_cause(name, found, fine, best, given) for name in names]
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
@@ -188,6 +199,7 @@ def _diagnosed(
     follows = not any(name.kind_only for name in names)
     known = known_error(integrity, scale)
     verdict = "unexplained" if given.is_no_unit else verdict_of(causes, before, after, thresholds, follows, known)
+    rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - left**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
@@ -197,7 +209,7 @@ def _diagnosed(
     force = force_rmse_n(fine, extended)
     return Diagnosis(
         verdict,
-        sentence_of(verdict, causes, baseline, best, after, thresholds),
+        sentence_of(verdict, causes, baseline, best, rest, thresholds),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
@@ -213,8 +225,8 @@ def _diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
         ),
-        limits=(*given.limits, *parted, *past, *refusals_of(found)),
-        leftover=after.says if verdict in ("unexplained", "partly_explained") else None,
+        limits=(*given.limits, *parted, *past, *(crept_of(*one) for one in crept), *refusals_of(found)),
+        leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         model=with_zero,
         baseline_model=found.baseline.model,

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._inference import Inference
+from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale
@@ -34,6 +35,12 @@ def known_error(integrity: Integrity, scale: Scale) -> float:
     return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
 
 
+def unexplained_of(causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure) -> ResidualStructure:
+    """What no cause accounts for: ``after`` them, or all that was ``before`` where effects have no name."""
+    hidden = not causes and before.significant and not (after.significant and after.rms >= before.rms)
+    return before if hidden else after
+
+
 def verdict_of(
     causes: Sequence[Cause],
     before: ResidualStructure,
@@ -48,7 +55,8 @@ def verdict_of(
 
     ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
     """
-    left = after.rms if after.significant else 0.0
+    rest = unexplained_of(causes, before, after)
+    left = rest.rms if rest.significant else 0.0
     least = max(thresholds.material, thresholds.tolerable, known)
     if causes:
         wrong = before.rms if before.significant else 0.0
@@ -62,21 +70,21 @@ def sentence_of(
     causes: Sequence[Cause],
     baseline: Errors,
     best: Errors,
-    after: ResidualStructure,
+    rest: ResidualStructure,
     thresholds: Thresholds,
 ) -> str:
-    """The answer in a sentence: size before judgement."""
+    """The answer in a sentence: size before judgement; ``rest`` is what no cause accounts for."""
     names = [cause.name.replace("_", " ") for cause in causes]
     named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
-    left = after.rms if after.significant else 0.0
-    rest = f"{100 * left:.2g} % {after.how} and is not explained"
+    left = rest.rms if rest.significant else 0.0
+    not_explained = f"{100 * left:.2g} % {rest.how} and is not explained"
     if verdict == "adequate":
-        return good if left <= thresholds.material else f"{good}; {rest}"
+        return good if left <= thresholds.material else f"{good}; {not_explained}"
     if verdict == "unexplained":
-        return f"{good}; {rest}, and no effect of the catalogue accounts for it"
+        return f"{good}; {not_explained}, and no effect of the catalogue accounts for it"
     said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
-    return said if verdict == "explained" else f"{said}; {rest}"
+    return said if verdict == "explained" else f"{said}; {not_explained}"
 
 
 def past_of(zero: Zero, scale: Scale) -> str:
@@ -85,6 +93,15 @@ def past_of(zero: Zero, scale: Scale) -> str:
     return (
         f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
         " may have begun before, or there is an offset beside (record from where the unit is switched on)"
+    )
+
+
+def crept_of(drift: Name, tare: Zero) -> str:
+    """What is said of a drift of the zero that a tare may make by creeping."""
+    return (
+        f"{drift.effect.name.replace('_', ' ')} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
+        f" which a tare of {100 * tare.size:.2g} % may do by creeping, so that it is not named (zero the load cell, and"
+        " log a rest)"
     )
 
 

@@ -136,6 +136,18 @@ def zeros_of(
     return tuple(sorted(named, key=lambda one: -one.size))
 
 
+def creeping(zeros: Sequence[Zero], drift: Effect, size: float, thresholds: Thresholds) -> Zero | None:
+    """The tare among ``zeros`` that a ``drift`` of the reading's zero by ``size`` may belong to.
+
+    That a tare is one value is an equation as any other: a load cell's zero that warms or creeps departs from it, by
+    up to an order of magnitude less than it is.
+    """
+    if drift.family != shift_of("reading").family:
+        return None
+    tares = (one for one in zeros if one.effect.shifts == "load")
+    return next((one for one in tares if thresholds.extrapolates * size <= one.size), None)
+
+
 def _unseen(
     sessions: Sequence[Session],
     model: ExtendedModel,

@@ -122,8 +122,9 @@ def _run_diagnosis(parts: Any) -> Any:
     return result
 
 
-def _name(name: str, kind_only: bool = False) -> Any:
-    return SimpleNamespace(name=name, kind_only=kind_only)
+def _name(name: str, kind_only: bool = False, size: float = 0.1) -> Any:
+    known = effect("delay" if name == "short" else name)
+    return SimpleNamespace(name=name, kind_only=kind_only, effect=known, member=SimpleNamespace(size=size))
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
@@ -173,6 +174,10 @@ def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) ->
 
 def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
     parts.kinds[1].significant = False
+    told = _run_diagnosis(parts)  # what effects without a name did away with is not explained
+    assert (told.verdict, told.leftover) == ("unexplained", "here")
+    parts.seen.clear()
+    parts.kinds[0].significant = False
     told = _run_diagnosis(parts)
     assert (told.verdict, told.leftover) == ("adequate", None)
     assert told.explainable_percent == pytest.approx(75.0)
@@ -200,6 +205,17 @@ def test_of_what_is_no_unit_or_one_cycle_no_zero_is_told(parts: Any) -> None:
     parts.seen.clear()
     parts.found.can_validate = True
     assert [one.name for one in _run_diagnosis(parts).causes] == ["zero"]
+
+
+def test_a_tares_own_creep_is_said_and_no_cause(parts: Any) -> None:
+    parts.sizes["warm_up"] = 0.02
+    parts.names = [_name("warm_up", size=0.02), _name("delay", size=0.3)]
+    for tare, causes, said in ((0.2, ["delay", "zero"], 1), (0.199, ["delay", "zero", "warm_up"], 0)):
+        parts.seen.clear()
+        parts.zeros = [Zero(shift_of("load"), tare, 0.01, tare)]
+        told = _run_diagnosis(parts)
+        assert [one.name for one in told.causes] == causes
+        assert sum("warm up moves the reading by 2 %" in limit for limit in told.limits) == said
 
 
 def test_what_is_material_at_the_least_is_a_zero(parts: Any) -> None:

@@ -132,7 +132,9 @@ def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_i
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
-    told = SimpleNamespace(independent=2, stretched=False, share=0.1, chosen=[], laws=[], lawful=None, said=[])
+    told = SimpleNamespace(
+        independent=2, stretched=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={}
+    )
     plain = _fit(100.0)
 
     def state(name: str) -> Any:
@@ -146,7 +148,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         return lambda one, *rest: state(f"{name} {one.name}")
 
     def judged(one: Any, plain: Any, sessions: Any, screening: Any) -> Any:
-        return SimpleNamespace(state=one.name, members=(), fit=SimpleNamespace(model="model"))
+        return SimpleNamespace(state=one.name, members=(), fit=SimpleNamespace(model=one.name))
 
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
     monkeypatch.setattr(
@@ -166,6 +168,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "_judged", judged)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
+    monkeypatch.setattr(_inference, "_score", lambda model, one, sessions: told.scores.get(model, -len(model)))
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
     return told
 
@@ -195,6 +198,15 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     assert flow.infer().state == "settled lawful"
     flow.lawful, flow.laws = None, [{"a": "b"}, {"c": "d"}]
     assert flow.infer().state == "law law settled first"
+
+
+def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(flow: Any) -> None:
+    laws = [{"a": "b"}, {"c": "d"}, {"e": "f"}]
+    for last, kept, left in ((-19.001, "law law settled first", 0), (-18.0, "law settled first", 1)):
+        flow.laws, flow.scores = list(laws), {"law settled first": -18.0, "law law settled first": last}
+        flow.scores["law law law settled first"] = 0.0
+        assert flow.infer().state == kept
+        assert len(flow.laws) == left  # nothing is tried beyond it
 
 
 class _Judge:

@@ -121,9 +121,14 @@ def test_what_is_left_is_held_against_what_laws_depart_by_and_what_a_good_unit_l
 def test_without_a_cause_it_is_adequate_up_to_what_is_tolerable_or_material() -> None:
     for thresholds in (STANDARD, replace(STANDARD, material=0.02)):
         bound = max(thresholds.tolerable, thresholds.material)
-        told = [verdict_of([], _left(0.5), _left(by * bound), thresholds) for by in (1.0, 1.0001)]
-        assert told == ["adequate", "unexplained"]
-    assert verdict_of([], _left(0.5), _left(0.5, significant=False), STANDARD) == "adequate"
+        for lesser in (_left(0.5 * bound), _left(9.0 * bound, significant=False)):
+            told = [verdict_of([], lesser, _left(by * bound), thresholds) for by in (1.0, 1.0001)]
+            assert told == ["adequate", "unexplained"]
+            # What effects do away with that are too unsure to be named is not explained either.
+            told = [verdict_of([], _left(by * bound), lesser, thresholds) for by in (1.0, 1.0001)]
+            assert told == ["adequate", "unexplained"]
+    nothing = _left(0.5, significant=False)
+    assert verdict_of([], nothing, nothing, STANDARD) == "adequate"
 
 
 def _said(verdict: Any, *names: str, left: Any = None) -> str:

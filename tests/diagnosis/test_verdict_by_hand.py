@@ -17,8 +17,8 @@ from smartshoe.diagnosis._inference import _judged
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
-from smartshoe.diagnosis._verdict import known_error, parted_clocks, past_of, verdict_of
-from smartshoe.diagnosis._zero import Zero, _is_past, shift_of
+from smartshoe.diagnosis._verdict import crept_of, known_error, parted_clocks, past_of, verdict_of
+from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -86,6 +86,20 @@ def test_an_offset_that_a_drift_may_have_brought_is_of_its_past(monkeypatch: pyt
     for value, is_past in ((0.1999, True), (0.2001, False), (-0.1, False), (0.0, False)):
         assert _is_past(sign * value, sessions, MODEL, STANDARD) is is_past
     assert not _is_past(0.1, sessions[2:], MODEL, STANDARD)
+
+
+def test_a_drift_of_a_tenth_of_a_tare_may_be_the_tares_own() -> None:
+    """Of the reading's zero alone, and of a tare's alone."""
+    tare, offset = (Zero(shift_of(signal), 0.05, 0.001, 0.04) for signal in ("load", "reading"))
+    drift, gain = effect("warm_up"), effect("gain_drift")
+    for size, told in ((0.004, tare), (0.004001, None)):
+        assert creeping([offset, tare], drift, size, STANDARD) is told
+    assert creeping([offset], drift, 0.001, STANDARD) is None
+    assert creeping([], drift, 0.001, STANDARD) is None
+    assert creeping([tare], gain, 0.001, STANDARD) is None
+    assert creeping([tare], drift, 0.004, replace(STANDARD, extrapolates=11.0)) is None
+    said = crept_of(SimpleNamespace(effect=drift, member=SimpleNamespace(size=0.0014)), tare)  # type: ignore[arg-type]
+    assert "warm up moves the reading by 0.14 % of full scale, which a tare of 4 % may do" in said
 
 
 # -- what remembers ---------------------------------------------------------------------------------------------------

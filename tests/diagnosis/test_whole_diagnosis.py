@@ -243,7 +243,7 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     large, small = 10.0 * limits.tolerable, 0.1 * limits.material
 
     def said(causes: Any, left: float) -> tuple[str, str]:
-        verdict = verdict_of(causes, _left(large), _left(left), limits)
+        verdict = verdict_of(causes, _left(large if causes else left), _left(left), limits)
         return verdict, sentence_of(verdict, causes, before, after, _left(left), limits)
 
     good = "the baseline simulation is good to 2 % of full scale on data it was not fitted to"

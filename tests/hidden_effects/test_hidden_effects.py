@@ -224,6 +224,16 @@ def test_a_zero_that_drifted_before_the_recordings_began_is_no_offset_beside_its
     assert any("may have begun before" in said for said in found.limits)
 
 
+def test_a_load_cell_that_warms_is_a_tare_and_no_drift_of_the_sensors_zero() -> None:
+    made = bank_case("two", 414)
+    hidden = [(effect["id"], effect["law"]) for effect in made.truth["effects"]]
+    assert hidden == [("load_cell_tare", "warming_bridge"), ("clock_drift", "constant")]
+    found = diagnose(made.recordings, hold_out=made.hold_out)
+    assert {cause.name for cause in found.causes} == {"load_cell_tare", "clock_drift"}
+    assert "warm_up" in found.minor  # the extension follows it all the same
+    assert any("may do by creeping" in said for said in found.limits)
+
+
 @pytest.mark.parametrize("kind", ["grid", "single", "pair", "none", "outside", "calibrate"])
 def test_the_bank_draws_the_same_for_ever_and_within_its_bounds(kind):
     drawn_now = [drawn(kind, index) for index in range(60)]
