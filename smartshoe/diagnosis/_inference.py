@@ -91,7 +91,8 @@ def infer(
     while laws := likelier_laws(found.members, state.banned):
         state = with_likelier_laws(state, found.fit.model, laws, sessions)
         other = _judged(state, plain, sessions, screening)
-        if _score(other.fit.model, state, sessions) >= _score(found.fit.model, state, sessions):
+        likelihood, odds = state.likelihood(sessions), state.evidence.odds
+        if _score(other.fit.model, likelihood, odds) >= _score(found.fit.model, likelihood, odds):
             break  # a law that follows better in its place led to a set that does not
         found = other
     return found
@@ -155,15 +156,16 @@ def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
     An arm that imitates a lag of a millisecond needs another one in its own place.
     """
     thresholds, likelihood = state.thresholds, state.likelihood(sessions)
-    new, old = ((_score(one.model, state, sessions), effect_count(one.model)) for one in (other, state.fit))
+    odds = state.evidence.odds
+    new, old = ((_score(one.model, likelihood, odds), effect_count(one.model)) for one in (other, state.fit))
     if apart(likelihood.sessions, state.fit.model, other.model) < thresholds.alike * thresholds.material:
         return (new[1], new[0]) < (old[1], old[0])
     return new[0] < old[0]
 
 
-def _score(model: ExtendedModel, state: State, sessions: Sequence[Session]) -> float:
-    """-2 log likelihood of a model near that of ``state``, with the odds against its effects; the less, the better."""
-    return state.likelihood(sessions).cost(model) + state.evidence.odds * effect_count(model)
+def _score(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
+    """-2 log likelihood of a model, with the ``odds`` against each of its effects; the less, the better."""
+    return likelihood.cost(model) + odds * effect_count(model)
 
 
 def _settled(state: State, sessions: Sequence[Session], progress: Progress) -> State:

@@ -174,7 +174,6 @@ def _diagnosed(
     before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], thresholds)
     residuals = [residual_of(one, extended) for one in sessions]
     after = residual_structure(sessions, residuals, thresholds)
-    left = after.rms if after.significant else 0.0
     # What is held out decides over no name; it may be of loads that nothing was learnt of.
     learnt = [k for k, one in enumerate(sessions) if one.fitted.any()]
     within = residual_structure([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
@@ -201,7 +200,7 @@ def _diagnosed(
     verdict = "unexplained" if given.is_no_unit else verdict_of(causes, before, after, thresholds, follows, known)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, zeros, sessions, scale)
-    noise_variance = max(best.rmse**2 - left**2, 0.0)
+    noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
     named = {cause.name for cause in causes}
@@ -223,7 +222,7 @@ def _diagnosed(
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=bool(left > thresholds.material)
+            found, causes, sessions, given.excitation, open_=bool(after.rms > thresholds.material)
         ),
         limits=(*given.limits, *parted, *past, *(crept_of(*one) for one in crept), *refusals_of(found)),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,

@@ -31,7 +31,7 @@ class ResidualStructure:
 
     @property
     def rms(self) -> float:
-        """The largest of the tests that stand out of the noise."""
+        """The largest of the tests that stand out of the noise, 0 where none does."""
         return max(self._found, default=0.0)
 
     @property

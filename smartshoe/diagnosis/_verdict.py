@@ -37,8 +37,7 @@ def known_error(integrity: Integrity, scale: Scale) -> float:
 
 def unexplained_of(causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure) -> ResidualStructure:
     """What no cause accounts for: ``after`` them, or all that was ``before`` where effects have no name."""
-    hidden = not causes and before.significant and not (after.significant and after.rms >= before.rms)
-    return before if hidden else after
+    return before if not causes and before.rms > after.rms else after
 
 
 def verdict_of(
@@ -55,12 +54,10 @@ def verdict_of(
 
     ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
     """
-    rest = unexplained_of(causes, before, after)
-    left = rest.rms if rest.significant else 0.0
+    left = unexplained_of(causes, before, after).rms
     least = max(thresholds.material, thresholds.tolerable, known)
     if causes:
-        wrong = before.rms if before.significant else 0.0
-        least = max(least, thresholds.departure * wrong if follows else 0.0)
+        least = max(least, thresholds.departure * before.rms if follows else 0.0)
         return "partly_explained" if left > least else "explained"
     return "unexplained" if left > least else "adequate"
 
@@ -77,10 +74,9 @@ def sentence_of(
     names = [cause.name.replace("_", " ") for cause in causes]
     named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
-    left = rest.rms if rest.significant else 0.0
-    not_explained = f"{100 * left:.2g} % {rest.how} and is not explained"
+    not_explained = f"{100 * rest.rms:.2g} % {rest.how} and is not explained"
     if verdict == "adequate":
-        return good if left <= thresholds.material else f"{good}; {not_explained}"
+        return good if rest.rms <= thresholds.material else f"{good}; {not_explained}"
     if verdict == "unexplained":
         return f"{good}; {not_explained}, and no effect of the catalogue accounts for it"
     said = f"{good}, with {named} to {100 * best.rmse:.2g} %"

@@ -329,6 +329,19 @@ def rate_undone(signal, strength, exponent, softness, dead_zone, step_s, keep, s
 
 
 @njit(cache=True)
+def _newton(at, off, slope, low, high):  # type: ignore[no-untyped-def]
+    """Where a rising ``off`` = 0 is sought next, what is left of the bracket, and the step: infinite if halved."""
+    if off > 0.0:
+        high = at
+    else:
+        low = at
+    trial = at - off / slope
+    if low <= trial <= high:
+        return trial, low, high, trial - at
+    return 0.5 * (low + high), low, high, math.inf
+
+
+@njit(cache=True)
 def _orifice(p, laminar):  # type: ignore[no-untyped-def]
     return p / math.sqrt(math.sqrt(p * p + laminar * laminar))
 
@@ -355,18 +368,9 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
         for _ in range(30):
             per_pressure = 1.0 / math.sqrt(math.sqrt(p * p + laminar * laminar))
             flow = p * per_pressure
-            off = p + half * flow - known
-            if off > 0.0:
-                high = p
-            else:
-                low = p
             sine = flow * per_pressure
-            trial = p - off / (1.0 + half * per_pressure * (1.0 - 0.5 * sine * sine))
-            if not low <= trial <= high:
-                p = 0.5 * (low + high)
-                continue
-            step = trial - p
-            p = trial
+            slope = 1.0 + half * per_pressure * (1.0 - 0.5 * sine * sine)
+            p, low, high, step = _newton(p, p + half * flow - known, slope, low, high)
             if bend * step * step <= 1e-10:
                 break
         half_flow = known - p
@@ -404,16 +408,7 @@ def softened(load, strength, width, largest, dead_zone, out):  # type: ignore[no
                 off = u * slope - f
                 if bend > 0.0:
                     slope += 2.0 * strength / width * u * u * (1.0 - bend * bend)
-                if off > 0.0:
-                    high = u
-                else:
-                    low = u
-                trial = u - off / slope
-                if not low <= trial <= high:
-                    u = 0.5 * (low + high)
-                    continue
-                step = trial - u
-                u = trial
+                u, low, high, step = _newton(u, off, slope, low, high)
                 if bound * step * step <= 1e-12:
                     break
         known = f

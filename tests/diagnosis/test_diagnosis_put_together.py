@@ -173,11 +173,11 @@ def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) ->
 
 
 def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
-    parts.kinds[1].significant = False
+    parts.kinds[1].significant, parts.kinds[1].rms = False, 0.0
     told = _run_diagnosis(parts)  # what effects without a name did away with is not explained
     assert (told.verdict, told.leftover) == ("unexplained", "here")
     parts.seen.clear()
-    parts.kinds[0].significant = False
+    parts.kinds[0].significant, parts.kinds[0].rms = False, 0.0
     told = _run_diagnosis(parts)
     assert (told.verdict, told.leftover) == ("adequate", None)
     assert told.explainable_percent == pytest.approx(75.0)

@@ -139,7 +139,10 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def state(name: str) -> Any:
         fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name))
-        return SimpleNamespace(name=name, chosen=told.chosen, fit=fit, banned=())
+        return SimpleNamespace(
+            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0),
+            likelihood=lambda sessions: "likelihood",
+        )  # fmt: skip
 
     def settled(one: Any, sessions: Any, progress: Any) -> Any:
         return state(f"settled {one.name}")
@@ -168,7 +171,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "_judged", judged)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
-    monkeypatch.setattr(_inference, "_score", lambda model, one, sessions: told.scores.get(model, -len(model)))
+    monkeypatch.setattr(_inference, "_score", lambda model, likelihood, odds: told.scores.get(model, -len(model)))
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
     return told
 

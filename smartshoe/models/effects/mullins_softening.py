@@ -54,7 +54,7 @@ class MullinsSoftening(Effect):
 
         def static(load: Array) -> Array:
             out = np.empty(load.size)
-            softened(np.array(load, dtype=float), amount, width, before, zone, out)
+            softened(np.ascontiguousarray(load), amount, width, before, zone, out)
             return out
 
         spring, arm = shared(static, signal, conditions)
