@@ -222,7 +222,7 @@ def _diagnosed(
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=bool(after.rms > thresholds.material)
+            found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material)
         ),
         limits=(*given.limits, *parted, *past, *(crept_of(*one) for one in crept), *refusals_of(found)),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,

@@ -176,6 +176,7 @@ def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
     parts.kinds[1].significant, parts.kinds[1].rms = False, 0.0
     told = _run_diagnosis(parts)  # what effects without a name did away with is not explained
     assert (told.verdict, told.leftover) == ("unexplained", "here")
+    assert parts.seen["next_experiment"][1] == {"open_": True}
     parts.seen.clear()
     parts.kinds[0].significant, parts.kinds[0].rms = False, 0.0
     told = _run_diagnosis(parts)
