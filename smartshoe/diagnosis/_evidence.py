@@ -16,6 +16,10 @@ With C0 the covariance of y for no effect, and U the columns x_e and Phi_e of S,
 
 R = U' C0^-1 U and q = U' C0^-1 y. Both are taken once for all columns, so that a set costs a factorisation of its own
 few.
+
+Once a set is chosen, each of its effects is weighed against nothing in its place with wider equations: they may depart
+towards any other of their family, its columns among Phi_e. A companion may be no more than that. The search goes
+without: there the other equations are tried themselves, and what they took up would hide an effect of another family.
 """
 
 from __future__ import annotations
@@ -61,7 +65,7 @@ class Evidence:
 
     def __init__(self, given: Linearised, noise_sd: float) -> None:
         self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
-        self._seen: dict[Members, Posterior] = {}
+        self._seen: dict[tuple[Members, bool], Posterior] = {}
         self._rows: list[Array] = []
         self._inner: list[Array] = []
         self._past: list[Array] = []
@@ -158,49 +162,67 @@ class Evidence:
         size = float(np.linalg.norm(found))
         return np.asarray(found / size) if size > 0 else np.ones(len(columns)) / math.sqrt(len(columns))
 
-    def posterior(self, members: Members) -> Posterior:
-        """The evidence of the set ``members`` (numbers of candidates); cached."""
+    def posterior(self, members: Members, *, of_any_law: bool = False) -> Posterior:
+        """The evidence of the set ``members`` (numbers of candidates); cached.
+
+        ``of_any_law``: their equations may depart towards all others of their families.
+        """
         members = tuple(sorted(members))
-        if members not in self._seen:
+        asked = members, of_any_law
+        if asked not in self._seen:
             found = self.exact(members)
             # How far an equation departs goes with its size, which is first found as if it were exact.
             for _ in range(2 if members else 0):
-                found = self._solved(members, found.strengths)
-            self._seen[members] = found
-        return self._seen[members]
+                found = self._solved(members, found.strengths, of_any_law=of_any_law)
+            self._seen[asked] = found
+        return self._seen[asked]
 
     def exact(self, members: Members) -> Posterior:
         """The evidence of a set whose equations are taken for exact."""
         return self._solved(members, None)
 
-    def _solved(self, members: Members, strengths: Sequence[Array] | None) -> Posterior:
+    def _solved(self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False) -> Posterior:
         if not members:
             return Posterior((), self._nothing, (), (), ())
-        index, sds = self._widened(members, strengths)
+        index, sds = self._widened(members, strengths, of_any_law)
         _, pull, fall = self._moved(index, sds)
         columns = [self.given.candidates[m].columns for m in members]
         ends = np.cumsum([len(own) for own in columns], dtype=np.intp)
         found = self.thresholds.strength_sd * pull[: ends[-1]]
         each = tuple(np.split(found, ends[:-1]))
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
-        beyond = pull[ends[-1] :].reshape(len(members), -1)
+        beyond = pull[ends[-1] :][: len(members) * self._directions].reshape(len(members), -1)
         departed = tuple(float(np.sqrt(np.mean(one**2))) if one.size else 0.0 for one in beyond)
         together = self.visible_rms([c for own in columns for c in own], found)
         return Posterior(members, self._nothing - fall + self.odds_of(members), each, sizes, departed, together)
 
-    def _widened(self, members: Members, strengths: Sequence[Array] | None) -> tuple[Index, Array]:
+    def _widened(
+        self, members: Members, strengths: Sequence[Array] | None, of_any_law: bool = False
+    ) -> tuple[Index, Array]:
         """A set's columns, and the standard deviations (k,) of their coefficients.
 
-        Its strengths' first, then each member's departures in proportion to ``strengths``, where they are known.
+        Its strengths' first, then each member's departures in proportion to ``strengths``, where they are known; last,
+        ``of_any_law``, those towards the others of its family.
         """
         index = [c for m in members for c in self.given.candidates[m].columns]
         sds = [self.thresholds.strength_sd] * len(index)
-        share = self.thresholds.departure / math.sqrt(self._directions)
-        for member, own in zip(members, strengths, strict=True) if strengths is not None else ():
-            first = self._departure_of(member)
-            index += range(first, first + self._directions)
-            sds += [max(share * float(np.linalg.norm(own)), 1e-7)] * self._directions
+        if strengths is not None:
+            sizes = [float(np.linalg.norm(own)) for own in strengths]
+            begun = [self._departure_of(member) for member in members]
+            ways: list[Sequence[int]] = [range(first, first + self._directions) for first in begun]
+            if of_any_law:
+                ways += [self._others_of(member) for member in members]
+                sizes *= 2
+            for way, size in zip(ways, sizes, strict=True):
+                index += way
+                sds += [max(self.thresholds.departure * size / math.sqrt(len(way) or 1), 1e-7)] * len(way)
         return np.array(index, dtype=np.intp), np.array(sds)
+
+    def _others_of(self, member: int) -> list[int]:
+        """The columns of all other equations and blocks of a member's family."""
+        own = self.given.candidates[member]
+        alike = (one for one in self.given.candidates if one.effect.family == own.effect.family)
+        return [column for one in alike if one.name != own.name for column in one.columns]
 
     def _moved(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
         """Factor of I + D R, its solution (k,) of D q, and by how much -2 log evidence falls; D by halves each side."""

@@ -81,9 +81,13 @@ def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:
-    """What could stand in a member's place: every other effect at its best shape, and nothing."""
+    """What could stand in a member's place: every other effect at its best shape, and nothing.
+
+    Nothing, or what the others' equations do where they depart towards any of their families.
+    """
     less = tuple(m for m in best.members if m != member)
-    found = [Alternative(None, evidence.posterior(less).score - best.score)]
+    without, whole = (evidence.posterior(one, of_any_law=True).score for one in (less, best.members))
+    found = [Alternative(None, without - whole)]
     for k in additions(evidence, less, 2 * BREADTH, refused):
         one = evidence.given.candidates[k]
         if one.name == evidence.given.candidates[member].name or one.effect.is_flexible:

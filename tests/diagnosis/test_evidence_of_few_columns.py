@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,6 +23,8 @@ SD = 0.02
 MATERIAL, STRENGTH, DEPARTURE = STANDARD.material, STANDARD.strength_sd, STANDARD.departure
 COLUMNS = ((3,), (4, 5), (6,), (7,))  # beside the target, of two own columns
 NAMES = ("one", "two", "three", "one")
+FAMILIES = {"one": "kind", "two": "kind", "three": "another"}
+OTHERS = ([4, 5], [3, 7], [], [4, 5])  # columns of the families' other equations
 
 
 def _given() -> Linearised:
@@ -34,7 +37,10 @@ def _given() -> Linearised:
         columns /= np.sqrt(np.mean(columns**2, axis=0))
         target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
         rows.append(np.column_stack([target, columns]))
-    candidates: Any = tuple(SimpleNamespace(name=n, columns=c) for n, c in zip(NAMES, COLUMNS, strict=True))
+    candidates: Any = tuple(
+        SimpleNamespace(name=n, columns=c, effect=SimpleNamespace(family=FAMILIES[n]))
+        for n, c in zip(NAMES, COLUMNS, strict=True)
+    )
     return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)
 
 
@@ -92,7 +98,11 @@ class _Twin:
         return weights
 
     def solved(
-        self, members: tuple[int, ...], amounts: dict[int, float] | None, exact: tuple[int, ...] = ()
+        self,
+        members: tuple[int, ...],
+        amounts: dict[int, float] | None,
+        exact: tuple[int, ...] = (),
+        of_any_law: bool = False,
     ) -> tuple[float, dict[int, Array], dict[int, float]]:
         """-2 log density but for a constant; members' strengths beyond what is immaterial; departures' rms."""
         variances = np.concatenate([[1.0, 1.0], np.full(5, MATERIAL**2)])
@@ -109,6 +119,10 @@ class _Twin:
             sd = max(DEPARTURE * amounts[member] / math.sqrt(made.shape[1]), 1e-7)
             columns.append(made)
             variances = np.append(variances, np.full(made.shape[1], sd**2))
+            if of_any_law and OTHERS[member]:
+                count = len(OTHERS[member])
+                columns.append(self.rows[:, OTHERS[member]])
+                variances = np.append(variances, np.full(count, (DEPARTURE * amounts[member]) ** 2 / count))
         whole = np.column_stack(columns) * np.sqrt(variances)
         inner = np.eye(whole.shape[1]) + whole.T @ self.weight @ whole
         asked = whole.T @ self.weight @ self.y
@@ -117,10 +131,13 @@ class _Twin:
         strengths = {m: pull[at] * STRENGTH for m, at in spans.items()}
         return score, strengths, {m: float(np.sqrt(np.mean(pull[at] ** 2))) for m, at in departed.items()}
 
-    def posterior(self, members: tuple[int, ...]) -> tuple[float, dict[int, Array], dict[int, float]]:
+    def posterior(
+        self, members: tuple[int, ...], of_any_law: bool = False
+    ) -> tuple[float, dict[int, Array], dict[int, float]]:
         found = self.solved(members, None)
         for _ in range(2):
-            found = self.solved(members, {m: float(np.linalg.norm(s)) for m, s in found[1].items()})
+            amounts = {m: float(np.linalg.norm(s)) for m, s in found[1].items()}
+            found = self.solved(members, amounts, of_any_law=of_any_law)
         return found
 
     def visible(self, members: tuple[int, ...], strengths: dict[int, Array]) -> float:
@@ -155,6 +172,9 @@ def test_a_sets_evidence_is_that_of_its_density_to_the_digit(
     for member, strengths in zip(members, exact.strengths, strict=True):
         assert strengths == pytest.approx(plain[1][member], rel=1e-5)
     found, slow = evidence.posterior(members), twin.posterior(members)
+    wider, slow_wider = evidence.posterior(members, of_any_law=True), twin.posterior(members, of_any_law=True)
+    assert wider.score - odds == pytest.approx(slow_wider[0], rel=1e-6)
+    assert wider.departed == pytest.approx([slow_wider[2][m] for m in members], rel=1e-4)
     assert found.score - odds == pytest.approx(slow[0], rel=1e-6)
     assert found.members == members
     for k, member in enumerate(members):
@@ -164,6 +184,29 @@ def test_a_sets_evidence_is_that_of_its_density_to_the_digit(
     if members:
         assert found.together == pytest.approx(twin.visible(members, slow[1]), rel=1e-4)
         assert exact.departed == (0.0,) * len(members)
+
+
+def test_a_companion_that_another_law_of_its_neighbours_kind_would_be_is_no_evidence(given: Linearised) -> None:
+    """An effect that goes a fifth of its size towards the other law of its kind, which an effect of no such kind is."""
+    rng = np.random.default_rng(5)
+    rows = [one.copy() for one in given.rows]
+    for one in rows:
+        one[:, 6] = one[:, 4] + 0.02 * rng.standard_normal(one.shape[0])
+        one[:, 0] = 0.06 * one[:, 3] + 0.012 * one[:, 4] + 0.002 * rng.standard_normal(one.shape[0])
+    evidence = Evidence(replace(given, rows=tuple(rows)), 0.002)
+
+    def margin(of_any_law: bool) -> float:
+        alone, beside = (evidence.posterior(m, of_any_law=of_any_law).score for m in ((0,), (0, 2)))
+        return alone - beside
+
+    assert margin(of_any_law=False) > 50.0
+    assert margin(of_any_law=True) < 0.0
+    # One in a direction of its own is needed all the same.
+    for one, plain in zip(rows, given.rows, strict=True):
+        one[:, 6] = plain[:, 6]
+        one[:, 0] += 0.012 * (one[:, 6] - one[:, 4])
+    evidence = Evidence(replace(given, rows=tuple(rows)), 0.002)
+    assert margin(of_any_law=True) > 50.0
 
 
 def test_members_are_a_set_in_any_order_and_known_once(given: Linearised) -> None:

@@ -167,6 +167,9 @@ def test_members_are_weighed_against_what_could_stand_in_their_place(monkeypatch
     # Nothing, and d in its place; not itself at another shape, no flexible block, none that cancels or has no sign.
     assert [(one.effect, one.margin) for one in near] == [("d", 40.0), (None, 50.0)]
     assert [one.effect for one in alternatives(evidence, best, 0, ("d",))] == [None]
+    # What the others' families could do instead is no evidence for it.
+    evidence.of_any_law = worth(3.0, 45.0, 0.0, 0.0, 0.0, 0.0)
+    assert [(one.effect, one.margin) for one in alternatives(evidence, best, 0, ())] == [(None, 3.0), ("d", 40.0)]
 
 
 def test_ten_are_weighed_against_a_member() -> None:

@@ -38,12 +38,14 @@ class ToldEvidence:
         self.given: Any = SimpleNamespace(candidates=candidates, model=SimpleNamespace(names=inside))
         self.thresholds, self.odds, self._score = STANDARD, 10.0, score
         self.strengths: dict[int, Array] = {}
+        self.of_any_law = score  # where equations may depart towards their families' others
 
-    def posterior(self, members: tuple[int, ...]) -> Posterior:
+    def posterior(self, members: tuple[int, ...], *, of_any_law: bool = False) -> Posterior:
         members = tuple(sorted(members))
         count = len(members)
         strengths = tuple(self.strengths.get(m, np.ones(1)) for m in members)
-        return Posterior(members, self._score(members), strengths, (1.0,) * count, (0.5,) * count, float(count))
+        score = self.of_any_law if of_any_law else self._score
+        return Posterior(members, score(members), strengths, (1.0,) * count, (0.5,) * count, float(count))
 
     def extensions(self, members: tuple[int, ...]) -> list[tuple[float, int, Array]]:
         return [
