@@ -17,8 +17,8 @@ With C0 the covariance of y for no effect, and U the columns x_e and Phi_e of S,
 R = U' C0^-1 U and q = U' C0^-1 y. Both are taken once for all columns, so that a set costs a factorisation of its own
 few.
 
-Once a set is chosen, each of its effects is weighed against nothing in its place with wider equations: they may depart
-towards any other of their family, its columns among Phi_e. A companion may be no more than that. The search goes
+Once a set is chosen, each of its effects is weighed against nothing in its place, also with wider equations: they may
+depart towards any other of their family, its columns among Phi_e. A companion may be no more than that. The search goes
 without: there the other equations are tried themselves, and what they took up would hide an effect of another family.
 """
 
@@ -215,7 +215,7 @@ class Evidence:
                 sizes *= 2
             for way, size in zip(ways, sizes, strict=True):
                 index += way
-                sds += [max(self.thresholds.departure * size / math.sqrt(len(way) or 1), 1e-7)] * len(way)
+                sds += [max(self.thresholds.departure / math.sqrt(len(way) or 1) * size, 1e-7)] * len(way)
         return np.array(index, dtype=np.intp), np.array(sds)
 
     def _others_of(self, member: int) -> list[int]:

@@ -83,11 +83,14 @@ def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
 def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:
     """What could stand in a member's place: every other effect at its best shape, and nothing.
 
-    Nothing, or what the others' equations do where they depart towards any of their families.
+    Nothing, whether the others' equations depart as their own do or towards any of their families.
     """
     less = tuple(m for m in best.members if m != member)
-    without, whole = (evidence.posterior(one, of_any_law=True).score for one in (less, best.members))
-    found = [Alternative(None, without - whole)]
+    margins = [
+        evidence.posterior(less, of_any_law=wider).score - evidence.posterior(best.members, of_any_law=wider).score
+        for wider in (False, True)
+    ]
+    found = [Alternative(None, min(margins))]
     for k in additions(evidence, less, 2 * BREADTH, refused):
         one = evidence.given.candidates[k]
         if one.name == evidence.given.candidates[member].name or one.effect.is_flexible:

@@ -261,8 +261,8 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
             "fall of -2 log evidence",
             nothing,
             0.0,
-            f"without it, the others free to depart towards any law of their kinds, the data is less likely by"
-            f" {nothing:,.0f} of -2 log",
+            f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log, also where the"
+            " others may depart towards any law of their kinds",
         ),
         *_held_out_evidence(member.size, won),
     ]

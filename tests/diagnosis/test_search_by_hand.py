@@ -170,6 +170,9 @@ def test_members_are_weighed_against_what_could_stand_in_their_place(monkeypatch
     # What the others' families could do instead is no evidence for it.
     evidence.of_any_law = worth(3.0, 45.0, 0.0, 0.0, 0.0, 0.0)
     assert [(one.effect, one.margin) for one in alternatives(evidence, best, 0, ())] == [(None, 3.0), ("d", 40.0)]
+    # Nor is it needed where they need it only if they may.
+    evidence.of_any_law = worth(90.0, 45.0, 0.0, 0.0, 0.0, 0.0)
+    assert [(one.effect, one.margin) for one in alternatives(evidence, best, 0, ())] == [("d", 40.0), (None, 50.0)]
 
 
 def test_ten_are_weighed_against_a_member() -> None:

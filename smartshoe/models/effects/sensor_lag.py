@@ -64,16 +64,15 @@ class SensorLag(Effect):
 NODES = np.array([-2.0, -1.0, 0.0, 1.0])  # samples that the cubic from -1 to 0 passes through
 CUBICS = np.linalg.inv(np.vander(NODES, increasing=True))  # (power, node): the polynomial of each sample's value
 POINTS, WEIGHTS = (0.5 * values for values in np.polynomial.legendre.leggauss(12))  # on -1/2 ... 1/2
+POWERS = (POINTS - 0.5) ** np.arange(4)[:, None]  # (power, point): of s between -1 and 0
 
 
 def _weights(x: float) -> Array:
     """(4,) of the samples at `NODES` in w(0) = exp(-x) w(-1) + integral of x exp(x s) u(s) from -1 to 0."""
-    moments = np.empty(4)
     if x < 2.0:
-        s = POINTS - 0.5
-        moments[:] = [float(np.sum(WEIGHTS * x * np.exp(x * s) * s**i)) for i in range(4)]
+        moments = np.sum(WEIGHTS * x * np.exp(x * POWERS[1]) * POWERS, axis=1)
     else:
-        decay = math.exp(-x)
+        decay, moments = math.exp(-x), np.empty(4)
         moments[0] = 1.0 - decay
         for i in range(1, 4):
             moments[i] = -((-1.0) ** i) * decay - i / x * moments[i - 1]
@@ -82,7 +81,7 @@ def _weights(x: float) -> Array:
 
 def _lagged(u: Array, x: float) -> Array:
     """w (n,) of w' = (u - w) x, the step being 1, from w = u before the first sample."""
-    from scipy.signal import lfilter
+    from smartshoe.kernels.linear_filter import linear_filter
 
     if u.size < 2:
         return u.copy()
@@ -90,7 +89,7 @@ def _lagged(u: Array, x: float) -> Array:
     drive = np.convolve(padded, _weights(x)[::-1], "valid")
     decay = math.exp(-x)
     drive[0] = (1.0 - decay) * u[0]
-    return np.asarray(lfilter([1.0], [1.0, -decay], drive, zi=[decay * u[0]])[0])
+    return linear_filter([1.0], [1.0, -decay], drive, [decay * u[0]])[0]
 
 
 class _Lead(Inverse):
