@@ -474,7 +474,7 @@ def test_a_rate_that_an_effect_bent_is_found_anew_without_it() -> None:
 
 
 def test_a_shape_at_a_bound_is_stretched() -> None:
-    for softness, is_stretched in ((0.2, False), (0.03, True), (1.0, True)):
+    for softness, is_stretched in ((0.2, False), (0.03, True), (1.0, False), (3.0, True)):
         law = effect("dead_band")
         assert _is_stretched(MODEL.with_part(law, np.array([0.05, softness])), law) is is_stretched
     # A strength at its bound is no shape, nor are another effect's.

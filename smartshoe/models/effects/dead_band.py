@@ -24,7 +24,7 @@ class DeadBand(Effect):
     says = "the first newtons of each loading do not reach the tube: no reading at low loads, a constant lack above"
     parameters = (
         EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.3, 0.01),
-        EffectParameter("softness", "1", "how far the gaps spread, over the lost load", None, 0.03, 1.0, 0.3),
+        EffectParameter("softness", "1", "how far the gaps spread, over the lost load", None, 0.03, 3.0, 0.3),
     )
     shapes = ({"softness": 0.2}, {"softness": 0.6})
     exposed_by = by("low_loads", "rests")
