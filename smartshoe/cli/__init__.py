@@ -187,7 +187,7 @@ def main() -> None:
     """Entry point of the ``smartshoe`` command."""
     # Most of what a command makes stays to its end: to look through it every 700 objects takes 7 % of a run.
     gc.set_threshold(SELDOM)
-    # At the end the system takes all memory back at once; Python would free every object first, for seconds.
+    # At the end the system takes all memory back at once; Python would free every object first.
     atexit.register(gc.freeze)
     # Workers are started by `python -m`, which would import a numpy.py that lies where the command is called.
     os.environ["PYTHONSAFEPATH"] = "1"

@@ -39,13 +39,17 @@ def test_the_headline_counts_the_good_and_names_the_others(units: list[UnitRepor
     assert headline([judge(units[0])] * 3)[1] == "All 3 units good"
 
 
-def test_a_filter_that_is_worse_than_a_static_line_says_so(units: list[UnitReport]) -> None:
+def test_a_filter_that_is_worse_than_a_static_line_says_so_once(units: list[UnitReport], tmp_path: Path) -> None:
     overall = replace(
         units[0].validation.overall, rmse_static_n=6.0, rmse_compensated_n=6.9, improvement_over_static_percent=-15.0
     )
     assert "worse than a static line" in against_static(overall)
     worse = replace(units[0], validation=replace(units[0].validation, overall=overall))
     assert judge(worse).grade == "bad"
+    text = write_page(tmp_path / "report.html", "t", "", {}, [worse]).read_text(encoding="utf-8")
+    assert text.count("The filter is worse than a static line") == 1
+    text = write_page(tmp_path / "report.html", "t", "", {}, [units[0]]).read_text(encoding="utf-8")
+    assert text.count("% less.") == 1  # what a good filter gains stands beside its grade
 
 
 def test_a_fit_that_did_not_converge_is_bad(units: list[UnitReport]) -> None:
