@@ -28,6 +28,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import cycle
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve, cholesky, solve_triangular
@@ -184,7 +185,7 @@ class Evidence:
     def _solved(self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False) -> Posterior:
         if not members:
             return Posterior((), self._nothing, (), (), ())
-        index, sds = self._widened(members, strengths, of_any_law)
+        index, sds = self._widened(members, strengths, of_any_law=of_any_law)
         _, pull, fall = self._moved(index, sds)
         columns = [self.given.candidates[m].columns for m in members]
         ends = np.cumsum([len(own) for own in columns], dtype=np.intp)
@@ -197,7 +198,7 @@ class Evidence:
         return Posterior(members, self._nothing - fall + self.odds_of(members), each, sizes, departed, together)
 
     def _widened(
-        self, members: Members, strengths: Sequence[Array] | None, of_any_law: bool = False
+        self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
     ) -> tuple[Index, Array]:
         """A set's columns, and the standard deviations (k,) of their coefficients.
 
@@ -207,15 +208,13 @@ class Evidence:
         index = [c for m in members for c in self.given.candidates[m].columns]
         sds = [self.thresholds.strength_sd] * len(index)
         if strengths is not None:
-            sizes = [float(np.linalg.norm(own)) for own in strengths]
             begun = [self._departure_of(member) for member in members]
             ways: list[Sequence[int]] = [range(first, first + self._directions) for first in begun]
-            if of_any_law:
-                ways += [self._others_of(member) for member in members]
-                sizes *= 2
-            for way, size in zip(ways, sizes, strict=True):
+            ways += [self._others_of(member) for member in members] if of_any_law else []
+            for way, own in zip(ways, cycle(strengths), strict=False):
+                share = self.thresholds.departure / math.sqrt(len(way) or 1)
                 index += way
-                sds += [max(self.thresholds.departure / math.sqrt(len(way) or 1) * size, 1e-7)] * len(way)
+                sds += [max(share * float(np.linalg.norm(own)), 1e-7)] * len(way)
         return np.array(index, dtype=np.intp), np.array(sds)
 
     def _others_of(self, member: int) -> list[int]:

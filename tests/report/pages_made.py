@@ -85,7 +85,7 @@ def session_page(folder: Path) -> Path:
         ("unit", "left_toe, serial number S9"),
         ("pressed: dynamic", "accepted at attempt 1, no fault found"),
         ("each attempt is searched for", "; ".join(["the reading stands at the end of the sensor's range"] * 7)),
-        ("stored", f"/home/somebody/.local/share/smartshoe/store/units/S9/2026-11-22_{'a79d93da6825d308' * 2}.json"),
+        ("stored", f"/srv/biomechanics/laboratory/smartshoe/store/units/S9/2026-11-22_{'a79d93da6825d308' * 2}.json"),
     ]
     return write_page(folder / "report.html", "Session", "about", {"shoe": "sim"}, two_units()[1:], session=card)
 

@@ -40,9 +40,9 @@ class UnitCard:
         return self.judged.grade != "good"
 
     @property
-    def gain_says(self) -> str:
-        """How the corrected error compares with the static line's."""
-        return judgement.against_static(self.unit.validation.overall)
+    def says(self) -> tuple[str, ...]:
+        """The grade's reason, and how the corrected error compares with the static line's where that is not it."""
+        return tuple(dict.fromkeys((self.judged.says, judgement.against_static(self.unit.validation.overall))))
 
     @property
     def left_percent(self) -> float:
