@@ -99,6 +99,6 @@ def _is_stretched(model: ExtendedModel, law: Effect) -> bool:
     """Whether a shape of a law lies at a bound: beyond it the equation means something else."""
     last = next(part for part in model.parts if part.name == law.name)
     return any(
-        parameter.null is None and not parameter.lower < float(value) < parameter.upper
+        parameter.null is None and parameter.is_at_bound(float(value))
         for parameter, value in zip(last.effect.parameters, last.values, strict=True)
     )

@@ -25,6 +25,7 @@ from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scal
 from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,
+    other_kind_of,
     parted_clocks,
     past_of,
     refusals_of,
@@ -181,6 +182,8 @@ def _diagnosed(
     silent = given.is_no_unit or not found.can_validate
     names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
     names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
+    unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
+    names = tuple(one for one in names if one not in [at_an_end for at_an_end, _ in unclear])
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
@@ -224,7 +227,14 @@ def _diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material)
         ),
-        limits=(*given.limits, *parted, *past, *(crept_of(*one) for one in crept), *refusals_of(found)),
+        limits=(
+            *given.limits,
+            *parted,
+            *(said for _, said in unclear),
+            *past,
+            *(crept_of(*one) for one in crept),
+            *refusals_of(found),
+        ),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         model=with_zero,

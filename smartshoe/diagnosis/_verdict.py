@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from smartshoe.arrays import Array
+from smartshoe.diagnosis._arms import arms_of, is_stretched
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
@@ -28,6 +29,25 @@ def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds:
         f"the reading is {lag_s:.3g} s late by the edges of load and reading, {fitted_s:.3g} s beside the other"
         " effects: one of them imitates the rest (record both by one clock)"
     )
+
+
+def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
+    """What is said of an effect that follows best where it is of another kind, or is the wall's own arm."""
+    told = name.effect.name.replace("_", " ")
+    part = next(part for part in model.parts if part.name == name.member.name)
+    for parameter, value in zip(part.effect.parameters, part.values, strict=True):
+        if parameter.is_where_kind_ends(float(value)):
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            return (
+                f"what follows best as {told} has its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it"
+                " turns into an effect of another kind, so that it is not named"
+            )
+    if part.name in dict(arms_of(model)) and is_stretched(model):
+        return (
+            f"beside {told} the wall's own relaxation has come to the end of its range, where no wall's is: either may"
+            " be the other's, so that it is not named"
+        )
+    return None
 
 
 def known_error(integrity: Integrity, scale: Scale) -> float:

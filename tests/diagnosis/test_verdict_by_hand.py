@@ -17,7 +17,7 @@ from smartshoe.diagnosis._inference import _judged
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
-from smartshoe.diagnosis._verdict import crept_of, known_error, parted_clocks, past_of, verdict_of
+from smartshoe.diagnosis._verdict import crept_of, known_error, other_kind_of, parted_clocks, past_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
@@ -45,6 +45,49 @@ def test_a_lag_that_a_fit_sees_otherwise_is_said(sign: float, lag_s: float, off_
     assert parted_clocks(told, value, MODEL, STANDARD) is None
     drift = effect("clock_drift")
     assert parted_clocks(drift, np.array([5.0]), MODEL.with_part(drift, np.array([0.0])), STANDARD) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "inside", "at_bound", "told"),
+    [
+        ("second_relaxation", [0.1, 119.9], [0.1, 120.0], "second relaxation has its time constant at 120 s"),
+        ("second_relaxation", [0.1, 0.051], [0.1, 0.05], "second relaxation has its time constant at 0.05 s"),
+        ("cycle_conditioning", [0.1, 49.9], [0.1, 50.0], "cycle conditioning has its cycles at 50,"),
+        ("cycle_conditioning", [0.1, 0.51], [0.1, 0.5], "cycle conditioning has its cycles at 0.5,"),
+        ("power_law_creep", [0.1, 0.79], [0.1, 0.8], "power law creep has its exponent at 0.8,"),
+        ("power_law_creep", [0.1, 0.02], [0.1, 0.8], "exponent"),  # logarithmic creep is creep
+        ("warm_up", [0.1, 300.0, 1.4], None, ""),  # ever slower, it drifts as any of its kind
+    ],
+)
+def test_an_effect_is_not_named_where_it_turns_into_one_of_another_kind(
+    name: str, inside: list[float], at_bound: list[float] | None, told: str
+) -> None:
+    def said(values: list[float]) -> str | None:
+        return other_kind_of(_named(name), MODEL.with_part("linear_leak", [0.001]).with_part(name, values))
+
+    assert said(inside) is None
+    if at_bound is not None:
+        assert told in str(said(at_bound))
+
+
+@pytest.mark.parametrize(
+    "arm", [{"relaxation_rate_per_s": 50.0}, {"relaxation_rate_per_s": 0.01}, {"relaxing_share": 5.0}]
+)
+def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[str, float]) -> None:
+    """Either may be the wall's own: what has no arm of its own, or a ladder of them, is none."""
+
+    def said(name: str, model: ExtendedModel) -> str | None:
+        return other_kind_of(_named(name), model.with_part(name, [0.1, 0.3] if name != "linear_leak" else [0.001]))
+
+    for name in ("second_relaxation", "power_law_creep", "linear_leak"):
+        assert said(name, MODEL) is None
+        assert (said(name, replace(MODEL, **arm)) is not None) is (name == "second_relaxation")
+    inside = {key: 0.99 * value + 0.01 * getattr(MODEL, key) for key, value in arm.items()}
+    assert said("second_relaxation", replace(MODEL, **inside)) is None  # type: ignore[arg-type]
+
+
+def _named(name: str) -> Any:
+    return SimpleNamespace(effect=effect(name), member=SimpleNamespace(name=name))
 
 
 def test_what_faults_add_is_the_most_of_them_in_shares_of_the_reading() -> None:

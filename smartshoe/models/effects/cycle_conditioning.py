@@ -22,7 +22,9 @@ class CycleConditioning(Effect):
     says = "the gain settles from cycle to cycle and keeps still in pauses"
     parameters = (
         EffectParameter("gained", "1", "gain after many cycles over that of the first, less 1", 0.0, -0.5, 1.0, 0.01),
-        EffectParameter("cycles", "1", "n0: cycles after which 63 % of it are there", None, 0.5, 50.0, 2.0),
+        EffectParameter(
+            "cycles", "1", "n0: cycles after which 63 % of it are there", None, 0.5, 50.0, 2.0, kind_ends="both"
+        ),
     )
     shapes = tuple({"cycles": cycles} for cycles in (1.0, 4.0, 16.0))
     exposed_by = by("repeats", "pauses")

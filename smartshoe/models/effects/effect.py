@@ -37,7 +37,9 @@ class EffectParameter:
     among them. ``size``: a typical value, or change from null; the step of derivatives is a small part of it.
     ``prior_sd``: standard deviation of a Gaussian prior about the null value, which a fit takes as one more row of its
     likelihood; None for a parameter that the data alone decide. ``channel``: what must be logged for the parameter to
-    do anything ("temperature"); '' where it needs nothing but load and time.
+    do anything ("temperature"); '' where it needs nothing but load and time. ``kind_ends``: the bounds at which an
+    effect turns into one of another kind, as a relaxation into a drift where its time constant grows beyond all holds;
+    '' where a bound is only as far as anybody has seen.
     """
 
     name: str
@@ -49,6 +51,15 @@ class EffectParameter:
     size: float
     prior_sd: float | None = None
     channel: Exposure | Literal[""] = ""
+    kind_ends: Literal["", "upper", "both"] = ""
+
+    def is_at_bound(self, value: float) -> bool:
+        """Whether a value lies at a bound."""
+        return not self.lower < value < self.upper
+
+    def is_where_kind_ends(self, value: float) -> bool:
+        """Whether a value lies at a bound beyond which the effect is of another kind."""
+        return (self.kind_ends != "" and value >= self.upper) or (self.kind_ends == "both" and value <= self.lower)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,16 @@ class PowerLawCreep(CoreEffect):
         EffectParameter(
             "creep_per_decade", "1", "relative creep over the decade about 1 s, small creep", 0.0, 0.0, 2.0, 0.01
         ),
-        EffectParameter("exponent", "1", "alpha: how much slower times weigh less, per decade", None, 0.02, 0.8, 0.2),
+        EffectParameter(
+            "exponent",
+            "1",
+            "alpha: how much slower times weigh less, per decade",
+            None,
+            0.02,
+            0.8,
+            0.2,
+            kind_ends="upper",
+        ),
     )
     shapes = ({"exponent": 0.15}, {"exponent": 0.45})
     exposed_by = by("holds", "rates", "rests")
