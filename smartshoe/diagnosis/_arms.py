@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL, with_usual_arm
-from smartshoe.diagnosis._likelihood import FEW_STEPS, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, fit
 from smartshoe.diagnosis._members import begun_with
+from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._sensitivity import available
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
@@ -44,6 +46,28 @@ def with_a_latency(state: State, sessions: Sequence[Session]) -> State:
     )
 
 
+def with_a_usual_arm(state: State, sessions: Sequence[Session]) -> State:
+    """The best of fits of a few likely effects, each beside an arm as units have, where that of ``state`` follows one.
+
+    About such an arm the effect that it follows is not found, but a second arm, which is the unit's own.
+    """
+    likelihood = state.likelihood(sessions)
+    found = []
+    for start in (with_arm(state.fit.model, arm) for arm in _usual_arms(state.thresholds)):
+        given, evidence, best = searched(start, sessions, state.thresholds)
+        # Far from any fit, one linearisation does not decide.
+        few = [best, *(evidence.posterior((k,)) for k in additions(evidence, (), BREADTH))]
+        found += [fit(likelihood, with_members(given, one, start, likelihood), FEW_STEPS) for one in few]
+    usual = [one for one in found if not is_beyond_memory(one.model, state.thresholds)] or found
+    return state_at(min(usual, key=lambda one: _scored(one, state)), sessions, state.thresholds)
+
+
+def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
+    """Whether the baseline's arm is faster or slower than all that laws remember by: it follows an effect, no wall."""
+    fastest_s, *_, slowest_s = thresholds.memory_s
+    return not fastest_s < 1.0 / model.relaxation_rate_per_s < slowest_s
+
+
 def is_stretched(model: ExtendedModel) -> bool:
     """Whether the baseline's arm has come to a bound: no wall has such a one."""
     share, rate = model.relaxing_share, model.relaxation_rate_per_s
@@ -57,14 +81,14 @@ def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls.
     """
     bare = _without_core_effects(state.fit.model)
-    arms = [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in state.thresholds.memory_s]
     likelihood = state.likelihood(sessions)
     found = []
-    for start in (with_arm(bare, arm) for arm in [*arms, *(arm for _, arm in arms_of(state.fit.model))]):
+    for start in (
+        with_arm(bare, arm) for arm in [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(state.fit.model))]
+    ):
         given, _, best = searched(start, sessions, state.thresholds)
         found.append(fit(likelihood, with_members(given, best, start, likelihood), FEW_STEPS))
-    nearest = min(found, key=lambda one: one.cost + state.evidence.odds * effect_count(one.model))
-    return state_at(nearest, sessions, state.thresholds)
+    return state_at(min(found, key=lambda one: _scored(one, state)), sessions, state.thresholds)
 
 
 def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
@@ -82,6 +106,15 @@ def with_arm(model: ExtendedModel, arm: Arm) -> ExtendedModel:
 def effect_count(model: ExtendedModel) -> int:
     """How many effects a model has: its parts, and an arm of the baseline's that falls where a wall's creeps."""
     return len(model.parts) + (model.relaxing_share < 0.0)
+
+
+def _usual_arms(thresholds: Thresholds) -> list[Arm]:
+    return [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in thresholds.memory_s]
+
+
+def _scored(one: Fit, state: State) -> float:
+    """-2 log likelihood with the odds against each effect."""
+    return one.cost + state.evidence.odds * effect_count(one.model)
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:

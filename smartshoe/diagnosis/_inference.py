@@ -15,8 +15,10 @@ import numpy as np
 from smartshoe.diagnosis._arms import (
     arms_of,
     effect_count,
+    is_beyond_memory,
     is_stretched,
     with_a_latency,
+    with_a_usual_arm,
     with_an_arm_that_creeps,
     with_another_pole,
     with_arm,
@@ -78,13 +80,17 @@ def infer(
     state = State(given, evidence, best, plain)
     if is_stretched(plain.model):
         state = _simpler(with_a_latency(state, sessions), state, sessions)
+    begun = state
     state = _settled(state, sessions, progress)
+    if is_beyond_memory(state.fit.model, thresholds):
+        progress("beginning anew from arms as units have")
+        state = _simpler(_settled(with_a_usual_arm(begun, sessions), sessions, progress), state, sessions)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         state = _simpler(_settled(with_another_pole(state, sessions), sessions, progress), state, sessions)
     if state.fit.model.relaxing_share < 0.0:
         state = _simpler(_settled(with_an_arm_that_creeps(state, sessions), sessions, progress), state, sessions)
-    lawful = with_laws(state, sessions)
+    lawful = with_laws(state, plain.model, sessions)
     state = state if lawful is state else _settled(lawful, sessions, progress)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions, screening)

@@ -15,17 +15,18 @@ from smartshoe.models.extended import ExtendedModel
 SIZES = (0.5, 5.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
 
 
-def with_laws(given: State, sessions: Sequence[Session]) -> State:
+def with_laws(given: State, plain: ExtendedModel, sessions: Sequence[Session]) -> State:
     """``given`` with a law in the place of a flexible block, where one follows nearly as well.
 
     No law is exact: one that leaves less than the square of the usual departure, of what the flexible block explains,
     is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
     One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
-    is, so that only fits of the whole model compare them fairly.
+    is, so that only fits of the whole model compare them fairly. Nothing in its place leaves no
+    more than the ``plain`` model does.
     """
     state = given
     for block in (one for one in given.chosen if one.effect.is_flexible):
-        found = _law_of(block, state, state.likelihood(sessions))
+        found = _law_of(block, state, plain, state.likelihood(sessions))
         if found is not None:
             missed, law = found
             banned = _replaced_with(block.effect) if missed < state.thresholds.departure**2 else ()
@@ -62,7 +63,7 @@ def with_likelier_laws(
     return state_at(fit(likelihood, model), sessions, state.thresholds, (*state.banned, *laws))
 
 
-def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[float, Fit] | None:
+def _law_of(block: Candidate, state: State, plain: ExtendedModel, likelihood: Likelihood) -> tuple[float, Fit] | None:
     """The law that follows nearly as well as a flexible block, and the share of what that explains which it misses."""
     thresholds, is_curve = state.thresholds, block.effect.is_memoryless
     bare = state.fit.model.without(block.name)
@@ -71,6 +72,7 @@ def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[flo
             bare = bare.without(part.name)
     nothing = fit(likelihood, bare, FEW_STEPS)
     flexible = likelihood.cost(state.fit.model)
+    explained = min(nothing.cost, likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
     for law in available(likelihood.sessions):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
@@ -80,7 +82,7 @@ def _law_of(block: Candidate, state: State, likelihood: Likelihood) -> tuple[flo
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
         most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
-        missed = (one.cost + other - flexible) / max(nothing.cost - flexible, other, 1e-9)
+        missed = (one.cost + other - flexible) / max(explained, other, 1e-9)
         if missed < most**2:
             misses.append((missed, one))
     return min(misses, key=lambda pair: pair[0]) if misses else None

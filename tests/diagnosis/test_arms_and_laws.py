@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 from told_evidence import STANDARD
 
 from smartshoe.diagnosis import _arms, _inference, _laws
-from smartshoe.diagnosis._arms import arms_of, effect_count, is_stretched
+from smartshoe.diagnosis._arms import arms_of, effect_count, is_beyond_memory, is_stretched
 from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, with_laws, with_likelier_laws
 from smartshoe.models.effects import blocks, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -26,6 +27,49 @@ MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
 )  # fmt: skip
 def test_an_arm_at_a_bound_is_stretched(share: float, rate: float, stretched: bool) -> None:
     assert is_stretched(ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")) is stretched
+
+
+@pytest.mark.parametrize(
+    ("tau_s", "beyond"), [(0.299, True), (0.301, False), (3.0, False), (29.9, False), (30.1, True)]
+)
+def test_an_arm_is_beyond_memory_where_it_relaxes_faster_or_slower_than_laws_remember(
+    tau_s: float, beyond: bool
+) -> None:
+    assert is_beyond_memory(replace(MODEL, relaxation_rate_per_s=1.0 / tau_s), STANDARD) is beyond
+
+
+def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The best by cost and odds among fits whose arm stays one as units have; of all, where none does."""
+    costs = {"best": 30.0, "a": 20.0, "b": 60.0}
+    ends: dict[str, float] = {}  # where an effect takes the arm, if not nowhere
+    tried: list[Any] = []
+    posterior = SimpleNamespace(posterior=lambda members: "ab"[members[0]])
+
+    def fitted(likelihood: Any, given: Any, steps: int) -> Any:
+        start, one = given
+        tried.append((start.names, start.relaxing_share, start.relaxation_rate_per_s, one, steps))
+        rate = ends.get(one, start.relaxation_rate_per_s)
+        model = replace(start, relaxation_rate_per_s=rate)
+        return SimpleNamespace(model=model, cost=costs[one] + abs(start.relaxation_rate_per_s - 1.0 / 3.0), one=one)
+
+    monkeypatch.setattr(_arms, "searched", lambda start, sessions, thresholds: ("given", posterior, "best"))
+    monkeypatch.setattr(_arms, "additions", lambda evidence, members, breadth: [0, 1])
+    monkeypatch.setattr(_arms, "with_members", lambda given, one, start, likelihood: (start, one))
+    monkeypatch.setattr(_arms, "fit", fitted)
+    monkeypatch.setattr(_arms, "state_at", lambda found, *given: found)
+    state: Any = SimpleNamespace(
+        fit=SimpleNamespace(model=replace(MODEL, relaxing_share=4.0, relaxation_rate_per_s=0.01)),
+        likelihood=lambda sessions: None, thresholds=STANDARD, evidence=SimpleNamespace(odds=10.0),
+    )  # fmt: skip
+    for there, taken in (({"a": 50.0}, "best"), ({"a": 0.2}, "a"), (dict.fromkeys(costs, 0.01), "a")):
+        ends.clear()
+        ends.update(there)
+        found: Any = _arms.with_a_usual_arm(state, [])
+        assert found.one == taken
+    arms = [((), 0.08, 1.0 / tau_s, one, 4) for tau_s in STANDARD.memory_s for one in ("best", "a", "b")]
+    assert tried == arms * 3
 
 
 def test_an_arm_that_creeps_is_one_of_a_share_above_nothing() -> None:
@@ -150,8 +194,9 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
     for missed, banned in ((0.999 * bound, _replaced_with(curve)), (bound, ())):
         asked.clear()
 
-        def law_of(block: Any, one: Any, likelihood: Any, missed: float = missed) -> Any:
+        def law_of(block: Any, one: Any, plain: Any, likelihood: Any, missed: float = missed) -> Any:
             asked.append(block.effect)
+            assert plain is MODEL
             return (missed, "law") if block.effect is curve else None
 
         monkeypatch.setattr(_laws, "_law_of", law_of)
@@ -161,11 +206,11 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
                 law=law, banned=without, thresholds=STANDARD, likelihood=lambda sessions: None
             ),
         )  # fmt: skip
-        found: Any = with_laws(state, [])
+        found: Any = with_laws(state, MODEL, [])
         assert (found.law, found.banned) == ("law", ("z", *banned))
         assert asked == [curve, other]
     monkeypatch.setattr(_laws, "_law_of", lambda *given: None)
-    assert with_laws(state, []) is state
+    assert with_laws(state, MODEL, []) is state
 
 
 def test_likelier_laws_take_their_members_places_and_ban_them(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -133,7 +133,7 @@ def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_i
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
-        independent=2, stretched=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={}
+        independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={}
     )
     plain = _fit(100.0)
 
@@ -161,13 +161,15 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
     monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
+    monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "_settled", settled)
     monkeypatch.setattr(_inference, "_simpler", lambda other, one, sessions: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "with_a_latency", named("late"))
+    monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
     monkeypatch.setattr(_inference, "with_an_arm_that_creeps", named("creeping"))
-    monkeypatch.setattr(_inference, "with_laws", lambda one, sessions: told.lawful or one)
+    monkeypatch.setattr(_inference, "with_laws", lambda one, model, sessions: told.lawful or one)
     monkeypatch.setattr(_inference, "_judged", judged)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
@@ -188,7 +190,12 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
 def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> None:
     flow.stretched = True
     assert flow.infer().state == "settled (late first or first)"
+    flow.beyond = True  # from what the search began with
+    assert flow.infer().state == "(settled usual (late first or first) or settled (late first or first))"
+    assert "beginning anew from arms as units have" in flow.said
     flow.stretched = False
+    assert flow.infer().state == "(settled usual first or settled first)"
+    flow.beyond = False
     flow.chosen = [SimpleNamespace(effect=effect("dead_band"))]
     assert flow.infer().state == "settled first"
     flow.chosen.append(SimpleNamespace(effect=effect("linear_leak")))

@@ -36,15 +36,16 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
     return told
 
 
-def _law_of(odds: float = 10.0) -> tuple[float, str] | None:
+def _law_of(odds: float = 10.0, plain_cost: float = NOTHING_COST) -> tuple[float, str] | None:
     block = next(one for one in blocks()["static_curve"])
     state: Any = SimpleNamespace(
         thresholds=STANDARD,
         fit=SimpleNamespace(model=MODEL.with_part(block)),
         evidence=SimpleNamespace(odds=odds),
     )
-    likelihood: Any = SimpleNamespace(cost=lambda model: FLEXIBLE_COST, sessions=())
-    found = _laws._law_of(SimpleNamespace(effect=block, name=block.name), state, likelihood)  # type: ignore[arg-type]
+    likelihood: Any = SimpleNamespace(cost=lambda model: FLEXIBLE_COST if model.parts else plain_cost, sessions=())
+    one: Any = SimpleNamespace(effect=block, name=block.name)
+    found = _laws._law_of(one, state, MODEL, likelihood)
     return None if found is None else (found[0], found[1].law)  # type: ignore[attr-defined]
 
 
@@ -61,6 +62,14 @@ def test_a_law_that_misses_less_than_laws_depart_is_the_law(costs: dict[str, tup
     assert found == (pytest.approx(0.9 * STANDARD.law_departure**2, rel=1e-3), "contact_area")
     costs["contact_area"] = (_missing(1.1 * STANDARD.law_departure**2), USUAL)
     assert _law_of() is None
+
+
+def test_what_a_block_explains_is_no_more_than_the_plain_model_leaves(costs: dict[str, tuple[float, float]]) -> None:
+    """A fit about a block is of an arm that nothing bends; without the block another arm may follow far better."""
+    costs["contact_area"] = (_missing(0.9 * STANDARD.law_departure**2), USUAL)
+    for share, is_law in ((1.0, True), (0.95, True), (0.85, False)):
+        assert (_law_of(plain_cost=_missing(share)) is not None) is is_law
+    assert _law_of(plain_cost=10.0 * NOTHING_COST) == _law_of()
 
 
 def test_the_law_that_misses_least_is_taken(costs: dict[str, tuple[float, float]]) -> None:
@@ -137,8 +146,8 @@ def test_a_law_that_stands_beside_a_block_may_do_without_it(costs: dict[str, tup
     likelihood: Any = SimpleNamespace(cost=lambda model: NOTHING_COST - 1.0, sessions=())
     member: Any = SimpleNamespace(effect=block, name=block.name)
     costs["gain_drift"] = (0.0, USUAL)  # of a second one, were it tried
-    assert _laws._law_of(member, state, likelihood) is None
+    assert _laws._law_of(member, state, MODEL, likelihood) is None
     likelihood.cost = lambda model: NOTHING_COST + 1.0
-    found = _laws._law_of(member, state, likelihood)
+    found = _laws._law_of(member, state, MODEL, likelihood)
     assert found is not None
     assert found[1].model.names == ("gain_drift",)

@@ -18,7 +18,7 @@ class FlexibleSet(Effect):
     name, family, stage, place = "flexible_set", "zero", "wall", "gas"
     says = "the unloaded reading rises with the time under load and with every loading, and stays"
     parameters = (
-        EffectParameter("set", "FS_reading", "rise by the first loading to full scale", 0.0, 0.0, 0.05, 0.003),
+        EffectParameter("set", "FS_reading", "rise by the first loading to full scale", 0.0, 0.0, 0.15, 0.003),
         *shape_parameters(3000.0),
     )
     shapes = (
