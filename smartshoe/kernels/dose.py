@@ -30,7 +30,7 @@ def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True)
-def dose_undone(signal, is_gain, size, early, held, by_stroke, exponent, width, state, out):  # type: ignore[no-untyped-def]
+def dose_undone(signal, is_gain, size, early, held, by_stroke, exponent, width, rounds, settled, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out + g = ``signal`` (n,), or out (1 + g) where ``is_gain``; g = size early log(1 + X/early).
 
     X grows by ``held`` times the sum of two flows, p^m, a step, and where the play of ``width`` rises by ``by_stroke``
@@ -43,13 +43,16 @@ def dose_undone(signal, is_gain, size, early, held, by_stroke, exponent, width, 
         if place < NO_LOAD:
             low = max(place, 0.0)
             begun, more = low**exponent, 0.0
-            for _ in range(24):  # a contraction: what a step adds is far below 1
+            for _ in range(rounds):  # a contraction: what a step adds grows by less than the step
+                guess = p
                 flow = max(p, 0.0) ** exponent
                 more = held * (last + flow)
                 if p - width > low:
                     more += by_stroke * ((p - width) ** exponent - begun)
                 grown = size * early * math.log(1.0 + (total + more) * (1.0 / early))
                 p = signal[k] / (1.0 + grown) if is_gain else signal[k] - grown
+                if abs(p - guess) <= settled:
+                    break
             total += more
             place = min(max(place, p - width), p + width)
         else:

@@ -18,6 +18,8 @@ from smartshoe.models.effects._wall_memory import NO_LOAD, Undone, cleaned, dead
 from smartshoe.models.effects.effect import Conditions, EffectParameter
 
 HALF_WIDTH = 0.01  # of full scale: a loading is more than twice of it, so that noise is none
+MOST_ROUNDS = 80  # 0.6, of the largest set that grows with the fourth power of a loading, to this power is 2e-18
+SETTLED = 1e-15  # of full scale
 USUAL_STROKE_S = 10.0  # seconds under full-scale load that count as one loading to it
 
 
@@ -54,7 +56,17 @@ class Dose:
         from smartshoe.kernels.dose import dose_undone
 
         held = 0.5 * step_s * (1.0 - self.by_stroke) / USUAL_STROKE_S
-        constants = (is_gain, self.size, self.early, held, self.by_stroke, self.exponent, HALF_WIDTH)
+        constants = (
+            is_gain,
+            self.size,
+            self.early,
+            held,
+            self.by_stroke,
+            self.exponent,
+            HALF_WIDTH,
+            MOST_ROUNDS,
+            SETTLED,
+        )
         members = ("dose", "flow", "place")
 
         def body(of: Mapping[str, str]) -> str:
@@ -75,14 +87,17 @@ class Dose:
     if ({of["place"]} >= {NO_LOAD}) {{
         {of["place"]} = x;
     }} else {{
-        for (k = 0; k < 24; k++) {{
-            const double z = p - {width};
+        for (k = 0; k < {MOST_ROUNDS}; k++) {{
+            const double z = p - {width}, guess = p;
             flow = p > 0.0 ? pow(p, {m}) : 0.0;
             more = {c_number(held)} * ({of["flow"]} + flow);
             if (z > low) {{
                 more = more + {c_number(self.by_stroke)} * (pow(z, {m}) - begun);
             }}
             p = {f"x / (1.0 + {grown})" if is_gain else f"x - {grown}"};
+            if (fabs(p - guess) <= {c_number(SETTLED)}) {{
+                break;
+            }}
         }}
         {of["dose"]} += more;
         if ({of["place"]} < p - {width}) {{
