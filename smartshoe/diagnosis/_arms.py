@@ -51,15 +51,10 @@ def with_a_usual_arm(state: State, sessions: Sequence[Session]) -> State:
 
     About such an arm the effect that it follows is not found, but a second arm, which is the unit's own.
     """
-    likelihood = state.likelihood(sessions)
-    found = []
-    for start in (with_arm(state.fit.model, arm) for arm in _usual_arms(state.thresholds)):
-        given, evidence, best = searched(start, sessions, state.thresholds)
-        # Far from any fit, one linearisation does not decide.
-        few = [best, *(evidence.posterior((k,)) for k in additions(evidence, (), BREADTH))]
-        found += [fit(likelihood, with_members(given, one, start, likelihood), FEW_STEPS) for one in few]
+    starts = [with_arm(state.fit.model, arm) for arm in _usual_arms(state.thresholds)]
+    found = _fits_from(starts, state, sessions, BREADTH)  # far from any fit, one linearisation does not decide
     usual = [one for one in found if not is_beyond_memory(one.model, state.thresholds)] or found
-    return state_at(min(usual, key=lambda one: _scored(one, state)), sessions, state.thresholds)
+    return _at_best_of(usual, state, sessions)
 
 
 def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
@@ -81,14 +76,8 @@ def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls.
     """
     bare = _without_core_effects(state.fit.model)
-    likelihood = state.likelihood(sessions)
-    found = []
-    for start in (
-        with_arm(bare, arm) for arm in [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(state.fit.model))]
-    ):
-        given, _, best = searched(start, sessions, state.thresholds)
-        found.append(fit(likelihood, with_members(given, best, start, likelihood), FEW_STEPS))
-    return state_at(min(found, key=lambda one: _scored(one, state)), sessions, state.thresholds)
+    arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(state.fit.model))]
+    return _at_best_of(_fits_from([with_arm(bare, arm) for arm in arms], state, sessions), state, sessions)
 
 
 def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
@@ -108,13 +97,31 @@ def effect_count(model: ExtendedModel) -> int:
     return len(model.parts) + (model.relaxing_share < 0.0)
 
 
+def with_odds(cost: float, model: ExtendedModel, odds: float) -> float:
+    """-2 log likelihood ``cost`` of a model with the ``odds`` against each of its effects; the less, the better."""
+    return cost + odds * effect_count(model)
+
+
 def _usual_arms(thresholds: Thresholds) -> list[Arm]:
     return [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in thresholds.memory_s]
 
 
-def _scored(one: Fit, state: State) -> float:
-    """-2 log likelihood with the odds against each effect."""
-    return one.cost + state.evidence.odds * effect_count(one.model)
+def _fits_from(
+    starts: Sequence[ExtendedModel], state: State, sessions: Sequence[Session], breadth: int = 0
+) -> list[Fit]:
+    """Fits of what a linearisation about each start asks for, and of the ``breadth`` likeliest effects alone."""
+    likelihood, found = state.likelihood(sessions), []
+    for start in starts:
+        given, evidence, best = searched(start, sessions, state.thresholds)
+        alone = [evidence.posterior((k,)) for k in additions(evidence, (), breadth)] if breadth else []
+        few = dict.fromkeys((best, *alone))  # what is asked for is often one of these
+        found += [fit(likelihood, with_members(given, one, start, likelihood), FEW_STEPS) for one in few]
+    return found
+
+
+def _at_best_of(found: Sequence[Fit], state: State, sessions: Sequence[Session]) -> State:
+    best = min(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))
+    return state_at(best, sessions, state.thresholds)
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:

@@ -22,6 +22,7 @@ from smartshoe.diagnosis._arms import (
     with_an_arm_that_creeps,
     with_another_pole,
     with_arm,
+    with_odds,
 )
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
@@ -171,7 +172,7 @@ def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
 
 def _score(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
     """-2 log likelihood of a model, with the ``odds`` against each of its effects; the less, the better."""
-    return likelihood.cost(model) + odds * effect_count(model)
+    return with_odds(likelihood.cost(model), model, odds)
 
 
 def _settled(state: State, sessions: Sequence[Session], progress: Progress) -> State:

@@ -250,7 +250,7 @@ def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[R
     """Whether a latency is too short to be one: a time stamp does not say where within its interval a sample lies."""
     if not (name.effect.is_latency and name.effect.parameters[0].unit == "s"):
         return False
-    values = next(part.values for part in model.parts if part.name == name.member.name)
+    values = model.part(name.member.name).values
     step_s = max(recording.sample_time_s for recording in recordings)
     return abs(float(values[0])) < UNIFORM_SD * step_s
 

@@ -34,7 +34,7 @@ def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds:
 def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     """What is said of an effect that follows best where it is of another kind, or is the wall's own arm."""
     told = name.effect.name.replace("_", " ")
-    part = next(part for part in model.parts if part.name == name.member.name)
+    part = model.part(name.member.name)
     for parameter, value in zip(part.effect.parameters, part.values, strict=True):
         if parameter.is_where_kind_ends(float(value)):
             unit = "" if parameter.unit == "1" else f" {parameter.unit}"

@@ -84,6 +84,10 @@ class ExtendedModel:
         part = Part(added, added.start() if values is None else np.array(values, dtype=float))
         return replace(self, parts=(*self.parts, part))
 
+    def part(self, name: str) -> Part:
+        """The effect ``name`` in it; KeyError where it is not."""
+        return {part.name: part for part in self.parts}[name]
+
     def without(self, name: str) -> ExtendedModel:
         """This model without the effect ``name``."""
         return replace(self, parts=tuple(part for part in self.parts if part.name != name))
