@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with
-from smartshoe.diagnosis._sensitivity import Candidate, available
+from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, state_at
 from smartshoe.models.effects import Effect, blocks, catalogue
@@ -93,7 +93,8 @@ def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
 
     A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
     """
-    starts = [model.with_part(law, law.begun(shape, sizes)) for shape in law.shapes for sizes in SIZES]
+    shapes = law.shapes_with(logged_channels(likelihood.sessions))
+    starts = [model.with_part(law, law.begun(shape, sizes)) for shape in shapes for sizes in SIZES]
     return fit(likelihood, min((fit(likelihood, one, 1) for one in starts), key=lambda f: f.cost).model, FEW_STEPS)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
-from smartshoe.diagnosis._sensitivity import Candidate, available
+from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
 from smartshoe.diagnosis._validation import apart
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
@@ -77,7 +77,8 @@ def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit
 
 def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:
     """``model`` with a law at the likeliest of its shapes, from where a fit begins."""
-    return min((model.with_part(law, law.begun(shape)) for shape in law.shapes), key=likelihood.cost)
+    shapes = law.shapes_with(logged_channels(likelihood.sessions))
+    return min((model.with_part(law, law.begun(shape)) for shape in shapes), key=likelihood.cost)
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:

@@ -5,18 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.diagnosis._likelihood import Fit
+from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Scale
 from smartshoe.models.parameter import Parameter
 from smartshoe.signals.noise import NORMAL_95
 
 
 def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
-    """The effect's parameters by name; an interval stays within the parameter's bounds."""
+    """The effect's parameters by name; an interval stays within the parameter's bounds.
+
+    Nothing is said of those that need a channel which was not logged.
+    """
     theta = fit.model.theta
     found = {}
-    for k, (owner, parameter) in enumerate(fit.model.parameters):
-        if owner != name:
-            continue
+    for k in _told(fit, name):
+        parameter = fit.model.parameters[k][1]
         factor, unit = _scaled(parameter.unit, scale, fit.model.gain)
         sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
         low = max(theta[k] - NORMAL_95 * sd, parameter.lower)
@@ -30,16 +33,21 @@ def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
 def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tuple[tuple[float, ...], ...]]:
     """Every effect's parameters as ``effect.parameter``, and their covariance in the same units and order."""
     found: dict[str, Parameter] = {}
-    factors, places = [], []
+    places: list[int] = []
     for name in fit.model.names:
-        for key, parameter in parameters_of(fit, name, scale).items():
-            found[f"{name}.{key}"] = parameter
-    for k, (owner, parameter_) in enumerate(fit.model.parameters):
-        if owner != "baseline":
-            places.append(k)
-            factors.append(_scaled(parameter_.unit, scale, fit.model.gain)[0])
+        found |= {f"{name}.{key}": parameter for key, parameter in parameters_of(fit, name, scale).items()}
+        places += _told(fit, name)
+    factors = [_scaled(fit.model.parameters[k][1].unit, scale, fit.model.gain)[0] for k in places]
     part = fit.covariance[np.ix_(places, places)] * np.outer(factors, factors)
     return found, tuple(tuple(float(value) for value in row) for row in part)
+
+
+def _told(fit: Fit, name: str) -> list[int]:
+    """Where the effect's parameters stand in theta, but for those without their channel."""
+    has = {"", *logged_channels(fit.likelihood.sessions)}
+    return [
+        k for k, (owner, parameter) in enumerate(fit.model.parameters) if owner == name and parameter.channel in has
+    ]
 
 
 def _scaled(unit: str, scale: Scale, gain: float) -> tuple[float, str]:

@@ -68,11 +68,16 @@ def available(sessions: Sequence[Session]) -> list[Effect]:
     Not those that shift load or reading by one value, which no waveform tells from a recording's own offset
     (`smartshoe.diagnosis._zero`).
     """
-    channels = (("temperature", "temperature_k"), ("neighbour", "neighbour"))
-    has = {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
+    has = logged_channels(sessions)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
     return [e for e in found if e.needs <= has and not e.is_refinement]
+
+
+def logged_channels(sessions: Sequence[Session]) -> set[str]:
+    """What every recording holds besides load and reading, in the words of `smartshoe.models.effects.exposure`."""
+    channels = (("temperature", "temperature_k"), ("neighbour", "neighbour"))
+    return {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
 
 
 def nuisances(session: Session, rate_per_s: float) -> Array:
@@ -157,6 +162,7 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     fitted = tuple(session for session in sessions if session.fitted.any())
     inside = {part.name: part for part in model.parts}
     outside = [e for e in available(fitted) if e.name not in inside]
+    channels = logged_channels(fitted)
     candidates: list[Candidate] = []
     place = 4
     for part in model.parts:
@@ -164,7 +170,7 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
         place += 1
     for effect in outside:
         strengths = sum(parameter.null is not None for parameter in effect.parameters)
-        for shape in effect.shapes:
+        for shape in effect.shapes_with(channels):
             candidates.append(Candidate(effect, shape, tuple(range(place, place + strengths))))
             place += strengths
     beyond = [model.extended_by(one.effect, one.effect.start(one.shape)) for one in candidates[len(model.parts) :]]

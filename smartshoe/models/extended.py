@@ -249,8 +249,14 @@ class ExtendedModel:
         plain = {key: given[key] for key in given if key != "effects"}
         return cls(
             **plain,
-            parts=tuple(Part(one, np.array([values[p.name] for p in one.parameters])) for one, values in parts),
+            parts=tuple(Part(one, np.array([_stored(p, values) for p in one.parameters])) for one, values in parts),
         )
+
+
+def _stored(parameter: EffectParameter, values: Mapping[str, float]) -> float:
+    """A parameter's value in a file; one that was made before sensors lagged behind a temperature has no such lag."""
+    lagless = parameter.channel and parameter.null is None and parameter.name not in values
+    return 0.0 if lagless else values[parameter.name]
 
 
 def derivative_step(parameter: EffectParameter, value: float) -> float:

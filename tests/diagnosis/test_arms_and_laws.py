@@ -232,7 +232,8 @@ def test_a_law_begins_from_all_its_shapes_small_and_large(monkeypatch: pytest.Mo
         return SimpleNamespace(model=model, cost=-len(begun))
 
     monkeypatch.setattr(_laws, "fit", fitted)
-    found: Any = _laws._begun(law, MODEL, None)  # type: ignore[arg-type]
+    unlogged: Any = SimpleNamespace(sessions=[])
+    found: Any = _laws._begun(law, MODEL, unlogged)
     starts = [tuple(law.begun(shape, sizes)) for shape in law.shapes for sizes in (0.5, 5.0)]
     assert begun[:-1] == [(start, 1) for start in starts]
     assert begun[-1] == (starts[-1], 4)  # the best of them goes on

@@ -239,7 +239,7 @@ def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     assert found.rows[0].shape[1] == place == found.scales.size
     for name in {one.name for one in outside}:
         own = [dict(one.shape) for one in outside if one.name == name]
-        assert own == [dict(shape) for shape in effect_of(outside, name).shapes]
+        assert own == [dict(shape) for shape in effect_of(outside, name).shapes_with(())]
     assert found.shapes["second_relaxation"] == len(effect("second_relaxation").shapes)
     for row, session in zip(found.rows, sessions, strict=True):
         at = session.conditions

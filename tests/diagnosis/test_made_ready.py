@@ -421,8 +421,8 @@ def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None
     [
         ("dead_band", (0.05, 0.2), "lost_load", 0.05 * 600.0, "N"),
         ("sensor_nonlinearity", (0.02, 0.0, 0.0), "bow", 0.02 * 1.5 * 200.0, "mbar"),
-        ("zero_drift", (1e-4, 0.0), "drift_rate", 1e-4 * 1.5 * 200.0, "mbar/s"),
-        ("zero_drift", (1e-4, 2e-3), "temperature_coefficient", 2e-3 * 1.5 * 200.0, "mbar/K"),
+        ("zero_drift", (1e-4, 0.0, 60.0), "drift_rate", 1e-4 * 1.5 * 200.0, "mbar/s"),
+        ("zero_drift", (1e-4, 2e-3, 60.0), "temperature_coefficient", 2e-3 * 1.5 * 200.0, "mbar/K"),
         ("delay", (0.03,), "delay", 0.03, "s"),
     ],
 )
@@ -431,6 +431,8 @@ def test_shares_of_full_scale_become_newtons_and_the_readings_unit(
 ) -> None:
     """What stands before the chain's gain comes out as many times as large."""
     sessions, _ = _prepared(_pressed(_triangles()))
+    for one in sessions:
+        object.__setattr__(one.conditions, "temperature_k", one.conditions.time_s % 7.0)
     model = replace(MODEL, gain=1.5).with_part(effect(name), np.array(values))
     found = parameters_of(fit(likelihood_of(sessions), model, 0), name, Scale(600.0, -200.0, MILLIBAR))
     assert set(found) == {one.name for one in effect(name).parameters}

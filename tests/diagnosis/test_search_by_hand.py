@@ -221,7 +221,9 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
 def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
     law = effect("second_relaxation")
     wanted = law.begun(law.shapes[-1])
-    likelihood: Any = SimpleNamespace(cost=lambda model: float(np.sum(np.abs(model.parts[-1].values - wanted))))
+    likelihood: Any = SimpleNamespace(
+        cost=lambda model: float(np.sum(np.abs(model.parts[-1].values - wanted))), sessions=[]
+    )
     assert list(begun_with(law, MODEL, likelihood).parts[-1].values) == list(wanted)
 
 

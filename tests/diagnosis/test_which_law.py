@@ -118,7 +118,8 @@ def test_a_curve_is_begun_from_every_shape_at_both_sizes(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(_laws, "fit", fitted)
     law = effect("dead_band")
-    found: Any = _laws._begun(law, MODEL, None)  # type: ignore[arg-type]
+    unlogged: Any = SimpleNamespace(sessions=[])
+    found: Any = _laws._begun(law, MODEL, unlogged)
     sizes = {size for size, _ in begun}
     assert {shape for _, shape in begun} == {one["softness"] for one in law.shapes}
     assert len(sizes) == 2

@@ -134,7 +134,7 @@ def test_a_load_of_which_a_gauge_reads_nothing_is_its_cells_tare_however_large()
 
 def test_what_has_drifted_by_the_first_rest_is_no_zero() -> None:
     sessions, _ = _sessions(_run())
-    drifting = MODEL.with_part(effect("zero_drift"), np.array([0.002, 0.0]))
+    drifting = MODEL.with_part(effect("zero_drift"), np.array([0.002, 0.0, 60.0]))
     (rest,) = first_rests(sessions, drifting, STANDARD)
     kept = STANDARD.hold_s > TIME_S
     assert rest[2] == pytest.approx(0.002 * float(np.mean(TIME_S[kept])), rel=0.05)

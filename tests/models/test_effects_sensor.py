@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from smartshoe.models.effects import Conditions, Effect, Inverse, effect
+from smartshoe.models.extended import ExtendedModel
 
 STEP_S = 0.02
 PHYSICAL = (
@@ -146,9 +147,9 @@ def _sign(name: str, values: list[float], *, at: float = 0.5, channels: bool = T
 def test_signs_are_those_of_the_documentation() -> None:
     assert _sign("zero_offset", [0.01]) > 0
     assert _sign("load_cell_tare", [0.01]) > 0
-    assert _sign("zero_drift", [1e-3, 0.0]) > 0
-    assert _sign("gain_drift", [1e-3, 0.0]) > 0
-    assert _sign("gain_drift", [1e-3, 0.0], at=0.0) == 0
+    assert _sign("zero_drift", [1e-3, 0.0, 0.0]) > 0
+    assert _sign("gain_drift", [1e-3, 0.0, 0.0]) > 0
+    assert _sign("gain_drift", [1e-3, 0.0, 0.0], at=0.0) == 0
     assert _sign("warm_up", [0.01, 5.0, 1.0]) > 0
     assert _sign("cross_talk", [0.01]) > 0
     assert _sign("saturation", [0.5, 0.4, 0.01, 0.0]) < 0
@@ -213,7 +214,7 @@ def test_a_lag_of_a_smoothed_and_thinned_load_is_that_of_the_load() -> None:
 @pytest.mark.parametrize("name", ["gain_drift", "zero_drift"])
 def test_a_temperature_coefficient_needs_a_temperature(name: str) -> None:
     one, p = effect(name), np.full(500, 0.5)
-    coefficient, rate = np.array([0.0, 0.01]), np.array([1e-3, 0.0])
+    coefficient, rate = np.array([0.0, 0.01, 0.0]), np.array([1e-3, 0.0, 0.0])
     still = np.array_equal(one.apply(p, _conditions(500, channels=False), coefficient), p)
     assert still
     time_s = STEP_S * np.arange(500)
@@ -241,9 +242,43 @@ def test_a_thermometers_noise_is_not_added_to_the_reading() -> None:
     time_s = STEP_S * np.arange(5000)
     warmer_k = 2.0 * np.sin(time_s / 15.0)
     noisy_k = warmer_k + 0.1 * np.random.default_rng(1).standard_normal(time_s.size)
-    p, values = np.zeros(time_s.size), np.array([0.0, 0.01])
+    p, values = np.zeros(time_s.size), np.array([0.0, 0.01, 0.0])
     moved = effect("zero_drift").apply(p, Conditions(time_s, p, STEP_S, temperature_k=noisy_k), values)
     assert np.std(moved - 0.01 * warmer_k) < 0.2 * 0.01 * 0.1
+
+
+@settings(max_examples=20, deadline=None)
+@given(tau_s=st.floats(3.0, 300.0), period_s=st.floats(60.0, 900.0))
+def test_a_sensors_body_follows_a_temperature_by_its_time_constant(tau_s: float, period_s: float) -> None:
+    """A first-order lag's answer to a sine, its transient included: omega tau in phase and amplitude."""
+    time_s = 0.05 * np.arange(40000)
+    omega = 2.0 * np.pi / period_s
+    ratio = omega * tau_s
+    body_k = (np.sin(omega * time_s) - ratio * np.cos(omega * time_s) + ratio * np.exp(-time_s / tau_s)) / (
+        1 + ratio**2
+    )
+    p = np.zeros(time_s.size)
+    conditions = Conditions(time_s, p, 0.05, temperature_k=4.0 * np.sin(omega * time_s))
+    for name, signal in (("zero_drift", p), ("gain_drift", p + 1.0)):
+        moved = effect(name).apply(signal, conditions, np.array([0.0, 0.01, tau_s])) - signal
+        # The thermometer is smoothed over three seconds, so that the corner where it begins is.
+        assert np.max(np.abs(moved - 0.04 * body_k)) < 0.04 * 2.0 * omega
+
+
+def test_shapes_that_differ_by_what_is_not_logged_are_one() -> None:
+    drift, lag = effect("zero_drift"), effect("sensor_lag")
+    assert [dict(one) for one in drift.shapes_with({"neighbour"})] == [{"temperature_lag": 3.0}]
+    assert drift.shapes_with({"temperature"}) == drift.shapes
+    assert lag.shapes_with(()) == lag.shapes
+
+
+def test_a_file_from_before_sensors_lagged_behind_a_temperature_has_no_such_lag() -> None:
+    now = ExtendedModel(1.0, 0.1, 0.5, 800.0, 140.0, "mbar").with_part("zero_drift", np.array([1e-5, 2e-3, 0.0]))
+    stored = now.to_dict()
+    before = {**stored, "effects": {"zero_drift": {"drift_rate": 1e-5, "temperature_coefficient": 2e-3}}}
+    assert ExtendedModel.from_dict(before).to_dict() == stored
+    with pytest.raises(KeyError):
+        ExtendedModel.from_dict({**stored, "effects": {"zero_drift": {"drift_rate": 1e-5}}})
 
 
 def test_cross_talk_without_a_neighbour_does_nothing() -> None:

@@ -8,7 +8,7 @@ stands at the chain's end. So every strength is a share of full scale.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
@@ -189,6 +189,14 @@ class Effect(ABC):
     def delay_s(self, values: Array) -> float:
         """The constant time by which it makes a reading late, and which a whole recording can be shifted back by."""
         return 0.0
+
+    def shapes_with(self, channels: Collection[str]) -> tuple[Mapping[str, float], ...]:
+        """``shapes`` where these are logged: those that differ by what needs another channel are one."""
+        inert = {p.name for p in self.parameters if p.channel and p.channel not in channels}
+        seen: dict[tuple[tuple[str, float], ...], Mapping[str, float]] = {}
+        for shape in self.shapes:
+            seen.setdefault(tuple((key, value) for key, value in shape.items() if key not in inert), shape)
+        return tuple(seen.values())
 
     def start(self, shape: Mapping[str, float] | None = None) -> Array:
         """Null strengths with the shape parameters at ``shape``, or at the first of ``shapes``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import drift
+from smartshoe.models.effects._sensor_clock import TEMPERATURE_LAG, TEMPERATURE_LAGS, drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -16,7 +16,9 @@ LEAST_GAIN = 0.01
 class GainDrift(Effect):
     """P (1 + g t); with the temperature logged, P (1 + g t + g_T dT).
 
-    g_T is inert without a temperature that moves, g where the temperature is a straight line in time.
+    dT is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead
+    of a die in its package. g_T is inert without a temperature that moves, g where the temperature is a straight line
+    in time.
     """
 
     name, family, stage, place = "gain_drift", "gain_drift", "sensor", "sensor"
@@ -33,7 +35,9 @@ class GainDrift(Effect):
             1e-3,
             channel="temperature",
         ),
+        TEMPERATURE_LAG,
     )
+    shapes = TEMPERATURE_LAGS
     exposed_by = by("repeats", "peaks", "pauses")
     separated_by = {
         "coloured_noise": by("repeats"),
@@ -53,7 +57,7 @@ class GainDrift(Effect):
 
         None with a temperature coefficient: a stream carries no temperature.
         """
-        rate, coefficient = (float(value) for value in values)
+        rate, coefficient, _ = (float(value) for value in values)
         if coefficient != 0.0:
             return None
         return Memoryless(

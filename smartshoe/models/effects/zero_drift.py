@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import drift
+from smartshoe.models.effects._sensor_clock import TEMPERATURE_LAG, TEMPERATURE_LAGS, drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -12,7 +12,9 @@ from smartshoe.models.effects.exposure import by
 class ZeroDrift(Effect):
     """+ d t; with the temperature logged, + d t + b_T dT.
 
-    b_T is inert without a temperature that moves, d where the temperature is a straight line in time.
+    dT is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead
+    of a die in its package. b_T is inert without a temperature that moves, d where the temperature is a straight line
+    in time.
     """
 
     name, family, stage, place = "zero_drift", "zero", "sensor", "sensor"
@@ -29,7 +31,9 @@ class ZeroDrift(Effect):
             1e-3,
             channel="temperature",
         ),
+        TEMPERATURE_LAG,
     )
+    shapes = TEMPERATURE_LAGS
     exposed_by = by("rests", "idle", "pauses")
     separated_by = {
         "coloured_noise": by("repeats"),
@@ -49,7 +53,7 @@ class ZeroDrift(Effect):
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """Subtract the drift; exact. None with a temperature coefficient: a stream carries no temperature."""
-        rate, coefficient = (float(value) for value in values)
+        rate, coefficient, _ = (float(value) for value in values)
         if coefficient != 0.0:
             return None
         return Memoryless(lambda signal, time_s: signal - rate * time_s, f"x -= {c_number(rate)} * t;")

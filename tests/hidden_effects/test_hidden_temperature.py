@@ -1,0 +1,60 @@
+"""A zero that follows the temperature of a die within its housing, while the thermometer hangs in the air."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bank import PLAIN, within_reach
+
+from smartshoe.diagnosis import diagnose
+from smartshoe.recording import Channel, Recording
+from smartshoe.units import unit
+
+SLAB_S = 50.0  # of the slowest mode
+START_C = 22.0
+SHARE_PER_KELVIN = 0.006  # of full scale
+
+
+def _air_k(time_s: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(n,) air above its first value: somebody opens a door, and somebody turns the heating up."""
+    cooled = -rng.uniform(1.0, 2.5) * -np.expm1(-np.maximum(time_s - rng.uniform(10.0, 60.0), 0.0) / 40.0)
+    heated = rng.uniform(2.0, 4.0) * -np.expm1(-np.maximum(time_s - rng.uniform(80.0, 140.0), 0.0) / 90.0)
+    return np.asarray(cooled + heated)
+
+
+def _amid_k(air_k: np.ndarray, step_s: float) -> np.ndarray:
+    """(n,) the middle of a slab whose faces are as warm as the air: all odd modes (Carslaw and Jaeger 1959, 3.3)."""
+    odd = np.arange(1, 20, 2)
+    weight = np.where(np.arange(odd.size) % 2, -1.0, 1.0) / odd
+    left, middle = np.zeros(odd.size), np.empty(air_k.size)
+    keep = np.exp(-step_s * odd**2 / SLAB_S)
+    for k, rise in enumerate(np.diff(air_k, prepend=0.0)):
+        left = keep * (left + rise)
+        middle[k] = air_k[k] - float(weight @ left) / float(weight.sum())
+    return middle
+
+
+def _warmed(recording: Recording, full_scale: float, rng: np.random.Generator) -> Recording:
+    reading = recording.sensors[0]
+    air_k = _air_k(recording.time_s, rng)
+    moved = SHARE_PER_KELVIN * full_scale * _amid_k(air_k, recording.sample_time_s)
+    thermometer = Channel.from_values("temperature", START_C + air_k, unit("°C"))
+    return recording.with_channel(replace(reading, values=reading.values + moved)).with_channel(thermometer)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_zero_that_lags_behind_the_temperature_is_told(seed: int) -> None:
+    case = within_reach({}, PLAIN[seed % len(PLAIN)], seed, recordings=2)
+    rng = np.random.default_rng(seed)
+    full_scale = float(np.ptp(case.recordings[0].sensors[0].values))
+    fitted, held_out = ([_warmed(one, full_scale, rng) for one in some] for some in (case.recordings, case.hold_out))
+    found = diagnose(fitted, held_out)
+    assert found.verdict == "explained"
+    told = next(cause for cause in found.causes if cause.name == "zero_drift")
+    assert told.confidence > 0.5
+    # Lag and coefficient stand in for one another where a recording ends before the housing has settled.
+    coefficient = told.parameters["temperature_coefficient"].value
+    assert 0.5 < coefficient / (SHARE_PER_KELVIN * full_scale) < 2.0
+    assert found.explained_percent > 0.75 * found.explainable_percent
