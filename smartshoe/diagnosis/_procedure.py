@@ -45,7 +45,7 @@ from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
-from smartshoe.signals.noise import NORMAL_95, UNIFORM_SD
+from smartshoe.signals.noise import NORMAL_95
 
 
 def _silent(_: str) -> None:
@@ -181,7 +181,6 @@ def _diagnosed(
     everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
     names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
-    names = tuple(one for one in names if not _is_within_a_sample(one, extended, recordings))
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     names = tuple(one for one in names if one not in [at_an_end for at_an_end, _ in unclear])
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
@@ -244,15 +243,6 @@ def _diagnosed(
         traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),
         thresholds=thresholds,
     )
-
-
-def _is_within_a_sample(name: Name, model: ExtendedModel, recordings: Sequence[Recording]) -> bool:
-    """Whether a latency is too short to be one: a time stamp does not say where within its interval a sample lies."""
-    if not (name.effect.is_latency and name.effect.parameters[0].unit == "s"):
-        return False
-    values = model.part(name.member.name).values
-    step_s = max(recording.sample_time_s for recording in recordings)
-    return abs(float(values[0])) < UNIFORM_SD * step_s
 
 
 def _percent_less(after: float, before: float) -> float:

@@ -99,7 +99,6 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("residual_of", lambda session, model: f"{session.name} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
     answer("names_of", lambda *_: tuple(made.names))
-    answer("_is_within_a_sample", lambda name, *_: name.name == "short")
     answer("other_kind_of", lambda name, *_: "it turned" if name.name == "turned" else None)
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
@@ -124,12 +123,12 @@ def _run_diagnosis(parts: Any) -> Any:
 
 
 def _name(name: str, kind_only: bool = False, size: float = 0.1) -> Any:
-    known = effect("delay" if name in ("short", "turned") else name)
+    known = effect("delay" if name == "turned" else name)
     return SimpleNamespace(name=name, kind_only=kind_only, effect=known, member=SimpleNamespace(size=size))
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
-    parts.names = [_name("linear_leak"), _name("short"), _name("turned"), _name("delay")]
+    parts.names = [_name("linear_leak"), _name("turned"), _name("delay")]
     parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, 0.2), Zero(shift_of("reading"), 0.2, 0.1, 1e-4)]
     told = _run_diagnosis(parts)
     assert [one.name for one in told.causes] == ["delay", "zero", "linear_leak"]  # the largest first, no immaterial one

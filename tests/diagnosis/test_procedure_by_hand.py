@@ -18,7 +18,6 @@ from smartshoe.diagnosis._procedure import (
     _cause,
     _goodness,
     _held_out_evidence,
-    _is_within_a_sample,
     _outside,
     _percent_less,
     _refused,
@@ -169,23 +168,6 @@ def test_a_fall_is_in_percent_and_never_below_nothing() -> None:
     assert _percent_less(1.0, 4.0) == 75.0
     assert _percent_less(5.0, 4.0) == 0.0
     assert _percent_less(1.0, 0.0) == 0.0
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_latency_within_a_sample_is_none(sign: float) -> None:
-    """A twelfth's root of the longest sample: a time stamp's own uncertainty."""
-    slow, fast = (Recording.from_arrays(time_s=step * np.arange(50), force_n=np.ones(50)) for step in (0.1, 0.01))
-    member: Any = SimpleNamespace(name="delay")
-    for by, is_within in ((0.9999, True), (1.0001, False)):
-        late = MODEL.with_part("linear_leak").with_part("delay", np.array([sign * by * 0.1 / math.sqrt(12.0)]))
-        name: Any = SimpleNamespace(effect=effect("delay"), member=member)
-        assert _is_within_a_sample(name, late, [fast, slow]) is is_within
-    # No latency; and one that is no time.
-    leak: Any = SimpleNamespace(effect=effect("linear_leak"), member=SimpleNamespace(name="linear_leak"))
-    assert not _is_within_a_sample(leak, MODEL.with_part("linear_leak"), [slow])
-    drift = effect("clock_drift")
-    named: Any = SimpleNamespace(effect=drift, member=SimpleNamespace(name="clock_drift"))
-    assert not _is_within_a_sample(named, MODEL.with_part(drift, np.array([1e-9])), [slow])
 
 
 # -- causes -----------------------------------------------------------------------------------------------------------

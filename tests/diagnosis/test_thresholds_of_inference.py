@@ -16,8 +16,6 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._procedure import _is_within_a_sample
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._validation import LeftOut, extrapolating
@@ -123,13 +121,6 @@ def test_false_name_is_what_lacks_of_the_confidence_in_an_offset_at_rest() -> No
     runs = [_recording(seed=seed, offset=0.04) for seed in range(3)]
     found = diagnose(runs[:2], hold_out=runs[2], thresholds=replace(STANDARD, false_name=0.17))
     assert {one.name: one.confidence for one in found.causes} == {"zero_offset": 0.83}
-
-
-@pytest.mark.parametrize(("samples", "within"), [(0.28, True), (0.3, False)])
-def test_a_delay_below_the_uncertainty_of_a_time_stamp_is_none(samples: float, within: bool) -> None:
-    model = MODEL.with_part(effect("delay"), np.array([samples * STEP_S]))
-    member: Any = SimpleNamespace(name="delay")
-    assert _is_within_a_sample(Name(member, effect("delay"), 0.9, 1.0, ()), model, [_recording()]) == within
 
 
 def test_tolerable_is_the_structure_that_a_good_unit_may_leave() -> None:
