@@ -52,7 +52,8 @@ class Thresholds:
     extrapolates: float = threshold(
         10.0,
         "ratio",
-        "of an effect in what is held out to that in what is fitted, beyond which it is no knowledge",
+        "of an effect in what is held out to that in what is fitted, beyond which it is no knowledge; of a zero's shift"
+        " to a drift beside it, within which one may be of the other",
         "an order of magnitude",
     )
     validated: float = threshold(
@@ -88,7 +89,10 @@ class Thresholds:
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
     memory_s: tuple[float, ...] = threshold(
-        (0.3, 3.0, 30.0), "s", "time constants by which a law may follow otherwise", "one a decade of the protocols"
+        (0.3, 3.0, 30.0),
+        "s",
+        "time constants by which a law may follow otherwise; an arm beyond them follows an effect",
+        "one a decade of the protocols",
     )
     held_out_every: int = threshold(
         3, "load cycles", "of which one judges and fits nothing, where no recording is held out", "two thirds to fit"
