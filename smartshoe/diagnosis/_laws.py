@@ -21,8 +21,8 @@ def with_laws(given: State, plain: ExtendedModel, sessions: Sequence[Session]) -
     No law is exact: one that leaves less than the square of the usual departure, of what the flexible block explains,
     is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
     One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
-    is, so that only fits of the whole model compare them fairly. Nothing in its
-    place leaves no more than the ``plain`` model does.
+    is, so that only fits of the whole model compare them fairly. Nothing in its place leaves no more than the ``plain``
+    model does.
     """
     state = given
     for block in (one for one in given.chosen if one.effect.is_flexible):

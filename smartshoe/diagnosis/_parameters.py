@@ -16,38 +16,36 @@ def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
 
     Nothing is said of those that need a channel which was not logged.
     """
-    theta = fit.model.theta
-    found = {}
-    for k in _told(fit, name):
-        parameter = fit.model.parameters[k][1]
-        factor, unit = _scaled(parameter.unit, scale, fit.model.gain)
-        sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
-        low = max(theta[k] - NORMAL_95 * sd, parameter.lower)
-        high = min(theta[k] + NORMAL_95 * sd, parameter.upper)
-        found[parameter.name] = Parameter(
-            float(theta[k] * factor), float(sd * factor), (float(low * factor), float(high * factor)), unit
-        )
-    return found
+    return {key: _parameter(fit, k, scale) for k, owner, key in _told(fit) if owner == name}
 
 
 def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tuple[tuple[float, ...], ...]]:
     """Every effect's parameters as ``effect.parameter``, and their covariance in the same units and order."""
-    found: dict[str, Parameter] = {}
-    places: list[int] = []
-    for name in fit.model.names:
-        found |= {f"{name}.{key}": parameter for key, parameter in parameters_of(fit, name, scale).items()}
-        places += _told(fit, name)
+    told = _told(fit)
+    found = {f"{owner}.{key}": _parameter(fit, k, scale) for k, owner, key in told}
+    places = [k for k, _, _ in told]
     factors = [_scaled(fit.model.parameters[k][1].unit, scale, fit.model.gain)[0] for k in places]
     part = fit.covariance[np.ix_(places, places)] * np.outer(factors, factors)
     return found, tuple(tuple(float(value) for value in row) for row in part)
 
 
-def _told(fit: Fit, name: str) -> list[int]:
-    """Where the effect's parameters stand in theta, but for those without their channel."""
+def _told(fit: Fit) -> list[tuple[int, str, str]]:
+    """Place in theta, effect and name of the effects' parameters, but for those without their channel."""
     has = {"", *logged_channels(fit.likelihood.sessions)}
     return [
-        k for k, (owner, parameter) in enumerate(fit.model.parameters) if owner == name and parameter.channel in has
+        (k, owner, parameter.name)
+        for k, (owner, parameter) in enumerate(fit.model.parameters)
+        if owner != "baseline" and parameter.channel in has
     ]
+
+
+def _parameter(fit: Fit, k: int, scale: Scale) -> Parameter:
+    """The parameter at ``k`` in theta, in units; its interval within its bounds."""
+    parameter, value = fit.model.parameters[k][1], fit.model.theta[k]
+    factor, unit = _scaled(parameter.unit, scale, fit.model.gain)
+    sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
+    low, high = max(value - NORMAL_95 * sd, parameter.lower), min(value + NORMAL_95 * sd, parameter.upper)
+    return Parameter(float(value * factor), float(sd * factor), (float(low * factor), float(high * factor)), unit)
 
 
 def _scaled(unit: str, scale: Scale, gain: float) -> tuple[float, str]:

@@ -34,9 +34,8 @@ def dose_undone(signal, is_gain, size, early, held, by_stroke, exponent, width, 
     """out (n,) with out + g = ``signal`` (n,), or out (1 + g) where ``is_gain``; g = size early log(1 + X/early).
 
     X grows by ``held`` times the sum of two flows, p^m, a step, and where the play of ``width`` rises by ``by_stroke``
-    times the rise of its z^m, all zero below zero. Each sample is sought in at most
-    ``rounds``, until one moves it by no more than ``settled``. ``state`` (3,): X, last flow, play (NO_LOAD before the
-    first).
+    times the rise of its z^m, all zero below zero. Each sample is sought in at most ``rounds``, until one moves it by
+    no more than ``settled``. ``state`` (3,): X, last flow, play (NO_LOAD before the first).
     """
     total, last, place = state
     for k in range(signal.size):

@@ -254,9 +254,8 @@ class ExtendedModel:
 
 
 def _stored(parameter: EffectParameter, values: Mapping[str, float]) -> float:
-    """A parameter's value in a file; one that was made before sensors lagged behind a temperature has no such lag."""
-    lagless = parameter.channel and parameter.null is None and parameter.name not in values
-    return 0.0 if lagless else values[parameter.name]
+    """A parameter's value in a file, also in one from before the parameter was known."""
+    return values[parameter.name] if parameter.absent is None else values.get(parameter.name, parameter.absent)
 
 
 def derivative_step(parameter: EffectParameter, value: float) -> float:

@@ -431,8 +431,8 @@ def test_shares_of_full_scale_become_newtons_and_the_readings_unit(
 ) -> None:
     """What stands before the chain's gain comes out as many times as large."""
     sessions, _ = _prepared(_pressed(_triangles()))
-    for one in sessions:
-        object.__setattr__(one.conditions, "temperature_k", one.conditions.time_s % 7.0)
+    conditions = [replace(one.conditions, temperature_k=one.conditions.time_s % 7.0) for one in sessions]
+    sessions = [replace(one, conditions=logged) for one, logged in zip(sessions, conditions, strict=True)]
     model = replace(MODEL, gain=1.5).with_part(effect(name), np.array(values))
     found = parameters_of(fit(likelihood_of(sessions), model, 0), name, Scale(600.0, -200.0, MILLIBAR))
     assert set(found) == {one.name for one in effect(name).parameters}

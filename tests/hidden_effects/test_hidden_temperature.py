@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bank import PLAIN, within_reach
+from scipy.signal import lfilter
 
 from smartshoe.diagnosis import diagnose
 from smartshoe.recording import Channel, Recording
@@ -28,12 +29,9 @@ def _amid_k(air_k: np.ndarray, step_s: float) -> np.ndarray:
     """(n,) the middle of a slab whose faces are as warm as the air: all odd modes (Carslaw and Jaeger 1959, 3.3)."""
     odd = np.arange(1, 20, 2)
     weight = np.where(np.arange(odd.size) % 2, -1.0, 1.0) / odd
-    left, middle = np.zeros(odd.size), np.empty(air_k.size)
-    keep = np.exp(-step_s * odd**2 / SLAB_S)
-    for k, rise in enumerate(np.diff(air_k, prepend=0.0)):
-        left = keep * (left + rise)
-        middle[k] = air_k[k] - float(weight @ left) / float(weight.sum())
-    return middle
+    rises = np.diff(air_k, prepend=0.0)
+    left = np.array([lfilter([keep], [1.0, -keep], rises) for keep in np.exp(-step_s * odd**2 / SLAB_S)])
+    return np.asarray(air_k - weight @ left / weight.sum())
 
 
 def _warmed(recording: Recording, full_scale: float, rng: np.random.Generator) -> Recording:

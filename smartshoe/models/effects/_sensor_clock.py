@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.kernels.linear_filter import linear_filter
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects.effect import Conditions, EffectParameter
+from smartshoe.models.first_order import lag
 
 LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
 SAME_AS_TIME = 0.98  # correlation above which a temperature is a clock, and the two have no separate coefficients
-SMOOTHED_S = 3.0  # a sensor's body follows no faster, and a thermometer's noise would come in as noise of the model
+SMOOTHED_S = 3.0  # a thermometer's noise would come in as noise of the model; no faster body is told from this one
 BLOCKS = 50
 TEMPERATURE_LAG = EffectParameter(
     "temperature_lag",
@@ -24,6 +24,7 @@ TEMPERATURE_LAG = EffectParameter(
     300.0,
     SMOOTHED_S,
     channel="temperature",
+    absent=0.0,
 )
 TEMPERATURE_LAGS = ({"temperature_lag": SMOOTHED_S}, {"temperature_lag": 60.0})  # a bare die's, and a housing's
 
@@ -42,8 +43,8 @@ def drift(conditions: Conditions, values: Array) -> Array:
     """
     warmer_k = _warmer_k(conditions)
     moved = np.zeros(conditions.time_s.size)
-    if warmer_k.size:
-        moved += values[1] * (_behind(warmer_k, float(values[2]), conditions.step_s) if values[2] > 0.0 else warmer_k)
+    if warmer_k.size and values[1] != 0.0:
+        moved += values[1] * (lag(warmer_k, 1.0 / values[2], float(conditions.step_s)) if values[2] > 0.0 else warmer_k)
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
         moved += values[0] * running_time_s(conditions)
     return moved
@@ -80,14 +81,6 @@ def _warmer_k(conditions: Conditions) -> Array:
                 conditions.cache["drift_by_clock"] = np.array([0.0 if like_time else 1.0])
         conditions.cache["warmer_k"] = known
     return known
-
-
-def _behind(signal: Array, lag_s: float, step_s: float) -> Array:
-    """(n,) a signal through a first-order lag, steady before its first value; exact for straight lines."""
-    z = step_s / lag_s
-    keep = math.exp(-z)
-    mean = -math.expm1(-z) / z
-    return np.asarray(linear_filter([1.0 - mean, mean - keep], [1.0, -keep], signal - signal[0])[0] + signal[0])
 
 
 def _running_mean(signal: Array, half: int) -> Array:

@@ -37,7 +37,8 @@ class EffectParameter:
     among them. ``size``: a typical value, or change from null; the step of derivatives is a small part of it.
     ``prior_sd``: standard deviation of a Gaussian prior about the null value, which a fit takes as one more row of its
     likelihood; None for a parameter that the data alone decide. ``channel``: what must be logged for the parameter to
-    do anything ("temperature"); '' where it needs nothing but load and time. ``kind_ends``: the bounds at which an
+    do anything ("temperature"); '' where it needs nothing but load and time. ``absent``: its value in files of models
+    from before it was known; None where every file holds it. ``kind_ends``: the bounds at which an
     effect turns into one of another kind, as a relaxation into a drift where its time constant grows beyond all holds;
     '' where a bound is only as far as anybody has seen.
     """
@@ -52,6 +53,7 @@ class EffectParameter:
     prior_sd: float | None = None
     channel: Exposure | Literal[""] = ""
     kind_ends: Literal["", "upper", "both"] = ""
+    absent: float | None = None
 
     def is_at_bound(self, value: float) -> bool:
         """Whether a value lies at a bound."""
