@@ -329,7 +329,7 @@ def rate_undone(signal, strength, exponent, softness, dead_zone, step_s, keep, s
 
 
 @njit(cache=True)
-def _newton(at, off, slope, low, high):  # type: ignore[no-untyped-def]
+def newton(at, off, slope, low, high):  # type: ignore[no-untyped-def]
     """Where a rising ``off`` = 0 is sought next, what is left of the bracket, and the step: infinite if halved."""
     if off > 0.0:
         high = at
@@ -370,7 +370,7 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
             flow = p * per_pressure
             sine = flow * per_pressure
             slope = 1.0 + half * per_pressure * (1.0 - 0.5 * sine * sine)
-            p, low, high, step = _newton(p, p + half * flow - known, slope, low, high)
+            p, low, high, step = newton(p, p + half * flow - known, slope, low, high)
             if bend * step * step <= 1e-10:
                 break
         half_flow = known - p
@@ -378,41 +378,6 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
         out[k] = p
     if pressure.size:
         state[0], state[1] = w, _orifice(p, laminar)
-
-
-@njit(cache=True)
-def softened(load, strength, width, largest, dead_zone, out):  # type: ignore[no-untyped-def]
-    """out (n,): u of u (1 - strength tanh((M^2 - u^2)/width)) = ``load`` (n,), M the largest load so far.
-
-    ``largest`` is M before the record; M counts less ``dead_zone``.
-    """
-    # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
-    bound = strength / width * (3.0 + 2.0 / width)
-    u, known, slope = 0.0, 0.0, 1.0
-    for k in range(load.size):
-        f = load[k]
-        if k and f == known:  # a pause leaves it where it is, to the last digit
-            out[k] = u
-            continue
-        largest = max(largest, f)
-        most = max(largest - dead_zone, 0.0)
-        if f >= most:
-            u, slope = f, 1.0
-        else:
-            # It rises with u: Newton from the last output moved along, held in a bracket.
-            low, high = (f, most) if f > 0.0 else (f / (1.0 - strength), f)
-            u = min(max(u + (f - known) / slope, low), high)
-            for _ in range(30):
-                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most - u * u, 0.0) / width) + 1.0)  # tanh
-                slope = 1.0 - strength * bend
-                off = u * slope - f
-                if bend > 0.0:
-                    slope += 2.0 * strength / width * u * u * (1.0 - bend * bend)
-                u, low, high, step = _newton(u, off, slope, low, high)
-                if bound * step * step <= 1e-12:
-                    break
-        known = f
-        out[k] = u
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import GasBesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects._wall_loop import relaxed, shared
+from smartshoe.models.effects._wall_loop import arm_beside, relaxed
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
@@ -38,24 +38,15 @@ class GasCompression(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure of the stiffer gas."""
+        from smartshoe.kernels.wall_loop import compressed
+
         ratio = float(values[0])
         if ratio == 0.0:
             return signal.copy()
-        wall, whole = _stiffness(ratio)
-
-        def pressure(spring: Array) -> Array:
-            b = 1.0 + wall - ratio * whole * spring
-            root = np.sqrt(np.maximum(b * b + 4.0 * ratio * whole * spring, 0.0))
-            p: Array = 2.0 * whole * spring / (b + root)
-            return p
-
-        def static(spring: Array) -> Array:
-            p = pressure(spring)
-            deformation: Array = (1.0 + ratio) * p / (1.0 + ratio * p)
-            return deformation
-
-        # The load of which the linear core made the signal, less what relaxes.
-        return pressure(shared(static, signal + relaxed(signal, conditions), conditions)[0])
+        # The load of which the linear core made the signal.
+        load, out = signal + relaxed(signal, conditions), np.empty(signal.size)
+        compressed(load, ratio, _stiffness(ratio)[0], *arm_beside(conditions), out)
+        return out
 
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""

@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_loop import shared
+from smartshoe.models.effects._wall_loop import arm_beside
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, dead_zone
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -45,20 +45,14 @@ class MullinsSoftening(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without softening would need; ``before["largest_load"]`` counts."""
-        from smartshoe.kernels.memory import softened
+        from smartshoe.kernels.wall_loop import softened
 
         if values[0] == 0.0:
             return signal.copy()
-        amount, width = _amount(values)
-        zone, before = dead_zone(conditions), float(conditions.before.get("largest_load", 0.0))
-
-        def static(load: Array) -> Array:
-            out = np.empty(load.size)
-            softened(np.ascontiguousarray(load), amount, width, before, zone, out)
-            return out
-
-        spring, arm = shared(static, signal, conditions)
-        return static(spring) + arm
+        before, out = float(conditions.before.get("largest_load", 0.0)), np.empty(signal.size)
+        given = *_amount(values), before, dead_zone(conditions), *arm_beside(conditions)
+        softened(np.ascontiguousarray(signal), *given, out)
+        return out
 
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""

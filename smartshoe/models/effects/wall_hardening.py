@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects._wall_loop import shared
+from smartshoe.models.effects._wall_loop import arm_beside
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
-
-NEWTON_STEPS = 5
 
 
 class WallHardening(Effect):
@@ -42,21 +42,11 @@ class WallHardening(Effect):
         """The load that a wall without hardening would need."""
         if values[0] == 0.0:
             return signal.copy()
-        cubic, fifth = _coefficients(values)
-        whole = 1.0 + cubic + fifth
+        from smartshoe.kernels.wall_loop import hardened
 
-        def static(spring: Array) -> Array:
-            load = whole * spring
-            square = spring * spring
-            u = load * (1.0 + cubic / whole * (1.0 - square)) / (1.0 + cubic + fifth * square)
-            for _ in range(NEWTON_STEPS):
-                square = u * u
-                bent = square * (2.0 * cubic + 4.0 * fifth * square)
-                u = (load + u * bent) / (1.0 + square * (3.0 * cubic + 5.0 * fifth * square))
-            return u
-
-        spring, arm = shared(static, signal, conditions)
-        return static(spring) + arm
+        out = np.empty(signal.size)
+        hardened(np.ascontiguousarray(signal), *_coefficients(values), *arm_beside(conditions), out)
+        return out
 
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""

@@ -1,0 +1,104 @@
+"""Springs that bend beside the arm that relaxes: the balance of both, sample by sample.
+
+f = phi(u) + kappa (u - q), q' = a (u - q), u the deformation: all begin in the steady state of the first load, where
+the arm bears nothing. ``share`` is kappa; q is u through `models.first_order.lag`, whose coefficients are ``decay``,
+``now`` and ``before``, so that within a sample the arm is a straight spring that is held elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from smartshoe.kernels.memory import newton
+
+CLOSE = 1e-8  # of full scale: a step of Newton's that is less leaves about its square
+STEPS = 30
+
+
+@njit(cache=True)
+def hardened(load, cubic, fifth, share, decay, now, before, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi = (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth)."""
+    whole = 1.0 + cubic + fifth
+    arm = held = 0.0
+    u, q, known, slope = 0.0, 0.0, 0.0, 1.0 / whole
+    for k in range(load.size):
+        last, f = u, load[k] + held
+        u += (f - known) / slope  # moved along with the load
+        for _ in range(STEPS):
+            square = u * u
+            slope = (1.0 + square * (3.0 * cubic + 5.0 * fifth * square)) / whole + arm
+            step = (f - u * ((1.0 + square * (cubic + fifth * square)) / whole + arm)) / slope
+            u += step
+            if abs(step) <= CLOSE:
+                break
+        q = decay * q + now * u + before * last if k else u
+        out[k] = u + share * (u - q)
+        arm, known = share * (1.0 - now), f
+        held = share * (decay * q + before * u)
+
+
+@njit(cache=True)
+def compressed(load, ratio, wall, share, decay, now, before, out):  # type: ignore[no-untyped-def]
+    """out (n,) = p under ``load`` (n,), phi = p (1 + wall/(1 + g p))/whole and u = (1 + g) p/(1 + g p).
+
+    ``ratio`` is g, whole = 1 + wall/(1 + g).
+    """
+    whole = 1.0 + wall / (1.0 + ratio)
+    least = -0.999 / ratio  # of an absolute pressure that is none, where phi has no end
+    arm = held = 0.0
+    p, u, q, known, slope = 0.0, 0.0, 0.0, 0.0, (1.0 + wall) / whole
+    for k in range(load.size):
+        last, f = u, load[k] + held
+        p += (f - known) / slope  # moved along with the load
+        for _ in range(STEPS):
+            p = max(p, least)
+            thinner = 1.0 / (1.0 + ratio * p)
+            u = (1.0 + ratio) * p * thinner
+            slope = (1.0 + wall * thinner * thinner) / whole + arm * (1.0 + ratio) * thinner * thinner
+            step = (f - p * (1.0 + wall * thinner) / whole - arm * u) / slope
+            p += step
+            if abs(step) <= CLOSE:
+                break
+        u = (1.0 + ratio) * p / (1.0 + ratio * p)
+        q = decay * q + now * u + before * last if k else u
+        out[k] = p
+        arm, known = share * (1.0 - now), f
+        held = share * (decay * q + before * u)
+
+
+@njit(cache=True)
+def softened(load, strength, width, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi = u (1 - strength tanh((M^2 - u^2)/width)).
+
+    M is the largest phi so far, ``largest`` before the record; it counts less ``dead_zone``.
+    """
+    # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
+    bound = strength / width * (3.0 + 2.0 / width)
+    arm = held = 0.0
+    u, q, known, slope = 0.0, 0.0, 0.0, 1.0
+    for k in range(load.size):
+        last, f = u, load[k] + held
+        virgin = f / (1.0 + arm)
+        most = max(max(largest, virgin) - dead_zone, 0.0)
+        if virgin >= most:
+            u, slope = virgin, 1.0 + arm
+        elif not k or f != known:  # a pause leaves it where it is, to the last digit
+            # It rises with u: Newton from the last output moved along, held in a bracket.
+            low, high = (virgin, most) if f > 0.0 else (f / (1.0 - strength + arm), virgin)
+            u = min(max(u + (f - known) / slope, low), high)
+            for _ in range(STEPS):
+                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most - u * u, 0.0) / width) + 1.0)  # tanh
+                slope = 1.0 - strength * bend + arm
+                off = u * slope - f
+                if bend > 0.0:
+                    slope += 2.0 * strength / width * u * u * (1.0 - bend * bend)
+                u, low, high, step = newton(u, off, slope, low, high)
+                if bound * step * step <= 1e-12:
+                    break
+        largest = max(largest, f - arm * u)
+        q = decay * q + now * u + before * last if k else u
+        out[k] = u + share * (u - q)
+        arm, known = share * (1.0 - now), f
+        held = share * (decay * q + before * u)
