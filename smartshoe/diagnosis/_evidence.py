@@ -28,7 +28,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import cycle
+from itertools import combinations, cycle
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve, cholesky, solve_triangular
@@ -39,7 +39,7 @@ from smartshoe.diagnosis._sensitivity import (
     departures,
     directions,
     nuisance_precision,
-    nuisances,
+    ridged,
 )
 
 Members = tuple[int, ...]
@@ -61,24 +61,35 @@ class Posterior:
     together: float = 0.0
 
 
+@dataclass(eq=False)
+class _Columns:
+    """Columns ``seen`` (n, k) a session, over what is fitted, at their ``places`` among all.
+
+    ``past`` (k, 2) a session: their inner products with its nuisances. ``half`` (p, k): what is taken out of their
+    inner products by all that is there without any effect is its square.
+    """
+
+    seen: Sequence[Array]
+    past: Sequence[Array]
+    places: range
+    half: Array
+
+
 class Evidence:
     """The evidence for sets of candidates of ``given`` under white noise of ``noise_sd``, a share of full scale."""
 
     def __init__(self, given: Linearised, noise_sd: float) -> None:
         self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
         self._seen: dict[tuple[Members, bool], Posterior] = {}
-        self._rows: list[Array] = []
-        self._inner: list[Array] = []
-        self._past: list[Array] = []
-        for session, rows in zip(given.sessions, given.rows, strict=True):
-            seen = session.fitted
-            past = nuisances(session, given.model.relaxation_rate_per_s)[seen] / noise_sd
-            inner = past.T @ past + nuisance_precision(session, given.model, self.thresholds)
-            inner += 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(2)
-            self._rows.append(rows[seen] / noise_sd)
-            self._past.append(past)
-            self._inner.append(inner)
-        self.gram = self._products(self._rows, self._rows)
+        self._inverse = [
+            np.linalg.inv(
+                ridged(products[-2:, -2:] + noise_sd**2 * nuisance_precision(one, given.model, self.thresholds))
+            )
+            for products, one in zip(given.products, given.sessions, strict=True)
+        ]
+        own_past = [products[:-2, -2:] for products in given.products]
+        self._all = _Columns(given.seen, own_past, range(given.scales.size), np.zeros(0))
+        self.gram = self._free(np.sum([one[:-2, :-2] for one in given.products], axis=0), own_past, own_past)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
         raw = given.gram
@@ -96,9 +107,8 @@ class Evidence:
         self._half = self._taken_out(self.gram)
         self._reduced = self.gram - self._half.T @ self._half
         self._nothing = float(self._reduced[0, 0]) + 2.0 * float(np.sum(np.log(np.diag(self._factor))))
-        self._room = [np.asfortranarray(rows) for rows in self._rows]  # grows as departures are asked for
-        self._rows = list(self._room)
-        self._departures: dict[int, int] = {}
+        self._departures: dict[int, _Columns] = {}
+        self._known: set[tuple[int, int]] = set()
         self._directions = directions(self.thresholds)
         effects = {one.name for one in given.candidates}
         self.odds = 2.0 * math.log(len(effects) / self.thresholds.false_name)
@@ -108,51 +118,60 @@ class Evidence:
         inside = self._sds[:, None] * cross[1:]
         return np.asarray(solve_triangular(self._factor, inside, lower=True, check_finite=False))
 
-    def _products(self, left: Sequence[Array], right: Sequence[Array]) -> Array:
-        """Inner products (l, r) with what the recordings' nuisances follow taken out."""
-        total = np.zeros((left[0].shape[1], right[0].shape[1]))
-        for a, b, past, inner in zip(left, right, self._past, self._inner, strict=True):
-            total += a.T @ (b - past @ np.linalg.solve(inner, past.T @ b))
-        return total
+    def _free(self, products: Array, left: Sequence[Array], right: Sequence[Array]) -> Array:
+        """(l, r) inner products, in units of the noise's variance, with what nuisances follow taken out.
+
+        ``left`` (l, 2) and ``right`` (r, 2) a session are the columns' inner products with its nuisances.
+        """
+        parts = zip(left, right, self._inverse, strict=True)
+        return np.asarray((products - sum(a @ inverse @ b.T for a, b, inverse in parts)) / self.noise_sd**2)
+
+    def _between(self, left: _Columns, right: _Columns) -> Array:
+        """The same of two sets of columns."""
+        products = np.asarray(sum(a.T @ b for a, b in zip(left.seen, right.seen, strict=True)))
+        return self._free(products, left.past, right.past)
 
     def visible_rms(self, columns: Sequence[int], strengths: Array) -> float:
         """Rms by which strengths of these columns move the reading beyond what the baseline absorbs."""
         part = self.raw[np.ix_(list(columns), list(columns))]
         return float(np.sqrt(max(float(strengths @ part @ strengths), 0.0)))
 
-    def _departure_of(self, member: int) -> int:
-        """First column of a member's departures, made when they are first asked for."""
-        if member in self._departures:
-            return self._departures[member]
-        given = self.given
-        columns = given.candidates[member].columns
+    def _departures_of(self, members: Members) -> list[range]:
+        """Where the columns of members' departures stand, made when they are first asked for."""
+        for member in members:
+            if member not in self._departures:
+                self._departures[member] = self._departing(member)
+        for pair in combinations(members, 2):
+            if pair not in self._known:
+                self._known.add(pair)
+                one, other = (self._departures[member] for member in pair)
+                found = self._between(one, other) - one.half.T @ other.half
+                self._reduced[np.ix_(one.places, other.places)] = found
+                self._reduced[np.ix_(other.places, one.places)] = found.T
+        return [self._departures[member].places for member in members]
+
+    def _departing(self, member: int) -> _Columns:
+        given, first = self.given, int(self._reduced.shape[0])
+        columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
-        own = slice(1, 1 + given.own)
+        absorbed = self._absorbed[:, columns] @ weights
         signatures = []
-        for session, rows in zip(given.sessions, given.rows, strict=True):
-            signature = rows[:, list(columns)] @ weights - rows[:, own] @ (self._absorbed[:, list(columns)] @ weights)
-            past = nuisances(session, given.model.relaxation_rate_per_s)
-            mask = session.fitted
-            signature = signature - past @ np.linalg.lstsq(past[mask], signature[mask], rcond=None)[0]
-            signatures.append(signature)
-        made = departures(given, signatures)
-        white = [part[s.fitted] / self.noise_sd for part, s in zip(made, given.sessions, strict=True)]
-        first = int(self._reduced.shape[0])
-        cross = self._products(self._rows, white)
-        half = self._taken_out(cross[: self._sds.size + 1])
-        cross -= self._half.T @ half
-        inner = self._products(white, white) - half.T @ half
-        self._reduced = np.block([[self._reduced, cross], [cross.T, inner]])
-        self._half = np.column_stack([self._half, half])
-        for k, part in enumerate(white):
-            if self._room[k].shape[1] < first + part.shape[1]:
-                grown = np.empty((part.shape[0], 2 * self._room[k].shape[1] + part.shape[1]), order="F")
-                grown[:, :first] = self._rows[k]
-                self._room[k] = grown
-            self._room[k][:, first : first + part.shape[1]] = part
-            self._rows[k] = self._room[k][:, : first + part.shape[1]]
-        self._departures[member] = first
-        return first
+        for rows, own, products in zip(given.rows, given.nuisances, given.products, strict=True):
+            visible = rows[:, columns] @ weights - rows[:, 1 : 1 + given.own] @ absorbed
+            known = products[-2:, columns] @ weights - products[-2:, 1 : 1 + given.own] @ absorbed
+            signatures.append(visible - own @ np.linalg.solve(ridged(products[-2:, -2:]), known))
+        seen = [part[one.fitted] for part, one in zip(departures(given, signatures), given.sessions, strict=True)]
+        past = [part.T @ own[one.fitted] for part, own, one in zip(seen, given.nuisances, given.sessions, strict=True)]
+        made = _Columns(seen, past, range(first, first + self._directions), np.zeros(0))
+        cross = self._between(self._all, made)
+        made.half = self._taken_out(cross)
+        reduced = cross - self._half.T @ made.half
+        grown = np.zeros((made.places.stop, made.places.stop))
+        grown[:first, :first] = self._reduced
+        grown[: len(reduced), first:], grown[first:, : len(reduced)] = reduced, reduced.T
+        grown[first:, first:] = self._between(made, made) - made.half.T @ made.half
+        self._reduced = grown
+        return made
 
     def _direction(self, columns: Sequence[int]) -> Array:
         """Of several strengths the direction that the data asks for, of unit length."""
@@ -208,8 +227,7 @@ class Evidence:
         index = [c for m in members for c in self.given.candidates[m].columns]
         sds = [self.thresholds.strength_sd] * len(index)
         if strengths is not None:
-            begun = [self._departure_of(member) for member in members]
-            ways: list[Sequence[int]] = [range(first, first + self._directions) for first in begun]
+            ways: list[Sequence[int]] = [*self._departures_of(members)]
             ways += [self._others_of(member) for member in members] if of_any_law else []
             for way, own in zip(ways, cycle(strengths), strict=False):
                 share = self.thresholds.departure / math.sqrt(len(way) or 1)

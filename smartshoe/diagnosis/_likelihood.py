@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances
+from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel, Trace
@@ -36,8 +36,7 @@ class Likelihood:
         self._inverse: list[Array] = []
         for session in self.sessions:
             past = nuisances(session, like.relaxation_rate_per_s)[session.fitted] / noise_sd
-            inner = past.T @ past + nuisance_precision(session, like, thresholds)
-            inner += 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(2)
+            inner = ridged(past.T @ past + nuisance_precision(session, like, thresholds))
             self._past.append(past)
             self._inverse.append(np.asarray(np.linalg.inv(inner), dtype=np.float64))
 

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy.signal import lfilter
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -121,10 +121,25 @@ class Linearised:
         return Counter(one.name for one in self.candidates)
 
     @cached_property
+    def nuisances(self) -> tuple[Array, ...]:
+        """(n, 2) a session: what is its own."""
+        return tuple(nuisances(session, self.model.relaxation_rate_per_s) for session in self.sessions)
+
+    @cached_property
+    def seen(self) -> tuple[Array, ...]:
+        """``rows`` where they may be fitted."""
+        return tuple(_where(session.fitted, rows) for rows, session in zip(self.rows, self.sessions, strict=True))
+
+    @cached_property
+    def products(self) -> tuple[Array, ...]:
+        """(m + 2, m + 2) a session: inner products over what is fitted, the nuisances' last."""
+        parts = zip(self.seen, self.nuisances, self.sessions, strict=True)
+        return tuple(_products(seen, past[session.fitted]) for seen, past, session in parts)
+
+    @cached_property
     def gram(self) -> Array:
         """(m, m) inner products of the target and all columns, in order, over all sessions; flat nuisances are out."""
-        parts = zip(self.rows, self.sessions, strict=True)
-        return np.asarray(sum(marginal(rows, session, self.model) for rows, session in parts))
+        return np.asarray(sum(_without_last(products) for products in self.products))
 
     @cached_property
     def factors(self) -> tuple[Array, ...]:
@@ -137,10 +152,9 @@ class Linearised:
         part = whole[1:, 1:] + np.diag(np.full(whole.shape[0] - 1, 1e-9 * np.trace(whole[1:, 1:]) / whole.shape[0]))
         found = np.linalg.solve(part, whole[1:, 0])
         left = []
-        for session, rows in zip(self.sessions, self.rows, strict=True):
+        for session, rows, columns in zip(self.sessions, self.rows, self.nuisances, strict=True):
             residual = rows[:, 0] - rows[:, 1:] @ found
             mask = session.fitted
-            columns = nuisances(session, self.model.relaxation_rate_per_s)
             fit = np.linalg.lstsq(columns[mask], residual[mask], rcond=None)[0]
             left.append(residual - columns @ fit)
         masks = [session.fitted for session in self.sessions]
@@ -149,12 +163,29 @@ class Linearised:
 
 def marginal(rows: Array, session: Session, model: ExtendedModel) -> Array:
     """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
-    seen = np.column_stack([rows, nuisances(session, model.relaxation_rate_per_s)])[session.fitted]
-    gram = seen.T @ seen
-    last = gram[-2:, -2:]
-    last += 1e-12 * max(float(np.trace(last)), 1e-12) * np.eye(2)
-    cross = gram[-2:, :-2]
-    return np.asarray(gram[:-2, :-2] - cross.T @ np.linalg.solve(last, cross))
+    past = nuisances(session, model.relaxation_rate_per_s)
+    return _without_last(_products(rows[session.fitted], past[session.fitted]))
+
+
+def _where(mask: Mask, columns: Array) -> Array:
+    """Rows of (n, m) columns, each column in one piece; themselves where none is left out."""
+    return columns if mask.all() else np.asfortranarray(columns.T[:, mask].T)
+
+
+def _products(seen: Array, past: Array) -> Array:
+    cross = seen.T @ past
+    return np.block([[seen.T @ seen, cross], [cross.T, past.T @ past]])
+
+
+def _without_last(products: Array) -> Array:
+    """(m, m) inner products (m + 2, m + 2) with what the last two columns follow taken out."""
+    last, cross = products[-2:, -2:], products[-2:, :-2]
+    return np.asarray(products[:-2, :-2] - cross.T @ np.linalg.solve(ridged(last), cross))
+
+
+def ridged(inner: Array) -> Array:
+    """(k, k) inner products with a trillionth more on the diagonal: columns that are alike can be solved for."""
+    return inner + 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(inner.shape[0])
 
 
 def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Linearised:
@@ -188,7 +219,15 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     scales = np.sqrt(np.asarray(power) / count)
     scales[0] = 1.0
     scales[scales == 0] = 1.0
-    return Linearised(model, fitted, tuple(part / scales for part in rows), scales, 3, tuple(candidates), thresholds)
+    return Linearised(
+        model,
+        fitted,
+        tuple(np.asfortranarray(part / scales) for part in rows),
+        scales,
+        3,
+        tuple(candidates),
+        thresholds,
+    )
 
 
 def _shape_of(effect: Effect, values: Array) -> dict[str, float]:

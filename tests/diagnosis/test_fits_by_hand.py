@@ -227,7 +227,7 @@ def test_departures_are_as_wide_as_their_members_strengths_and_never_nothing() -
     candidates = [SimpleNamespace(columns=(4,)), SimpleNamespace(columns=(5, 6)), SimpleNamespace(columns=(7,))]
     known: Any = SimpleNamespace(
         given=SimpleNamespace(candidates=candidates), thresholds=STANDARD, _directions=9,
-        _departure_of=lambda member: 20 + 9 * member,
+        _departures_of=lambda members: [range(20 + 9 * one, 29 + 9 * one) for one in members],
     )  # fmt: skip
     index, sds = Evidence._widened(known, (0, 1), None)
     assert (list(index), list(sds)) == ([4, 5, 6], [0.03] * 3)
