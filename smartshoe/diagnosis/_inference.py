@@ -94,21 +94,36 @@ def infer(
     lawful = with_laws(state, plain.model, sessions)
     state = state if lawful is state else _settled(lawful, sessions, progress)
     progress("weighing alternatives")
-    found = _judged(state, plain, sessions, screening)
-    while laws := likelier_laws(found.members, state.banned):
+    found = _judged(state, plain, sessions)
+    members = found.members()
+    while laws := likelier_laws(members, state.banned):
         state = with_likelier_laws(state, found.fit.model, laws, sessions)
-        other = _judged(state, plain, sessions, screening)
-        likelihood, odds = state.likelihood(sessions), state.evidence.odds
-        if _score(other.fit.model, likelihood, odds) >= _score(found.fit.model, likelihood, odds):
+        other = _judged(state, plain, sessions)
+        odds = state.evidence.odds
+        if _score(other.fit.model, other.likelihood, odds) >= _score(found.fit.model, other.likelihood, odds):
             break  # a law that follows better in its place led to a set that does not
-        found = other
-    return found
+        found, members = other, other.members()
+    return Inference(plain, found.fit, found.likelihood, members, screening, found.refused, undone=found.undone)
 
 
-def _judged(
-    state: State, plain: Fit, sessions: Sequence[Session], screening: tuple[tuple[str, float], ...]
-) -> Inference:
-    """What of a state's effects predicts what is left out, fitted at last, each weighed against its alternatives."""
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """What of a state's effects predicts what is left out: the set and its ``fit``, and what was taken out of it."""
+
+    evidence: Evidence
+    best: Posterior
+    fit: Fit
+    likelihood: Likelihood
+    refused: tuple[str, ...]
+    undone: tuple[str, ...]
+
+    def members(self) -> tuple[Member, ...]:
+        """Each effect weighed against its alternatives."""
+        return members_of(self.evidence, self.best, self.refused, self.likelihood, self.fit)
+
+
+def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
+    """What of a state's effects predicts what is left out, fitted at last."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     likelihood, most = state.likelihood(sessions), error_of(sessions, plain.model)
     left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
@@ -141,9 +156,8 @@ def _judged(
         # What the baseline itself holds, two clocks, was told before any model.
         own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
         extended, best = plain, evidence.posterior(own)
-    members = members_of(evidence, best, refused, likelihood, extended)
     left = tuple(name for name in undone if name in extended.model.names)
-    return Inference(plain, extended, likelihood, members, screening, tuple(refused), undone=left)
+    return _Judged(evidence, best, extended, likelihood, tuple(refused), left)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

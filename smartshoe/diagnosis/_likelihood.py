@@ -21,6 +21,12 @@ SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 
 
+def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) -> Array:
+    """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`."""
+    reading, slopes = model.sensitivities(session.conditions, trace)
+    return np.column_stack([session.reading - reading, slopes])
+
+
 class Likelihood:
     """What a model's parameters are judged by: ``sessions``, the noise, and nuisances that belong to a session."""
 
@@ -54,13 +60,12 @@ class Likelihood:
             total += float(self._gram(k, (session.reading - reading)[:, None])[0, 0])
         return total
 
-    def normal(self, model: ExtendedModel) -> tuple[float, Array, Array]:
-        """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p)."""
-        known = self._known(model)
-        self._rows = []
-        for k, session in enumerate(self.sessions):
-            reading, slopes = model.sensitivities(session.conditions, None if known is None else known[k])
-            self._rows.append(np.column_stack([session.reading - reading, slopes]))
+    def normal(self, model: ExtendedModel, rows: Sequence[Array] | None = None) -> tuple[float, Array, Array]:
+        """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p); ``rows`` where they are known."""
+        if rows is None:
+            known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
+            rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
+        self._rows = [one.copy() for one in rows]
         return self._products()
 
     def nearly_normal(self, model: ExtendedModel, step: Array) -> tuple[float, Array, Array]:
@@ -105,22 +110,30 @@ class Fit:
         return np.asarray(_inverse(inner) * np.outer(scale, scale))
 
 
-def fit(likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS) -> Fit:
+def within_bounds(model: ExtendedModel) -> ExtendedModel:
+    """``model`` with every parameter within its bounds."""
+    bounds = [(one.lower, one.upper) for _, one in model.parameters]
+    return model.at(np.clip(model.theta, *np.transpose(bounds)))
+
+
+def fit(
+    likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS, rows: Sequence[Array] | None = None
+) -> Fit:
     """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
 
     Shapes have a prior about their start, of one in the logarithm or of their size; weights of flexible blocks have
-    theirs about null.
+    theirs about null. ``rows`` are `rows_of` the start within its bounds, a session each, where they are known.
     """
     owners = start.parameters
     logarithmic = _are_logarithmic(start)
     low, high = np.array([p.lower for _, p in owners]), np.array([p.upper for _, p in owners])
-    model = start.at(np.clip(start.theta, low, high))
+    model = within_bounds(start)
     about, precision = _about(model, logarithmic), _precision(model, logarithmic)
 
     def penalty(theta: Array) -> float:
         return float(np.sum(precision * (_stepped(theta, logarithmic) - about) ** 2))
 
-    cost, right, normal = likelihood.normal(model)
+    cost, right, normal = likelihood.normal(model, rows)
     cost += penalty(model.theta)
     damping, exact, came = 1e-4, True, model.theta
     for taken in range(steps):

@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, within_bounds
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
@@ -30,14 +30,21 @@ class LeftOut:
         self.sessions, self.thresholds = sessions, thresholds
         self._folds = _folds(sessions)
         self._rest = [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in self._folds]
+        self._errors: dict[ExtendedModel, Array] = {}
 
     def errors(self, model: ExtendedModel) -> Array:
-        """(folds,) squared errors of what is left out."""
-        found = []
-        for fold, rest in zip(self._folds, self._rest, strict=True):
-            residual = residual_of(fold.seen, fit(rest, model, FEW_STEPS).model)[fold.left_out]
-            found.append(float(residual @ residual))
-        return np.array(found)
+        """(folds,) squared errors of what is left out; cached."""
+        if model not in self._errors:
+            # All begin at one model, whose slopes they share.
+            start = within_bounds(model)
+            rows = {id(one.conditions): rows_of(start, one) for one in self.sessions if one.fitted.any()}
+            found = []
+            for fold, rest in zip(self._folds, self._rest, strict=True):
+                known = [rows[id(one.conditions)] for one in rest.sessions]
+                residual = residual_of(fold.seen, fit(rest, start, FEW_STEPS, known).model)[fold.left_out]
+                found.append(float(residual @ residual))
+            self._errors[model] = np.array(found)
+        return self._errors[model]
 
     def following(self, found: Fit) -> Fit:
         """``found``, fitted again without the effects without which what is left out is followed better.

@@ -150,8 +150,10 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     def named(name: str) -> Callable[..., Any]:
         return lambda one, *rest: state(f"{name} {one.name}")
 
-    def judged(one: Any, plain: Any, sessions: Any, screening: Any) -> Any:
-        return SimpleNamespace(state=one.name, members=(), fit=SimpleNamespace(model=one.name))
+    def judged(one: Any, plain: Any, sessions: Any) -> Any:
+        return SimpleNamespace(
+            members=lambda: (), fit=SimpleNamespace(model=one.name), likelihood="likelihood", refused=(), undone=()
+        )
 
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
     monkeypatch.setattr(
@@ -179,7 +181,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
-    assert flow.infer().state == "settled first"
+    assert flow.infer().fit.model == "settled first"
     for flow.independent, is_unit, can_validate in ((1, True, False), (2, False, True), (1, False, False)):
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
@@ -189,25 +191,25 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
 
 def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> None:
     flow.stretched = True
-    assert flow.infer().state == "settled (late first or first)"
+    assert flow.infer().fit.model == "settled (late first or first)"
     flow.beyond = True  # from what the search began with
-    assert flow.infer().state == "(settled usual (late first or first) or settled (late first or first))"
+    assert flow.infer().fit.model == "(settled usual (late first or first) or settled (late first or first))"
     assert "beginning anew from arms as units have" in flow.said
     flow.stretched = False
-    assert flow.infer().state == "(settled usual first or settled first)"
+    assert flow.infer().fit.model == "(settled usual first or settled first)"
     flow.beyond = False
     flow.chosen = [SimpleNamespace(effect=effect("dead_band"))]
-    assert flow.infer().state == "settled first"
+    assert flow.infer().fit.model == "settled first"
     flow.chosen.append(SimpleNamespace(effect=effect("linear_leak")))
-    assert flow.infer().state == "(settled pole settled first or settled first)"
+    assert flow.infer().fit.model == "(settled pole settled first or settled first)"
     flow.chosen, flow.share = [], -0.01
-    assert flow.infer().state == "(settled creeping settled first or settled first)"
+    assert flow.infer().fit.model == "(settled creeping settled first or settled first)"
     flow.share = 0.0
-    assert flow.infer().state == "settled first"
+    assert flow.infer().fit.model == "settled first"
     flow.lawful = SimpleNamespace(name="lawful", banned=())
-    assert flow.infer().state == "settled lawful"
+    assert flow.infer().fit.model == "settled lawful"
     flow.lawful, flow.laws = None, [{"a": "b"}, {"c": "d"}]
-    assert flow.infer().state == "law law settled first"
+    assert flow.infer().fit.model == "law law settled first"
 
 
 def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(flow: Any) -> None:
@@ -215,7 +217,7 @@ def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(
     for last, kept, left in ((-19.001, "law law settled first", 0), (-18.0, "law settled first", 1)):
         flow.laws, flow.scores = list(laws), {"law settled first": -18.0, "law law settled first": last}
         flow.scores["law law law settled first"] = 0.0
-        assert flow.infer().state == kept
+        assert flow.infer().fit.model == kept
         assert len(flow.laws) == left  # nothing is tried beyond it
 
 
@@ -274,11 +276,11 @@ class _Judge:
             given=self.evidence.given, evidence=self.evidence, best=best, thresholds=STANDARD,
             fit=SimpleNamespace(model=self.start), likelihood=lambda sessions: "likelihood",
         )  # fmt: skip
-        return _judged(state, self.plain, [], ())
+        return _judged(state, self.plain, [])
 
     def judged(self) -> tuple[Any, Any, Any]:
         found = self.inference()
-        return found.fit, found.members, found.refused
+        return found.fit, found.members(), found.refused
 
 
 def test_what_does_not_follow_what_is_left_out_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

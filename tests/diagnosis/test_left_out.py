@@ -148,10 +148,10 @@ def test_of_two_that_fail_that_one_goes_first_without_which_the_error_is_least(m
     assert without["delay"] < without["gas_compression"]
     fitted: list[tuple[str, ...]] = []
 
-    def kept(likelihood: Likelihood, start: ExtendedModel, steps: int = 25) -> Fit:
+    def kept(likelihood: Likelihood, start: ExtendedModel, steps: int = 25, *known: list[Array]) -> Fit:
         if steps > FEW_STEPS:
             fitted.append(start.names)
-        return fit(likelihood, start, steps)
+        return fit(likelihood, start, steps, *known)
 
     monkeypatch.setattr(_validation, "fit", kept)
     impossible.following(fit(Likelihood(sessions, SD, MODEL, STANDARD), model))

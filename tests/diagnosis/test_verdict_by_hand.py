@@ -255,7 +255,7 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
         given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
         fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda sessions: "likelihood",
     )  # fmt: skip
-    found: Any = _judged(state, SimpleNamespace(model=model()), [], ())  # type: ignore[arg-type]
+    found: Any = _judged(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
     assert found.fit.model.names == names
     gone = () if len(names) > 1 else ("b",)
-    assert (found.members, found.refused) == ((tuple(range(len(names))), gone), gone)
+    assert (found.members(), found.refused) == ((tuple(range(len(names))), gone), gone)
