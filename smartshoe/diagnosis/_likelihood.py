@@ -65,7 +65,7 @@ class Likelihood:
         if rows is None:
             known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
             rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
-        self._rows = [one.copy() for one in rows]
+        self._rows = [one.copy(order="K") for one in rows]  # they are brought up to date in place
         return self._products()
 
     def nearly_normal(self, model: ExtendedModel, step: Array) -> tuple[float, Array, Array]:
