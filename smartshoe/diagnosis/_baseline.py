@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
-from smartshoe.arrays import Array
+from smartshoe.diagnosis._sensitivity import lagged, marginal
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
@@ -30,11 +29,9 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     for pole in POLES_PER_S:
         gram = np.zeros((3, 3))
         for session in fitted:
-            load, step_s, time_s = session.conditions.load, session.conditions.step_s, session.conditions.time_s
-            rows = np.column_stack([session.reading, load, lagged(load, step_s, 1.0 / float(pole))])
-            past = np.column_stack([np.ones(time_s.size), np.exp(-float(pole) * time_s)])
-            seen, own = rows[session.fitted], past[session.fitted]
-            gram += seen.T @ (seen - own @ np.linalg.lstsq(own, seen, rcond=1e-10)[0])
+            load = session.conditions.load
+            slow_load = lagged(load, session.conditions.step_s, 1.0 / float(pole))
+            gram += marginal(np.column_stack([session.reading, load, slow_load]), session, float(pole))
         part = gram[1:, 1:] + 1e-9 * np.trace(gram[1:, 1:]) * np.eye(2)
         fast, slow = np.linalg.solve(part, gram[1:, 0])
         # reading = fast f + slow lag(f) = gain (s + a) / ((1 + kappa) s + a) f with a = pole (1 + kappa)
@@ -59,12 +56,6 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
 def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
     """``model`` with an arm as units have, from which a fit begins where its own is bent."""
     return replace(model, relaxing_share=USUAL.relaxing_share, relaxation_rate_per_s=USUAL.relaxation_rate_per_s)
-
-
-def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
-    """``signal`` (n,) through a first-order lag, started in steady state."""
-    keep = float(np.exp(-step_s / tau_s))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=np.array([keep * signal[0]]))[0])
 
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:

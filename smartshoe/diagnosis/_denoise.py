@@ -41,38 +41,31 @@ def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds)
     # Within which an echo lies; where corners are near, a half and a quarter of it.
     for share in (1.0, 0.5, 0.25):
         half = max(round(share * thresholds.echo_s / step_s), least // 2)
-        for first in (-half, -2 * half, 0):
-            value, left, leverage = _line(squares, first, first + 2 * half)
-            n = 2 * half + 1
-            fits = left <= sd**2 * (1.0 + unlikely * np.sqrt(2.0 / (n - 2)))
-            better = fits & (leverage < variance)
-            best[better] = value[better] + load.mean()
-            variance[better] = leverage
+        n = 2 * half + 1
+        if n > load.size:
+            continue
+        mean, slope, left, spread = _lines(squares, half)
+        fits = left <= sd**2 * (1.0 + unlikely * np.sqrt(2.0 / (n - 2)))
+        for place in (half, 2 * half, 0):  # of the sample within its neighbourhood
+            away = place - half
+            leverage = 1.0 / n + away**2 / spread
+            here = slice(place, place + fits.size)
+            better = fits & (leverage < variance[here])
+            best[here][better] = (mean + slope * away)[better] + load.mean()
+            variance[here][better] = leverage
     return best, sd * float(np.sqrt(variance.mean()))
 
 
-def _line(signal: Array, first: int, last: int) -> tuple[Array, Array, float]:
-    """Least squares line through the neighbours ``first`` to ``last`` of each sample.
+def _lines(signal: Array, half: int) -> tuple[Array, Array, Array, float]:
+    """Least squares lines through every 2 ``half`` + 1 neighbours of a signal (n,).
 
-    Its value there (n,), residual variance (n,), infinite where neighbours lack, and the value's share of the noise's
-    variance.
+    Mean, slope and residual variance, (n - 2 half,) each; and the places' sum of squares about their middle.
     """
-    k = np.arange(first, last + 1, dtype=float)
-    n = k.size
-    centre = k.mean()
-    spread = float(np.sum((k - centre) ** 2))
-    size = signal.size
-    value, left = np.zeros(size), np.full(size, np.inf)
-    low, high = max(0, -first), min(size, size - last)
-    if high <= low:
-        return value, left, 1.0
-    windows = np.ones(n)
-    total = np.convolve(signal, windows, "valid")
-    tilt = np.convolve(signal, (k - centre)[::-1], "valid")
+    k = np.arange(-half, half + 1, dtype=float)
+    spread = float(np.sum(k**2))
+    windows = np.ones(k.size)
+    mean = np.convolve(signal, windows, "valid") / k.size
+    slope = np.convolve(signal, k[::-1], "valid") / spread
     power = np.convolve(signal**2, windows, "valid")
-    start = low + first
-    inside = slice(start, start + high - low)
-    mean, slope = total[inside] / n, tilt[inside] / spread
-    value[low:high] = mean - slope * centre
-    left[low:high] = np.maximum(power[inside] - n * mean**2 - spread * slope**2, 0.0) / (n - 2)
-    return value, left, 1.0 / n + centre**2 / spread
+    left = np.maximum(power - k.size * mean**2 - spread * slope**2, 0.0) / (k.size - 2)
+    return mean, slope, left, spread

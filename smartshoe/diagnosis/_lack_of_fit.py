@@ -165,18 +165,28 @@ def _mean_variance(centred: Array, step_s: float, thresholds: Thresholds) -> flo
     width = centred.shape[1]
     lags = np.arange(width // 2)
     rows = centred[_quiet(centred)]
-    found = np.array([float(np.mean(rows[:, k:] * rows[:, : width - k])) for k in lags])
-    place = np.arange(width)
-    centring = np.eye(width) - 1.0 / width
-    white = np.array([float(np.mean(np.diag(centring, int(k)))) for k in lags])
+    power = np.sum(np.abs(np.fft.rfft(rows, 2 * width, axis=1)) ** 2, axis=0)
+    found = np.fft.irfft(power, 2 * width)[lags] / (rows.shape[0] * (width - lags))
+    white, of_mean = _centred(np.eye(1, width)[0])
     best: tuple[float, float] | None = None
     # A few of the slowest go into a block: what is slower counts as structure.
     for tau_s in np.geomspace(thresholds.echo_s, thresholds.lasting_s / thresholds.few, COLOURS):
-        covariance = np.exp(-np.abs(place[:, None] - place) * (step_s / tau_s))
-        changed = centring @ covariance @ centring
-        coloured = np.array([float(np.mean(np.diag(changed, int(k)))) for k in lags])
+        coloured, slow_of_mean = _centred(np.exp(-np.arange(width) * (step_s / tau_s)))
         (w, c), off = nnls(np.column_stack([white, coloured]), found)
-        variance = w / width + c * float(covariance.mean())
         if best is None or off < best[0]:
-            best = off, variance
+            best = off, w * of_mean + c * slow_of_mean
     return best[1] if best else 0.0
+
+
+def _centred(covariance: Array) -> tuple[Array, float]:
+    """Of noise with the ``covariance`` (w,) at each lag: that of a block of w less its mean, and the mean's variance.
+
+    The former (w // 2,), averaged over the block's places: each place's with the mean is taken out twice, and the
+    mean's variance put back.
+    """
+    width = covariance.size
+    lags = np.arange(width // 2)
+    sums = np.cumsum(covariance)
+    with_mean = (sums + sums[::-1] - covariance[0]) / width
+    of_mean = float(with_mean.mean())
+    return covariance[lags] - 2.0 * np.cumsum(with_mean)[width - 1 - lags] / (width - lags) + of_mean, of_mean

@@ -161,10 +161,9 @@ class Linearised:
         return correlated_sd(left, masks)
 
 
-def marginal(rows: Array, session: Session, model: ExtendedModel) -> Array:
+def marginal(rows: Array, session: Session, rate_per_s: float) -> Array:
     """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
-    past = nuisances(session, model.relaxation_rate_per_s)
-    return _without_last(_products(rows[session.fitted], past[session.fitted]))
+    return _without_last(_products(rows[session.fitted], nuisances(session, rate_per_s)[session.fitted]))
 
 
 def _where(mask: Mask, columns: Array) -> Array:
@@ -248,7 +247,7 @@ def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
     """
     out = []
     for session, factors, own in zip(given.sessions, given.factors, column, strict=True):
-        lags = [_lag(own, session.conditions.step_s, tau_s) - own for tau_s in given.thresholds.memory_s]
+        lags = [lagged(own, session.conditions.step_s, tau_s) - own for tau_s in given.thresholds.memory_s]
         out.append(np.column_stack([own[:, None] * factors, *lags]))
     power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(out, given.sessions, strict=True))
     size = sum(float(np.sum(own[s.fitted] ** 2)) for own, s in zip(column, given.sessions, strict=True))
@@ -267,7 +266,7 @@ def _factors(session: Session, thresholds: Thresholds) -> Array:
     return np.column_stack([linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5])
 
 
-def _lag(signal: Array, step_s: float, tau_s: float) -> Array:
+def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
+    """``signal`` (n,) through a first-order lag, started in steady state."""
     keep = float(np.exp(-step_s / tau_s))
-    start = np.array([keep * signal[0]])
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=start)[0])
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=np.array([keep * signal[0]]))[0])

@@ -12,17 +12,17 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, lagged, with_usual_arm
+from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, with_usual_arm
 from smartshoe.diagnosis._held_out import Errors, _percent, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
     _factors,
-    _lag,
     available,
     departures,
     directions,
+    lagged,
     linearised,
     marginal,
     nuisance_precision,
@@ -146,7 +146,6 @@ def test_a_lag_is_that_of_its_recursion() -> None:
     seen = [signal[0]]
     for value in signal[1:]:
         seen.append(keep * seen[-1] + (1.0 - keep) * value)
-    assert _lag(signal, 0.1, 0.7) == pytest.approx(seen)
     assert lagged(signal, 0.1, 0.7) == pytest.approx(seen)
 
 
@@ -164,7 +163,7 @@ def test_departures_are_factors_and_lags_of_the_signatures_own_rms() -> None:
             if column < 6:
                 parts.append(one * _factors(session, STANDARD)[:, column])
             else:
-                parts.append(_lag(one, STEP_S, STANDARD.memory_s[column - 6]) - one)
+                parts.append(lagged(one, STEP_S, STANDARD.memory_s[column - 6]) - one)
         power = sum(float(np.sum(one[s.fitted] ** 2)) for one, s in zip(parts, sessions, strict=True))
         for made, part in zip(found, parts, strict=True):
             assert made[:, column] == pytest.approx(part * math.sqrt(size / power))
@@ -180,11 +179,11 @@ def test_inner_products_are_of_what_the_nuisances_leave() -> None:
     past = _past(session, 0.3)[session.fitted]
     seen = rows[session.fitted]
     left = seen - past @ np.linalg.lstsq(past, seen, rcond=None)[0]
-    assert marginal(rows, session, MODEL) == pytest.approx(left.T @ left, rel=1e-7, abs=1e-7)
+    assert marginal(rows, session, MODEL.relaxation_rate_per_s) == pytest.approx(left.T @ left, rel=1e-7, abs=1e-7)
     # A past that never fades is no other than an offset.
     about = seen - seen.mean(axis=0)
     ever = replace(MODEL, relaxation_rate_per_s=0.0)
-    assert marginal(rows, session, ever) == pytest.approx(about.T @ about, rel=1e-6, abs=1e-6)
+    assert marginal(rows, session, ever.relaxation_rate_per_s) == pytest.approx(about.T @ about, rel=1e-6, abs=1e-6)
 
 
 def test_what_no_column_reaches_is_the_noise() -> None:
@@ -205,8 +204,8 @@ def test_what_no_column_reaches_is_the_noise() -> None:
         left.append(row[:, 0] - row[:, 1:] @ found[:2] - _past(one, 0.3) @ found[2 + 2 * k : 4 + 2 * k])
     expected = correlated_sd(left, [one.fitted for one in sessions])
     assert given.noise_sd() == pytest.approx(expected, rel=1e-6)
-    assert given.gram[0, 0] == pytest.approx(sum(marginal(r, s, MODEL)[0, 0] for r, s in zip(rows, sessions,
-                                                                                            strict=True)))  # fmt: skip
+    parts = [marginal(r, one, MODEL.relaxation_rate_per_s) for r, one in zip(rows, sessions, strict=True)]
+    assert given.gram[0, 0] == pytest.approx(sum(part[0, 0] for part in parts))
 
 
 @pytest.mark.parametrize(("share", "begun"), [(0.2, 0.5), (0.2, 0.01), (-0.2, -0.5), (0.0, 1.0)])
@@ -273,7 +272,7 @@ def _slow_baseline(sessions: list[Any]) -> tuple[float, float, float]:
         for one in (one for one in sessions if one.fitted.any()):
             load = one.conditions.load
             kept = one.fitted
-            seen = np.column_stack([one.reading, load, _lag(load, STEP_S, 1.0 / pole)])[kept]
+            seen = np.column_stack([one.reading, load, lagged(load, STEP_S, 1.0 / pole)])[kept]
             past = _past(one, pole)[kept]
             rows.append(seen - past @ np.linalg.lstsq(past, seen, rcond=1e-10)[0])
         whole = np.concatenate(rows)
@@ -305,7 +304,7 @@ def test_a_share_beyond_what_a_wall_can_have_is_held_at_its_bound(fast: float, s
     sessions = _sessions(MODEL)
     for one in sessions:
         load = one.conditions.load
-        one.reading = fast * load + slow * _lag(load, STEP_S, 1.0 / 0.5)
+        one.reading = fast * load + slow * lagged(load, STEP_S, 1.0 / 0.5)
     found = baseline_of(sessions, SCALE)
     told = found.gain, found.relaxing_share, found.relaxation_rate_per_s
     assert -0.9 <= found.relaxing_share <= 5.0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from test_diagnosis_parts import recording, sessions_of
 
 from smartshoe.diagnosis._experiments import EXPERIMENTS, multisine, shuffled_loads
-from smartshoe.diagnosis._sensitivity import _lag, marginal, nuisances
+from smartshoe.diagnosis._sensitivity import lagged, marginal, nuisances
 from smartshoe.models.extended import ExtendedModel
 
 UNIT = ExtendedModel(1.0, 0.3, 0.25, 800.0, 140.0, "mbar", (), 1.5)
@@ -57,7 +57,7 @@ def test_the_nuisances_are_projected_out() -> None:
     beside = nuisances(session, UNIT.relaxation_rate_per_s)[session.fitted]
     seen = rows[session.fitted]
     left = seen - beside @ np.linalg.lstsq(beside, seen, rcond=None)[0]
-    assert marginal(rows, session, UNIT) == pytest.approx(left.T @ left, rel=1e-6, abs=1e-6)
+    assert marginal(rows, session, UNIT.relaxation_rate_per_s) == pytest.approx(left.T @ left, rel=1e-6, abs=1e-6)
 
 
 def test_the_memory_from_before_the_recording_fades_from_its_first_sample() -> None:
@@ -73,7 +73,7 @@ def test_the_memory_from_before_the_recording_fades_from_its_first_sample() -> N
 def test_a_lag_holds_a_hold_and_follows_a_ramp_late_by_its_time(tau_s: float, level: float, slope: float) -> None:
     step_s = 0.01
     time_s = np.arange(0.0, 30.0 * tau_s, step_s)
-    assert _lag(np.full(50, level), step_s, tau_s) == pytest.approx(np.full(50, level), abs=1e-12)
-    late = slope * time_s - _lag(slope * time_s, step_s, tau_s)
+    assert lagged(np.full(50, level), step_s, tau_s) == pytest.approx(np.full(50, level), abs=1e-12)
+    late = slope * time_s - lagged(slope * time_s, step_s, tau_s)
     # Of a sampled lag: step/(e^(step/tau) - 1) for the time constant.
     assert late[-1] == pytest.approx(slope * step_s / np.expm1(step_s / tau_s), rel=1e-6, abs=1e-9)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import aligned
-from smartshoe.diagnosis._baseline import baseline_of, lagged
+from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
+from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
 from smartshoe.models.core import USUAL_WALL_RATIO
