@@ -174,7 +174,7 @@ def _variances(columns: Array, variance: Array, used: list[int]) -> Array:
         active = list(used)
         while True:
             left = columns[:, active] * weight[:, None]
-            solution = np.linalg.lstsq(left, variance * weight, rcond=None)[0]
+            solution = np.linalg.lstsq(left.T @ left, left.T @ (variance * weight), rcond=None)[0]
             negative = [column for column, value in zip(active, solution, strict=True) if value < 0.0 and column]
             if not negative:
                 break
