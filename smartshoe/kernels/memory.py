@@ -290,20 +290,34 @@ def cycles_done(load, least, state, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def conditioned_undone(signal, strength, per_cycle, least, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 + strength (1 - exp(-n per_cycle))) = ``signal`` (n,), n the cycles of out.
+def conditioned_undone(signal, strength, per_cycle, by_way, least, width, rounds, settled, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out (1 + strength (1 - exp(-n per_cycle))) = ``signal`` (n,), n = (1 - by_way) N + by_way L/2.
 
-    ``state`` (3,) as in `cycles_done`.
+    N are the cycles of out, as in `cycles_done`, L is the way of its play of ``width``. Each sample is sought in at
+    most ``rounds``, until one moves it by no more than ``settled``. ``state`` (5,): N, trough and peak of the cycle,
+    the play (each NO_LOAD before the first sample), L/2.
     """
-    trough, peak, count = state
+    count, trough, peak, place, gone = state
     for k in range(signal.size):
-        f = signal[k] / (1.0 - strength * math.expm1(-count * per_cycle))
-        ended, trough, peak = _cycle_step(f, least, trough, peak)
-        if ended:
+        f, ended, moved, z = signal[k], False, gone, place
+        for _ in range(2):  # again where a cycle ends with it
+            for _ in range(rounds):
+                guess = f
+                z = f if place >= NO_LOAD else min(max(place, f - width), f + width)
+                moved = gone if place >= NO_LOAD else gone + 0.5 * abs(z - place)
+                done = (1.0 - by_way) * count + by_way * moved
+                f = signal[k] / (1.0 - strength * math.expm1(-done * per_cycle))
+                if abs(f - guess) <= settled:
+                    break
+            if ended:
+                break
+            ended, trough, peak = _cycle_step(f, least, trough, peak)
+            if not ended:
+                break
             count += 1.0
-            f = signal[k] / (1.0 - strength * math.expm1(-count * per_cycle))
+        place, gone = z, moved
         out[k] = f
-    state[0], state[1], state[2] = trough, peak, count
+    state[0], state[1], state[2], state[3], state[4] = count, trough, peak, place, gone
 
 
 @njit(cache=True)

@@ -33,6 +33,7 @@ from smartshoe.diagnosis._session import (
 )
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Conditions
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE
 from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
@@ -233,9 +234,13 @@ def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
     load = course((10, 0.0), (20, 0.9), (20, -0.1), (20, 0.5), (20, 0.0))
     dose = sum(0.5 * STEP_S * (max(a, 0.0) + max(b, 0.0)) for a, b in itertools.pairwise(load))
     first = _left_behind(_conditions(load), STANDARD)
+    way = 0.5 * float(np.sum(np.abs(np.diff(load))))
+    # A reversal shows in full but for twice the play's half width, which is no noise.
+    assert first.pop("way") == pytest.approx(way, abs=4 * LEAST_DEAD_ZONE)
     assert first == pytest.approx({"largest_load": 0.9, "cycles": 2.0, "time_s": 90 * STEP_S, "dose": dose})
-    before = {"largest_load": 0.95, "cycles": 7.0, "time_s": 30.0, "dose": 4.0}
+    before = {"largest_load": 0.95, "cycles": 7.0, "way": 3.0, "time_s": 30.0, "dose": 4.0}
     later = _left_behind(_conditions(load, before=before), STANDARD)
+    assert later.pop("way") == pytest.approx(3.0 + way, abs=4 * LEAST_DEAD_ZONE)
     expected = {"largest_load": 0.95, "cycles": 9.0, "time_s": 30.0 + 90 * STEP_S, "dose": 4.0 + dose}
     assert later == pytest.approx(expected)
     lower = _left_behind(_conditions(load, before={**before, "largest_load": 0.3}), STANDARD)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._wall_memory import dead_zone
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, dead_zone
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import Conditions
 
@@ -22,7 +22,7 @@ MEMORIES = (
     *LOOPS,
     ("load_unload_asymmetry", np.array([0.02, 0.005])),
     ("mullins_softening", np.array([0.03, 0.3])),
-    ("cycle_conditioning", np.array([0.03, 3.0])),
+    ("cycle_conditioning", np.array([0.03, 3.0, 0.0])),
 )
 turning_points = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=8)
 
@@ -174,7 +174,7 @@ def test_softened_rubber_bears_the_load_to_the_last_digit(
 
 
 def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not() -> None:
-    values = np.array([0.1, 2.0])
+    values = np.array([0.1, 2.0, 0.0])
     load = between([0.3, 0.0, 1.0, 0.0, 0.5, 0.49, 0.5, 0.0, 0.2, 0.0, 0.03, 0.0, 0.5], 137)
     out = run("cycle_conditioning", values, load)
     assert out[-1] / load[-1] == pytest.approx(1.0 + 0.1 * -np.expm1(-4.0 / 2.0), rel=1e-12)
@@ -184,22 +184,34 @@ def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not()
     ("name", "values", "key"),
     [
         ("mullins_softening", np.array([0.05, 0.3]), "largest_load"),
-        ("cycle_conditioning", np.array([0.05, 3.0]), "cycles"),
+        ("cycle_conditioning", np.array([0.05, 3.0, 0.0]), "cycles"),
+        ("cycle_conditioning", np.array([0.05, 3.0, 1.0]), "way"),
         ("permanent_set", np.array([1e-3, 1.0]), "dose"),
     ],
 )
 def test_a_recording_that_continues_another_begins_where_it_ended(name: str, values: Array, key: str) -> None:
     first, second = between([0.8, 0.0, 0.6, 0.0]), between([0.5, 0.0, 1.0])
     whole = run(name, values, np.concatenate([first, second[1:]]))
-    left_behind = {"largest_load": 0.8, "cycles": 2.0, "dose": float(np.trapezoid(first, dx=STEP_S))}
+    way = 1.4 - 4 * LEAST_DEAD_ZONE  # what a play of that half width lets through: less after each reversal
+    left_behind = {"largest_load": 0.8, "cycles": 2.0, "way": way, "dose": float(np.trapezoid(first, dx=STEP_S))}
     continued = run(name, values, second, **{key: left_behind[key]})
     assert np.max(np.abs(continued[1:] - whole[first.size :])) <= 1e-12
+
+
+def test_by_the_way_a_gain_settles_within_a_cycle_and_keeps_still_in_holds() -> None:
+    load = between([0.8, 0.8, 0.2, 0.2, 1.0])
+    gained = run("cycle_conditioning", np.array([0.1, 2.0, 1.0]), load)[1:] / load[1:] - 1.0
+    way = 0.5 * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(load)))])[1:]
+    assert np.max(np.abs(gained - 0.1 * -np.expm1(-way / 2.0))) < 0.1 / 2.0 * 3 * LEAST_DEAD_ZONE
+    still = np.diff(load[1:]) == 0.0
+    assert still.any()
+    assert np.all(np.diff(gained)[still] == 0.0)
 
 
 @pytest.mark.parametrize(("height", "counted"), [(0.085, True), (0.075, False)])
 def test_a_cycle_counts_from_eight_percent_of_full_scale_on(height: float, counted: bool) -> None:
     load = between([height, 0.0, height, 0.0, 0.5], 50)
-    gain = run("cycle_conditioning", np.array([0.1, 2.0]), load)[-1] / load[-1]
+    gain = run("cycle_conditioning", np.array([0.1, 2.0, 0.0]), load)[-1] / load[-1]
     assert gain == pytest.approx(1.0 + 0.1 * -np.expm1(-2.0 / 2.0) if counted else 1.0, rel=1e-12)
 
 

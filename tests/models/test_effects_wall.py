@@ -137,7 +137,7 @@ def test_derivatives_do_not_depend_on_the_step_of_the_difference(name: str, seed
     made = effect(name)
     values, given_ = drawn(made, seed), conditions(corners(seed))
     for k, parameter in enumerate(made.parameters):
-        width = 1e-3 * (abs(values[k]) if parameter.null is None else parameter.size)
+        width = 1e-3 * (parameter.size if parameter.null is not None else abs(values[k]) or parameter.size)
         slopes = []
         for h in (width, 0.25 * width):
             up, down = values.copy(), values.copy()

@@ -1,4 +1,4 @@
-"""A gain that settles over load cycles, not over time."""
+"""A gain that settles over load cycles, or with the way that the load goes, not over time."""
 
 from __future__ import annotations
 
@@ -8,15 +8,22 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import NO_LOAD, Undone, cleaned_load
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
+MOST_ROUNDS = 60  # of a contraction that halves what is off
+SETTLED = 1e-15  # of full scale
+MEMBERS = ("count", "trough", "peak", "place", "gone")
 
 
 class CycleConditioning(Effect):
-    """f (1 + m (1 - exp(-n/n0))), n the cycles of 8 % of full scale and more that are over."""
+    """f (1 + m (1 - exp(-n/n0))), n = (1 - w) N + w L/2.
+
+    N are the cycles of 8 % of full scale and more that are over (shakedown by counting), L is the way that the load has
+    gone up and down, in full scales (endochronic, Valanis 1971): one cycle to full scale is one of either.
+    """
 
     name, family, stage, place = "cycle_conditioning", "softening", "wall", "wall"
     says = "the gain settles from cycle to cycle and keeps still in pauses"
@@ -25,8 +32,10 @@ class CycleConditioning(Effect):
         EffectParameter(
             "cycles", "1", "n0: cycles after which 63 % of it are there", None, 0.5, 50.0, 2.0, kind_ends="both"
         ),
-    )
-    shapes = tuple({"cycles": cycles} for cycles in (1.0, 4.0, 16.0))
+        EffectParameter("by_way", "1", "w: share that goes by the load's way, not by cycles", None, 0.0, 1.0, 0.5,
+                        absent=0.0),
+    )  # fmt: skip
+    shapes = tuple({"cycles": cycles, "by_way": by_way} for cycles in (1.0, 4.0, 16.0) for by_way in (0.0, 1.0))
     exposed_by = by("repeats", "pauses")
     separated_by = {
         "gain_drift": by("pauses", "temperature"),
@@ -36,30 +45,43 @@ class CycleConditioning(Effect):
     departs_with = frozenset({"memory", "time"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The load with the gain so far; ``before["cycles"]`` counts along."""
+        """The load with the gain so far; ``before["cycles"]`` and ``before["way"]`` count along."""
         if values[0] == 0.0:
             return signal.copy()
-        done = conditions.cache.get("cycles_done")
-        if done is None:
-            from smartshoe.kernels.memory import cycles_done
-
-            done = conditions.cache["cycles_done"] = np.empty(signal.size)
-            start = np.array([NO_LOAD, NO_LOAD, float(conditions.before.get("cycles", 0.0))])
-            cycles_done(cleaned_load(conditions), LEAST_HEIGHT, start, done)
-        return signal * (1.0 - float(values[0]) * np.expm1(done * (-1.0 / float(values[1]))))
+        gained, cycles, by_way = (float(value) for value in values)
+        done, gone = _done(conditions)
+        count = done + by_way * (gone - done)
+        return signal * (1.0 - gained * np.expm1(count * (-1.0 / cycles)))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Divide by the gain so far, counting the cycles of what comes out; exact but for the count's threshold."""
+        """Divide by the gain so far, counting cycles and way of what comes out; exact but for what counts as noise."""
         from smartshoe.kernels.memory import CYCLE_ENDS, conditioned_undone
 
-        gained, per_cycle = float(values[0]), 1.0 / float(values[1])
+        gained, per_cycle, by_way = float(values[0]), 1.0 / float(values[1]), float(values[2])
+        width = LEAST_DEAD_ZONE
 
         def body(of: Mapping[str, str]) -> str:
-            count, trough, peak = of["count"], of["trough"], of["peak"]
-            gain = f"(1.0 - {c_number(gained)} * expm1(-{count} * {c_number(per_cycle)}))"
+            count, trough, peak, place, gone = (of[name] for name in MEMBERS)
+            n = f"({c_number(1.0 - by_way)} * {count} + {c_number(by_way)} * moved)"
+            seek = f"""for (k = 0; k < {MOST_ROUNDS}; k++) {{
+        const double guess = x;
+        if ({place} >= {NO_LOAD}) {{
+            z = x;
+        }} else {{
+            z = {place} < x - {c_number(width)} ? x - {c_number(width)} : {place};
+            z = z > x + {c_number(width)} ? x + {c_number(width)} : z;
+            moved = {gone} + 0.5 * fabs(z - {place});
+        }}
+        x = given / (1.0 - {c_number(gained)} * expm1(-{n} * {c_number(per_cycle)}));
+        if (fabs(x - guess) <= {c_number(SETTLED)}) {{
+            break;
+        }}
+    }}"""
             return f"""{{
     const double given = x;
-    x = given / {gain};
+    double moved = {gone}, z = x;
+    int k;
+    {seek}
     if ({trough} >= {NO_LOAD}) {{
         {trough} = x;
         {peak} = x;
@@ -73,11 +95,27 @@ class CycleConditioning(Effect):
             {trough} = x;
             {peak} = x;
             {count} += 1.0;
-            x = given / {gain};
+            {seek}
         }}
     }}
+    {place} = z;
+    {gone} = moved;
 }}"""
 
-        start = np.array([NO_LOAD, NO_LOAD, 0.0])
-        constants = (gained, per_cycle, LEAST_HEIGHT)
-        return Undone(conditioned_undone, constants, start, ("trough", "peak", "count"), body)
+        start = np.array([0.0, NO_LOAD, NO_LOAD, NO_LOAD, 0.0])
+        constants = (gained, per_cycle, by_way, LEAST_HEIGHT, width, MOST_ROUNDS, SETTLED)
+        return Undone(conditioned_undone, constants, start, MEMBERS, body)
+
+
+def _done(conditions: Conditions) -> tuple[Array, Array]:
+    """Cycles that are over (n,) and half the way of the load (n,), neither by its noise; computed once."""
+    done, gone = conditions.cache.get("cycles_done"), conditions.cache.get("half_way")
+    if done is None or gone is None:
+        from smartshoe.kernels.memory import cycles_done
+
+        load, before = cleaned_load(conditions), conditions.before
+        done, counted = np.empty(load.size), float(before.get("cycles", 0.0))
+        cycles_done(load, LEAST_HEIGHT, np.array([NO_LOAD, NO_LOAD, counted]), done)
+        gone = float(before.get("way", counted)) + 0.5 * np.cumsum(np.abs(np.diff(load, prepend=load[0])))
+        conditions.cache["cycles_done"], conditions.cache["half_way"] = done, gone
+    return done, gone
