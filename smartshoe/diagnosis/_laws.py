@@ -12,7 +12,7 @@ from smartshoe.diagnosis._state import State, state_at
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
 
-SIZES = (0.5, 5.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
+SIZES = (0.5, 5.0, 20.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
 
 
 def with_laws(given: State, plain: ExtendedModel, sessions: Sequence[Session]) -> State:
@@ -102,6 +102,6 @@ def _is_stretched(model: ExtendedModel, law: Effect) -> bool:
     """Whether a shape of a law lies at a bound: beyond it the equation means something else."""
     last = model.part(law.name)
     return any(
-        parameter.null is None and parameter.is_at_bound(float(value))
+        parameter.null is None and parameter.is_stretched(float(value))
         for parameter, value in zip(last.effect.parameters, last.values, strict=True)
     )

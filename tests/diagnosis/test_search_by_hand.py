@@ -147,7 +147,7 @@ def test_new_effects_begin_on_the_best_part_of_the_way() -> None:
     ]
     given: Any = SimpleNamespace(candidates=candidates, scales=np.array([1.0, 2.0, 4.0, 5.0, 10.0]))
     found = Posterior((0, 1), 0.0, (np.array([0.2, 0.4, 0.5]), np.array([3.0])), (), ())
-    model = MODEL.with_part(two, np.array([0.07])).with_part("dead_band", np.array([0.05, 0.2]))
+    model = MODEL.with_part(two, np.array([0.07])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
     for length in (1.0, 0.5, 0.2, 0.05):
         likelihood: Any = SimpleNamespace(cost=lambda trial, length=length: abs(float(trial.theta[-3]) - length * 0.1))
         begun = _state.with_members(given, found, model, likelihood)

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 FULL_N, FULL_MBAR, STEP_S, NOISE, OFFSET_MBAR = 800.0, 140.0, 0.02, 0.001, 7.0
 PLAIN = ExtendedModel(1.0, 0.08, 0.22, FULL_N, FULL_MBAR, "mbar")
 LOST_N = 40.0
-UNIT = PLAIN.with_part(effect("dead_band"), np.array([LOST_N / FULL_N, 0.2]))
+UNIT = PLAIN.with_part(effect("dead_band"), np.array([LOST_N / FULL_N, 0.2, 0.0]))
 
 
 def _run(seed: int) -> Recording:

@@ -401,7 +401,9 @@ def test_shares_come_to_units(unit: str, expected: tuple[float, str]) -> None:
 
 
 def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> None:
-    model = MODEL.with_part("zero_drift", np.array([1e-4, 2e-3, 60.0])).with_part("dead_band", np.array([0.05, 0.2]))
+    model = MODEL.with_part("zero_drift", np.array([1e-4, 2e-3, 60.0])).with_part(
+        "dead_band", np.array([0.05, 0.2, 0.0])
+    )
     rng = np.random.default_rng(1)
     root = 1e-3 * rng.standard_normal((8, 8))
     covariance = root @ root.T

@@ -25,6 +25,7 @@ TEMPERATURE_LAG = EffectParameter(
     SMOOTHED_S,
     channel="temperature",
     absent=0.0,
+    natural="lower",
 )
 TEMPERATURE_LAGS = ({"temperature_lag": SMOOTHED_S}, {"temperature_lag": 60.0})  # a bare die's, and a housing's
 

@@ -33,7 +33,7 @@ class CycleConditioning(Effect):
             "cycles", "1", "n0: cycles after which 63 % of it are there", None, 0.5, 50.0, 2.0, kind_ends="both"
         ),
         EffectParameter("by_way", "1", "w: share that goes by the load's way, not by cycles", None, 0.0, 1.0, 0.5,
-                        absent=0.0),
+                        absent=0.0, natural="both"),
     )  # fmt: skip
     shapes = tuple({"cycles": cycles, "by_way": by_way} for cycles in (1.0, 4.0, 16.0) for by_way in (0.0, 1.0))
     exposed_by = by("repeats", "pauses")

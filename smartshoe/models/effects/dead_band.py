@@ -10,12 +10,17 @@ from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter,
 from smartshoe.models.effects.exposure import by
 
 BISECTIONS = 50
+LEAST_ONSET = 1e-9  # stands for none
+MOST = 1.3  # times the lost load: a band that is sharp at its end loses a little more before it
 
 
 class DeadBand(Effect):
     """f - f0 m(f/f0), m(x) = x at first and 1 later, rounded over ``softness``: f - f0 once all gaps are closed.
 
-    m(x) = [s(1/k) - s((1 - x)/k)]/s(1/k) with s(y) = ln(1 + exp y); loads below zero pass unchanged.
+    m(x) = [k s(b/k) - k s((b - x)/k) - a e (1 - exp(-x/a))]/[k s(b/k) - a e], b = 1 + a, s(y) = ln(1 + exp y) and e its
+    slope at b/k. ``onset`` a, over the lost load, is how soon the loss sets in: 0 at once, as where gaps are to be
+    closed; later where something beside the tube is touched, bears along and then yields. Loads below zero pass
+    unchanged.
     """
 
     name, family, stage, place = "dead_band", "dead_band", "contact", "contact"
@@ -25,8 +30,10 @@ class DeadBand(Effect):
     parameters = (
         EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.3, 0.01),
         EffectParameter("softness", "1", "how far the gaps spread, over the lost load", None, 0.03, 3.0, 0.3),
-    )
-    shapes = ({"softness": 0.2}, {"softness": 0.6})
+        EffectParameter("onset", "1", "load over which the loss sets in, over the lost load", None, 0.0, 1.5, 0.3,
+                        absent=0.0, natural="lower"),
+    )  # fmt: skip
+    shapes = ({"softness": 0.2, "onset": 0.0}, {"softness": 0.6, "onset": 0.0}, {"softness": 0.6, "onset": 0.6})
     exposed_by = by("low_loads", "rests")
     separated_by = {
         "contact_area": by("low_loads"),
@@ -41,33 +48,35 @@ class DeadBand(Effect):
         """The load that reaches the tube."""
         if values[0] == 0.0:
             return signal.copy()
-        return _passed(signal, float(values[0]), float(values[1]))
+        return _passed(signal, *(float(value) for value in values))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Bisection between y and y + f0; loads within a sharp band cannot be told apart, nor noise about zero."""
-        lost, soft = float(values[0]), float(values[1])
+        lost, soft, onset = (float(value) for value in values)
 
         def undo(signal: Array, time_s: Array) -> Array:
             if lost == 0.0:
                 return signal.copy()
-            low, high = signal.copy(), signal + lost
+            low, high = signal.copy(), signal + MOST * lost
             for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
-                below = _passed(middle, lost, soft) < signal
+                below = _passed(middle, lost, soft, onset) < signal
                 low, high = np.where(below, middle, low), np.where(below, high, middle)
             return np.where(signal > 0.0, 0.5 * (low + high), signal)
 
         if lost == 0.0:
             return Memoryless(undo, "")
-        whole = _soft(np.array([1.0 / soft]))[0]
+        begins, whole, late = _constants(soft, onset)
         body = f"""if (x > 0.0) {{
-    double low = x, high = x + {c_number(lost)};
+    double low = x, high = x + {c_number(MOST * lost)};
     int k;
     for (k = 0; k < {BISECTIONS}; k++) {{
-        const double v = 0.5 * (low + high);
-        const double y = (1.0 - v / {c_number(lost)}) / {c_number(soft)};
+        const double v = 0.5 * (low + high), z = v / {c_number(lost)};
+        const double y = ({c_number(1.0 + onset)} - z) / {c_number(soft)};
         const double s = (y > 0.0 ? y : 0.0) + log1p(exp(-fabs(y)));
-        if (v - {c_number(lost)} * (1.0 - s / {c_number(whole)}) < x) {{
+        const double sets_in = {c_number(late)} * expm1(-z / {c_number(max(onset, LEAST_ONSET))});
+        const double m = {c_number(begins)} - {c_number(soft)} * s + sets_in;
+        if (v - {c_number(lost / whole)} * m < x) {{
             low = v;
         }} else {{
             high = v;
@@ -82,7 +91,16 @@ def _soft(y: Array) -> Array:
     return np.maximum(y, 0.0) + np.log1p(np.exp(-np.abs(y)))
 
 
-def _passed(load: Array, lost: float, soft: float) -> Array:
-    whole = _soft(np.array([1.0 / soft]))[0]
-    out = load - lost * (1.0 - _soft((1.0 - load / lost) / soft) / whole)
+def _constants(soft: float, onset: float) -> tuple[float, float, float]:
+    """k s(b/k), what m is divided by, and a e."""
+    end = np.array([(1.0 + onset) / soft])
+    begins, late = soft * float(_soft(end)[0]), onset / float(1.0 + np.exp(-end[0]))
+    return begins, begins - late, late
+
+
+def _passed(load: Array, lost: float, soft: float, onset: float) -> Array:
+    begins, whole, late = _constants(soft, onset)
+    z = np.maximum(load / lost, 0.0)
+    sets_in = late * np.expm1(-z / max(onset, LEAST_ONSET))
+    out = load - lost / whole * (begins - soft * _soft((1.0 + onset - z) / soft) + sets_in)
     return np.where(load > 0.0, out, load)

@@ -40,7 +40,8 @@ class EffectParameter:
     do anything ("temperature"); '' where it needs nothing but load and time. ``absent``: its value in files of models
     from before it was known; None where every file holds it. ``kind_ends``: the bounds at which an
     effect turns into one of another kind, as a relaxation into a drift where its time constant grows beyond all holds;
-    '' where a bound is only as far as anybody has seen.
+    '' where a bound is only as far as anybody has seen. ``natural``: bounds that are no end of what was seen but of
+    what there is, as of a share none and all are: the equation is itself there.
     """
 
     name: str
@@ -54,10 +55,11 @@ class EffectParameter:
     channel: Exposure | Literal[""] = ""
     kind_ends: Literal["", "upper", "both"] = ""
     absent: float | None = None
+    natural: Literal["", "lower", "both"] = ""
 
-    def is_at_bound(self, value: float) -> bool:
-        """Whether a value lies at a bound."""
-        return not self.lower < value < self.upper
+    def is_stretched(self, value: float) -> bool:
+        """Whether a value lies at a bound that is not a natural one."""
+        return (value <= self.lower and not self.natural) or (value >= self.upper and self.natural != "both")
 
     def is_where_kind_ends(self, value: float) -> bool:
         """Whether a value lies at a bound beyond which the effect is of another kind."""

@@ -22,7 +22,9 @@ class GasHeat(CoreEffect):
     parameters = (
         EffectParameter("share", "1", "adiabatic over isothermal pressure rise, less 1", 0.0, 0.0, 0.4, 0.02),
         EffectParameter("cooling_rate", "1/s", "one over the time in which the heat leaves", None, 0.2, 20.0, 1.0),
-        EffectParameter("spread", "1", "0: one time constant, 1: conduction in a cylinder", None, 0.0, 1.0, 0.5),
+        EffectParameter(
+            "spread", "1", "0: one time constant, 1: conduction in a cylinder", None, 0.0, 1.0, 0.5, natural="both"
+        ),
     )
     shapes = tuple({"cooling_rate": rate, "spread": 0.5} for rate in (0.4, 1.5, 6.0))
     exposed_by = by("holds", "rates", "rests", "steps")

@@ -35,7 +35,9 @@ class PlayHysteresis(Effect):
         EffectParameter("width", "FS_load", "half width of the play that matters most", None, 0.015, 0.3, 0.05),
         EffectParameter("spread", "1", "standard deviation of ln width over the plays", None, 0.3, 1.2, 0.5),
         EffectParameter("levelling", "1", "how far friction stops growing", None, LEAST_LEVELLING, 0.9, 0.3),
-        EffectParameter("openness", "1", "share of friction that is there without load too", None, 0.0, 1.0, 0.3),
+        EffectParameter(
+            "openness", "1", "share of friction that is there without load too", None, 0.0, 1.0, 0.3, natural="both"
+        ),
     )
     shapes = (
         {"width": 0.05, "spread": 0.5, "levelling": 0.6, "openness": 0.1},

@@ -25,7 +25,9 @@ class SensorLag(Effect):
     says = "the reading comes late and rounds corners: after a step it approaches its end value exponentially"
     parameters = (
         EffectParameter("time_constant", "s", "time by which a steady ramp comes late", 0.0, 0.0, 3.0, 0.01),
-        EffectParameter("second_pole", "1", "share of that in a second, faster pole", None, 0.0, 0.45, 0.1),
+        EffectParameter(
+            "second_pole", "1", "share of that in a second, faster pole", None, 0.0, 0.45, 0.1, natural="lower"
+        ),
     )
     shapes = ({"second_pole": 0.1}, {"second_pole": 0.4})
     exposed_by = by("rates", "steps")
