@@ -117,18 +117,24 @@ def within_bounds(model: ExtendedModel) -> ExtendedModel:
 
 
 def fit(
-    likelihood: Likelihood, start: ExtendedModel, steps: int = MOST_STEPS, rows: Sequence[Array] | None = None
+    likelihood: Likelihood,
+    start: ExtendedModel,
+    steps: int = MOST_STEPS,
+    rows: Sequence[Array] | None = None,
+    only: str | None = None,
 ) -> Fit:
     """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
 
     Shapes have a prior about their start, of one in the logarithm or of their size; weights of flexible blocks have
     theirs about null. ``rows`` are `rows_of` the start within its bounds, a session each, where they are known.
+    ``only``: the effect whose parameters are fitted, all others held; all of them where it is None.
     """
     owners = start.parameters
     logarithmic = _are_logarithmic(start)
     low, high = np.array([p.lower for _, p in owners]), np.array([p.upper for _, p in owners])
     model = within_bounds(start)
     about, precision = _about(model, logarithmic), _precision(model, logarithmic)
+    free = np.array([only in (None, owner) for owner, _ in owners])
 
     def penalty(theta: Array) -> float:
         return float(np.sum(precision * (_stepped(theta, logarithmic) - about) ** 2))
@@ -142,8 +148,8 @@ def fit(
             _, right, normal = likelihood.normal(model) if exact else likelihood.nearly_normal(model, theta - came)
         came = theta
         scale = np.where(logarithmic, theta, 1.0)
-        inner = normal * np.outer(scale, scale) + np.diag(precision)
-        pull = right * scale - precision * (_stepped(theta, logarithmic) - about)
+        inner = (normal * np.outer(scale, scale) + np.diag(precision)) * np.outer(free, free)
+        pull = (right * scale - precision * (_stepped(theta, logarithmic) - about)) * free
         best: tuple[float, ExtendedModel] | None = None
         for _ in range(6):
             step = _bounded_step(inner, pull, damping, theta, low, high, logarithmic)

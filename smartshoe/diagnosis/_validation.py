@@ -16,6 +16,7 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
 MOST_FOLDS = 6  # of a single recording, a resolution
+OWN_STEPS = 2  # of an effect's own parameters, from where all recordings have them
 
 
 class LeftOut:
@@ -35,35 +36,42 @@ class LeftOut:
     def errors(self, model: ExtendedModel) -> Array:
         """(folds,) squared errors of what is left out; cached."""
         if model not in self._errors:
-            # All begin at one model, whose slopes they share.
             start = within_bounds(model)
-            rows = {id(one.conditions): rows_of(start, one) for one in self.sessions if one.fitted.any()}
-            found = []
-            for fold, rest in zip(self._folds, self._rest, strict=True):
-                known = [rows[id(one.conditions)] for one in rest.sessions]
-                residual = residual_of(fold.seen, fit(rest, start, FEW_STEPS, known).model)[fold.left_out]
-                found.append(float(residual @ residual))
-            self._errors[model] = np.array(found)
+            rows = self._rows_of(start)
+            self._errors[model] = self._squares([fit(rest, start, FEW_STEPS, rows(rest)).model for rest in self._rest])
         return self._errors[model]
 
     def following(self, found: Fit) -> Fit:
-        """``found``, fitted again without the effects without which what is left out is followed better.
+        """``found``, fitted again without the effects that are not the same in what is left out.
 
-        An effect's gain over what is left out must lie above zero by most of a standard error. Of several of which it
-        does not, and which may stand in for one another, that one goes without which the error is least.
+        Each effect's parameters are found without a recording, all else as all of them together ask. Its gain there,
+        over a fit without it, must lie above zero by most of a standard error. Of several of which it does not, and
+        which may stand in for one another, that one goes that gains least.
         """
         failing = list(found.model.names)
         while failing:
-            whole = self.errors(found.model)
-            without = {name: self.errors(found.model.without(name)) for name in failing}
-            failing = [
-                name for name in failing if _in_standard_errors(without[name] - whole) < self.thresholds.validated
-            ]
+            start = within_bounds(found.model)
+            rows, gains, less = self._rows_of(start), {}, {}
+            for name in failing:
+                own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in self._rest]
+                less[name] = fit(found.likelihood, start.without(name))
+                gains[name] = self._squares([less[name].model] * len(own)) - self._squares(own)
+            failing = [name for name in failing if _in_standard_errors(gains[name]) < self.thresholds.validated]
             if failing:
-                worst = min(failing, key=lambda name: float(without[name].sum()))
+                worst = min(failing, key=lambda name: float(gains[name].sum()))
                 failing.remove(worst)
-                found = fit(found.likelihood, found.model.without(worst))
+                found = less[worst]
         return found
+
+    def _rows_of(self, start: ExtendedModel) -> Callable[[Likelihood], list[Array]]:
+        """What all fits begin with, of those recordings that one of them is fitted to."""
+        rows = {id(one.conditions): rows_of(start, one) for one in self.sessions if one.fitted.any()}
+        return lambda rest: [rows[id(one.conditions)] for one in rest.sessions]
+
+    def _squares(self, models: Sequence[ExtendedModel]) -> Array:
+        """(folds,) squared errors of a model each where its fold is left out."""
+        left = [residual_of(fold.seen, model)[fold.left_out] for fold, model in zip(self._folds, models, strict=True)]
+        return np.array([float(one @ one) for one in left])
 
     def stands(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
         """Whether ``model`` does away with enough of the plain model's squared error where recordings are left out.

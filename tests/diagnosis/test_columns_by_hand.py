@@ -219,7 +219,7 @@ def test_the_prior_of_a_past_is_of_what_the_arm_may_hold(share: float, begun: fl
 
 
 def test_columns_are_what_each_strength_does_to_the_reading() -> None:
-    model = MODEL.with_part("dead_band", np.array([0.05, 0.3])).with_part("delay", np.array([0.12]))
+    model = MODEL.with_part("dead_band", np.array([0.05, 0.3, 0.1])).with_part("delay", np.array([0.12]))
     sessions = _sessions(model, sizes=(150, 120))
     nothing = _session(_load(50, 5), np.zeros(50), lost=1.1)
     found = linearised(model, [sessions[0], nothing, sessions[1]], STANDARD)
@@ -227,7 +227,7 @@ def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     assert (found.own, found.scales[0]) == (3, 1.0)
     assert [one.columns for one in found.candidates[:2]] == [(4,), (5,)]
     assert [one.name for one in found.candidates[:2]] == ["dead_band", "delay"]
-    assert (dict(found.candidates[0].shape), dict(found.candidates[1].shape)) == ({"softness": 0.3}, {})
+    assert (dict(found.candidates[0].shape), dict(found.candidates[1].shape)) == ({"softness": 0.3, "onset": 0.1}, {})
     outside = found.candidates[2:]
     assert not {one.name for one in outside} & {"dead_band", "delay"}
     place = 6

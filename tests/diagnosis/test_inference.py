@@ -128,8 +128,8 @@ def plain() -> tuple[list[Recording], Diagnosis]:
     return runs, diagnose(runs[:2], hold_out=[runs[2]])
 
 
-@pytest.mark.parametrize("values", [(0.08, 0.03), (0.13, 0.1)])
-def test_a_corner_below_the_least_load_is_a_dead_band_and_no_curve(values: tuple[float, float]) -> None:
+@pytest.mark.parametrize("values", [(0.08, 0.03, 0.0), (0.13, 0.1, 0.0)])
+def test_a_corner_below_the_least_load_is_a_dead_band_and_no_curve(values: tuple[float, float, float]) -> None:
     """A tare lifts every load over the band, so that a fit that begins small has no slope towards it."""
     model = MODEL.with_part(effect("dead_band"), np.array(values))
     runs = [recording(model, seed, tare_n=24.0) for seed in range(3)]

@@ -416,7 +416,7 @@ def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None
 @pytest.mark.parametrize(
     ("name", "values", "parameter", "expected", "unit"),
     [
-        ("dead_band", (0.05, 0.2), "lost_load", 0.05 * 600.0, "N"),
+        ("dead_band", (0.05, 0.2, 0.0), "lost_load", 0.05 * 600.0, "N"),
         ("sensor_nonlinearity", (0.02, 0.0, 0.0), "bow", 0.02 * 1.5 * 200.0, "mbar"),
         ("zero_drift", (1e-4, 0.0, 60.0), "drift_rate", 1e-4 * 1.5 * 200.0, "mbar/s"),
         ("zero_drift", (1e-4, 2e-3, 60.0), "temperature_coefficient", 2e-3 * 1.5 * 200.0, "mbar/K"),
@@ -473,13 +473,15 @@ def test_a_rate_that_an_effect_bent_is_found_anew_without_it() -> None:
 
 
 def test_a_shape_at_a_bound_is_stretched() -> None:
+    law = effect("dead_band")
     for softness, is_stretched in ((0.2, False), (0.03, True), (1.0, False), (3.0, True)):
-        law = effect("dead_band")
-        assert _is_stretched(MODEL.with_part(law, np.array([0.05, softness])), law) is is_stretched
+        assert _is_stretched(MODEL.with_part(law, np.array([0.05, softness, 0.1])), law) is is_stretched
+    for onset, is_stretched in ((0.0, False), (1.5, True)):  # that it sets in at once is no stretch
+        assert _is_stretched(MODEL.with_part(law, np.array([0.05, 0.2, onset])), law) is is_stretched
     # A strength at its bound is no shape, nor are another effect's.
     leak = effect("linear_leak")
     assert not _is_stretched(MODEL.with_part(leak, np.array([0.0])), leak)
-    below = MODEL.with_part(effect("dead_band"), np.array([0.05, 0.03]))
+    below = MODEL.with_part(effect("dead_band"), np.array([0.05, 0.03, 0.0]))
     assert not _is_stretched(below.with_part(leak, np.array([0.01])), leak)
 
 

@@ -405,7 +405,7 @@ def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> 
         "dead_band", np.array([0.05, 0.2, 0.0])
     )
     rng = np.random.default_rng(1)
-    root = 1e-3 * rng.standard_normal((8, 8))
+    root = 1e-3 * rng.standard_normal((9, 9))
     covariance = root @ root.T
     covariance[4, 4] = -1e-9  # by rounding
     logged = SimpleNamespace(conditions=Conditions(np.zeros(1), np.zeros(1), 0.01, temperature_k=np.zeros(1)))
@@ -414,16 +414,16 @@ def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> 
         model=model, covariance=covariance, likelihood=SimpleNamespace(sessions=[logged, unlogged])
     )
     assert list(joint_parameters(fit, SCALE)[0]) == ["zero_drift.drift_rate", "dead_band.lost_load",
-                                                     "dead_band.softness"]  # fmt: skip
-    without = np.array([3, 6, 7])
-    factors = np.array([0.8 * 140.0, 800.0, 1.0])
+                                                     "dead_band.softness", "dead_band.onset"]  # fmt: skip
+    without = np.array([3, 6, 7, 8])
+    factors = np.array([0.8 * 140.0, 800.0, 1.0, 1.0])
     expected = covariance[np.ix_(without, without)] * np.outer(factors, factors)
     assert np.array(joint_parameters(fit, SCALE)[1]) == pytest.approx(expected)
     fit.likelihood = SimpleNamespace(sessions=[logged])
     found, joint = joint_parameters(fit, SCALE)
     assert list(found) == ["zero_drift.drift_rate", "zero_drift.temperature_coefficient", "zero_drift.temperature_lag",
-                           "dead_band.lost_load", "dead_band.softness"]  # fmt: skip
-    factors = np.array([0.8 * 140.0, 0.8 * 140.0, 1.0, 800.0, 1.0])
+                           "dead_band.lost_load", "dead_band.softness", "dead_band.onset"]  # fmt: skip
+    factors = np.array([0.8 * 140.0, 0.8 * 140.0, 1.0, 800.0, 1.0, 1.0])
     assert np.array(joint) == pytest.approx(covariance[3:, 3:] * np.outer(factors, factors))
     drift = parameters_of(fit, "zero_drift", SCALE)
     assert list(drift) == ["drift_rate", "temperature_coefficient", "temperature_lag"]

@@ -189,7 +189,7 @@ def test_zeros_stand_apart_from_the_forces(offset: float, is_extended: bool) -> 
 
 def test_an_effect_beside_the_same_coefficients_is_a_difference() -> None:
     plain = calibration()
-    model = plain.model().with_part(effect("dead_band"), np.array([0.02, 0.03]))
+    model = plain.model().with_part(effect("dead_band"), np.array([0.02, 0.03, 0.0]))
     other = extended_calibration(model, load_range_n=(0.0, 800.0))
     assert (other.a1, other.b0, other.b1) == pytest.approx((plain.a1, plain.b0, plain.b1))
     for pair, sign in (((plain, other), 1.0), ((other, plain), -1.0)):
