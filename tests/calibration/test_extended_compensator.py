@@ -68,11 +68,12 @@ def test_effects_together_are_undone_exactly(names: list[str], seed: int) -> Non
 @pytest.mark.parametrize("name", LOOPED)
 @given(others=st.lists(st.sampled_from(EXACT), max_size=1), seed=seeds)
 @settings(max_examples=5, deadline=None)
-def test_a_spring_beside_the_arm_is_undone_to_what_the_models_rounds_leave(
+def test_a_spring_beside_the_arm_is_undone_to_what_happens_between_samples(
     name: str, others: list[str], seed: int
 ) -> None:
-    # (kappa (1 - slope)/(1 + kappa))^4 for slopes from a half to twice; the static curve alone leaves 1e-3 and more.
-    assert np.max(np.abs(_error(chain_of([name, *others], seed), some_conditions(seed)))) < 1e-6
+    # There the core takes the spring's load for straight lines, and the spring what it does; the static curve alone
+    # leaves 1e-3 and more.
+    assert np.max(np.abs(_error(chain_of([name, *others], seed), some_conditions(seed)))) < 1e-7
 
 
 def _lagged(tau_s: float) -> ExtendedModel:
