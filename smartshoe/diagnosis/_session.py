@@ -19,7 +19,7 @@ from smartshoe.diagnosis._jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
-from smartshoe.models.effects._wall_memory import cleaned_load
+from smartshoe.models.effects.cycle_conditioning import half_way
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import bridged, runs_of
@@ -344,7 +344,7 @@ def _left_behind(conditions: Conditions, thresholds: Thresholds) -> dict[str, fl
     return {
         "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
         "cycles": before.get("cycles", 0.0) + rises,
-        "way": before.get("way", 0.0) + 0.5 * float(np.sum(np.abs(np.diff(cleaned_load(conditions))))),
+        "way": before.get("way", 0.0) + float(half_way(conditions)[-1]),
         "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
         "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),
     }

@@ -107,6 +107,12 @@ class CycleConditioning(Effect):
         return Undone(conditioned_undone, constants, start, MEMBERS, body)
 
 
+def half_way(conditions: Conditions) -> Array:
+    """Half the way (n,) that the load has gone up and down since the recording began, but for its noise."""
+    load = cleaned_load(conditions)
+    return np.asarray(0.5 * np.cumsum(np.abs(np.diff(load, prepend=load[0]))))
+
+
 def _done(conditions: Conditions) -> tuple[Array, Array]:
     """Cycles that are over (n,) and half the way of the load (n,), neither by its noise; computed once."""
     done, gone = conditions.cache.get("cycles_done"), conditions.cache.get("half_way")
@@ -116,6 +122,6 @@ def _done(conditions: Conditions) -> tuple[Array, Array]:
         load, before = cleaned_load(conditions), conditions.before
         done, counted = np.empty(load.size), float(before.get("cycles", 0.0))
         cycles_done(load, LEAST_HEIGHT, np.array([NO_LOAD, NO_LOAD, counted]), done)
-        gone = float(before.get("way", counted)) + 0.5 * np.cumsum(np.abs(np.diff(load, prepend=load[0])))
+        gone = float(before.get("way", counted)) + half_way(conditions)
         conditions.cache["cycles_done"], conditions.cache["half_way"] = done, gone
     return done, gone
