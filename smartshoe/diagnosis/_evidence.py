@@ -61,16 +61,22 @@ class Posterior:
     together: float = 0.0
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class _Columns:
-    """Columns ``seen`` (n, k) a session, over what is fitted, at their ``places`` among all.
-
-    ``past`` (k, 2) a session: their inner products with its nuisances. ``half`` (p, k): what is taken out of their
-    inner products by all that is there without any effect is its square.
-    """
+    """Columns ``seen`` (n, k) a session, over what is fitted; ``past`` (k, 2), their products with its nuisances."""
 
     seen: Sequence[Array]
     past: Sequence[Array]
+
+
+@dataclass(frozen=True, eq=False)
+class _Departures:
+    """A member's departures, and their ``places`` among all columns.
+
+    ``half`` (p, k): what is taken out of their inner products by all that is there without any effect is its square.
+    """
+
+    columns: _Columns
     places: range
     half: Array
 
@@ -88,7 +94,7 @@ class Evidence:
             for products, one in zip(given.products, given.sessions, strict=True)
         ]
         own_past = [products[:-2, -2:] for products in given.products]
-        self._all = _Columns(given.seen, own_past, range(given.scales.size), np.zeros(0))
+        self._all = _Columns(given.seen, own_past)
         self.gram = self._free(np.sum([one[:-2, :-2] for one in given.products], axis=0), own_past, own_past)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
@@ -107,7 +113,7 @@ class Evidence:
         self._half = self._taken_out(self.gram)
         self._reduced = self.gram - self._half.T @ self._half
         self._nothing = float(self._reduced[0, 0]) + 2.0 * float(np.sum(np.log(np.diag(self._factor))))
-        self._departures: dict[int, _Columns] = {}
+        self._departures: dict[int, _Departures] = {}
         self._known: set[tuple[int, int]] = set()
         self._directions = directions(self.thresholds)
         effects = {one.name for one in given.candidates}
@@ -145,12 +151,12 @@ class Evidence:
             if pair not in self._known:
                 self._known.add(pair)
                 one, other = (self._departures[member] for member in pair)
-                found = self._between(one, other) - one.half.T @ other.half
+                found = self._between(one.columns, other.columns) - one.half.T @ other.half
                 self._reduced[np.ix_(one.places, other.places)] = found
                 self._reduced[np.ix_(other.places, one.places)] = found.T
         return [self._departures[member].places for member in members]
 
-    def _departing(self, member: int) -> _Columns:
+    def _departing(self, member: int) -> _Departures:
         given, first = self.given, int(self._reduced.shape[0])
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
@@ -162,16 +168,16 @@ class Evidence:
             signatures.append(visible - own @ np.linalg.solve(ridged(products[-2:, -2:]), known))
         seen = [part[one.fitted] for part, one in zip(departures(given, signatures), given.sessions, strict=True)]
         past = [part.T @ own[one.fitted] for part, own, one in zip(seen, given.nuisances, given.sessions, strict=True)]
-        made = _Columns(seen, past, range(first, first + self._directions), np.zeros(0))
+        made = _Columns(seen, past)
         cross = self._between(self._all, made)
-        made.half = self._taken_out(cross)
-        reduced = cross - self._half.T @ made.half
-        grown = np.zeros((made.places.stop, made.places.stop))
+        half, places = self._taken_out(cross), range(first, first + self._directions)
+        reduced = cross - self._half.T @ half
+        grown = np.zeros((places.stop, places.stop))
         grown[:first, :first] = self._reduced
         grown[: len(reduced), first:], grown[first:, : len(reduced)] = reduced, reduced.T
-        grown[first:, first:] = self._between(made, made) - made.half.T @ made.half
+        grown[first:, first:] = self._between(made, made) - half.T @ half
         self._reduced = grown
-        return made
+        return _Departures(made, places, half)
 
     def _direction(self, columns: Sequence[int]) -> Array:
         """Of several strengths the direction that the data asks for, of unit length."""

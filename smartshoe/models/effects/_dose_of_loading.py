@@ -14,12 +14,11 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import NO_LOAD, Undone, cleaned, dead_zone
+from smartshoe.models.effects._wall_memory import NO_LOAD, SETTLED, Undone, cleaned, dead_zone
 from smartshoe.models.effects.effect import Conditions, EffectParameter
 
 HALF_WIDTH = 0.01  # of full scale: a loading is more than twice of it, so that noise is none
 MOST_ROUNDS = 80  # 0.6, of the largest set that grows with the fourth power of a loading, to this power is 2e-18
-SETTLED = 1e-15  # of full scale
 USUAL_STROKE_S = 10.0  # seconds under full-scale load that count as one loading to it
 
 

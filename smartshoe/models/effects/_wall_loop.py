@@ -17,10 +17,8 @@ def arm_beside(conditions: Conditions) -> tuple[float, float, float, float]:
 
 def relaxed(deformation: Array, conditions: Conditions) -> Array:
     """Load (n,) of the arm that relaxes, kappa (u - q), under a deformation (n,) in straight lines."""
-    from smartshoe.kernels.linear_filter import linear_filter
+    from smartshoe.models.first_order import lag
 
-    share, decay, now, before = arm_beside(conditions)
-    start = [deformation[0] - now * deformation[0]]
-    q = linear_filter([now, before], [1.0, -decay], deformation, start)[0]
-    force: Array = share * (deformation - q)
+    share, rate_per_s = conditions.relaxing or (0.0, 0.0)
+    force: Array = share * (deformation - lag(deformation, rate_per_s, float(conditions.step_s)))
     return force

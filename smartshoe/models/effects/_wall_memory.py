@@ -12,6 +12,7 @@ from smartshoe.models.effects.effect import Conditions, CStep, Inverse
 
 LEAST_DEAD_ZONE = 1e-3  # of full scale
 SIGMAS = 4.0
+SETTLED = 1e-15  # of full scale: what a round of an inverse with memory may still move a sample by
 NO_LOAD = 1e30  # as in `smartshoe.kernels.memory`: before the first sample
 
 

@@ -8,13 +8,12 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETTLED, Undone, cleaned_load
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
 MOST_ROUNDS = 60  # of a contraction that halves what is off
-SETTLED = 1e-15  # of full scale
 MEMBERS = ("count", "trough", "peak", "place", "gone")
 
 
@@ -115,7 +114,7 @@ def half_way(conditions: Conditions) -> Array:
 
 def _done(conditions: Conditions) -> tuple[Array, Array]:
     """Cycles that are over (n,) and half the way of the load (n,), neither by its noise; computed once."""
-    done, gone = conditions.cache.get("cycles_done"), conditions.cache.get("half_way")
+    done, gone = conditions.cache.get("cycles_done"), conditions.cache.get("way_gone")
     if done is None or gone is None:
         from smartshoe.kernels.memory import cycles_done
 
@@ -123,5 +122,5 @@ def _done(conditions: Conditions) -> tuple[Array, Array]:
         done, counted = np.empty(load.size), float(before.get("cycles", 0.0))
         cycles_done(load, LEAST_HEIGHT, np.array([NO_LOAD, NO_LOAD, counted]), done)
         gone = float(before.get("way", counted)) + half_way(conditions)
-        conditions.cache["cycles_done"], conditions.cache["half_way"] = done, gone
+        conditions.cache["cycles_done"], conditions.cache["way_gone"] = done, gone
     return done, gone
