@@ -395,15 +395,45 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def softened_undone(signal, strength, width, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u (1 - strength tanh((M^2 - u^2)/width)) of the ``signal`` u (n,), M the largest out so far.
+def rise(largest, raised, width):  # type: ignore[no-untyped-def]
+    """u/phi of a first loading, 1 + raised tanh(M^2/width), M the ``largest`` load so far."""
+    return 1.0 + raised * math.tanh(largest * largest / width) if raised > 0.0 else 1.0
+
+
+@njit(cache=True)
+def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untyped-def]
+    """phi of a first loading, own phi + arm u = ``load`` >= 0 and u = phi rise(phi), and the slope of the load in u.
+
+    Newton from ``phi``, held in a bracket: both terms rise.
+    """
+    if raised == 0.0:
+        return load / (own + arm), own + arm
+    low, high = load / (own + arm * (1.0 + raised)), load / (own + arm)
+    phi, slope = min(max(phi, low), high), 1.0
+    for _ in range(60):
+        bend = math.tanh(phi * phi / width)
+        off = phi * (own + arm * (1.0 + raised * bend)) - load
+        slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # of u in phi
+        phi, low, high, step = newton(phi, off, own + arm * slope, low, high)
+        if abs(step) <= 1e-9:  # the next one would be about its square
+            break
+    return phi, own / slope + arm
+
+
+@njit(cache=True)
+def softened_undone(signal, strength, width, raised, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u (1 - strength tanh((M^2 rise^2 - u^2)/width))/rise of the ``signal`` u (n,), M the largest out.
 
     ``state`` (1,): that largest, less ``dead_zone``.
     """
     largest = state[0]
     for k in range(signal.size):
-        u = signal[k]
-        f = u * (1.0 - strength * math.tanh(max(largest * largest - u * u, 0.0) / width))
+        u, more = signal[k], rise(largest, raised, width)
+        if u >= largest * more:
+            f = first_loading(u, raised, width, 0.0, 1.0, u)[0]
+        else:
+            below = max(largest * largest * more * more - u * u, 0.0)
+            f = u * (1.0 - strength * math.tanh(below / width)) / more
         largest = max(largest, f - dead_zone)
         out[k] = f
     state[0] = largest

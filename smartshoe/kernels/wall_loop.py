@@ -11,7 +11,7 @@ import math
 
 from numba import njit
 
-from smartshoe.kernels.memory import newton
+from smartshoe.kernels.memory import first_loading, newton, rise
 
 CLOSE = 1e-8  # of full scale: a step of Newton's that is less leaves about its square
 STEPS = 30
@@ -69,34 +69,41 @@ def compressed(load, ratio, wall, share, decay, now, before, out):  # type: igno
 
 
 @njit(cache=True)
-def softened(load, strength, width, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi = u (1 - strength tanh((M^2 - u^2)/width)).
+def softened(load, strength, width, raised, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi r(M) = u (1 - strength tanh((M^2 r(M)^2 - u^2)/width)).
 
-    M is the largest phi so far, ``largest`` before the record; it counts less ``dead_zone``.
+    M is the largest phi so far, ``largest`` before the record; it counts less ``dead_zone``. r is `rise`.
     """
     # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
     bound = strength / width * (3.0 + 2.0 / width)
     arm = held = 0.0
-    u, q, known, slope = 0.0, 0.0, 0.0, 1.0
+    u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
     for k in range(load.size):
         last, f = u, load[k] + held
-        virgin = f / (1.0 + arm)
-        most = max(max(largest, virgin) - dead_zone, 0.0)
-        if virgin >= most:
-            u, slope = virgin, 1.0 + arm
+        most = max(largest - dead_zone, 0.0)
+        more = rise(most, raised, width)
+        if f >= most * (1.0 + arm * more):
+            phi, slope = first_loading(f, raised, width, 1.0, arm, phi)
+            u = phi * rise(phi, raised, width)
         elif not k or f != known:  # a pause leaves it where it is, to the last digit
             # It rises with u: Newton from the last output moved along, held in a bracket.
-            low, high = (virgin, most) if f > 0.0 else (f / (1.0 - strength + arm), virgin)
+            given, beside = f * more, arm * more
+            straight = given / (1.0 + beside)
+            low, high = straight, most * more
+            if f <= 0.0:
+                lost = min(strength * math.tanh(high * high / width), 0.95)  # more leaves nothing that could pull
+                low, high = given / (1.0 - lost + beside), straight
             u = min(max(u + (f - known) / slope, low), high)
             for _ in range(STEPS):
-                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most - u * u, 0.0) / width) + 1.0)  # tanh
-                slope = 1.0 - strength * bend + arm
-                off = u * slope - f
+                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most * more * more - u * u, 0.0) / width) + 1.0)  # tanh
+                slope = 1.0 - strength * bend + beside
+                off = u * slope - given
                 if bend > 0.0:
                     slope += 2.0 * strength / width * u * u * (1.0 - bend * bend)
                 u, low, high, step = newton(u, off, slope, low, high)
                 if bound * step * step <= 1e-12:
                     break
+            slope /= more
         largest = max(largest, f - arm * u)
         q = decay * q + now * u + before * last if k else u
         out[k] = u + share * (u - q)

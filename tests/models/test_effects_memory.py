@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -21,7 +21,8 @@ LOOPS = (("play_hysteresis", PLAY), ("play_hysteresis", STOPS), ("bouc_wen_hyste
 MEMORIES = (
     *LOOPS,
     ("load_unload_asymmetry", np.array([0.02, 0.005])),
-    ("mullins_softening", np.array([0.03, 0.3])),
+    ("mullins_softening", np.array([0.03, 0.3, 0.0])),
+    ("mullins_softening", np.array([0.03, 0.3, 0.7])),
     ("cycle_conditioning", np.array([0.03, 3.0, 0.0])),
 )
 turning_points = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=8)
@@ -135,7 +136,7 @@ def test_size_grows_with_rate_in_both_directions() -> None:
 
 
 def test_only_the_first_loading_to_a_level_is_stiff() -> None:
-    values = np.array([0.05, 0.3])
+    values = np.array([0.05, 0.3, 0.0])
     load = between([0.5, 0.0, 0.5, 1.0, 0.0, 1.0], 500)
     out = run("mullins_softening", values, load)
     assert out[250] == pytest.approx(load[250], abs=1e-12)  # virgin
@@ -145,31 +146,52 @@ def test_only_the_first_loading_to_a_level_is_stiff() -> None:
     assert out[2250] / load[2250] == pytest.approx(1.05, abs=1e-3)  # half of full scale after full scale
 
 
+def test_a_damaged_wall_is_straight_below_its_largest_load_and_bends_beyond() -> None:
+    values = np.array([0.05, 0.3, 1.0])
+    load = between([0.5, 0.0, 0.5, 1.0, 0.0], 500)
+    out = run("mullins_softening", values, load)
+    gain = out / np.where(load == 0.0, np.inf, load)
+    once, more = (1.0 + 0.05 * np.tanh(most**2 / 0.3) / np.tanh(2.5) for most in (0.5, 1.0))
+    assert gain[500] == pytest.approx(once, abs=1e-4)
+    assert gain[550:900] == pytest.approx(np.full(350, once), abs=1e-4)  # down
+    assert gain[1100:1490] == pytest.approx(np.full(390, once), abs=1e-4)  # up again
+    assert np.all(np.diff(gain[1510:1900]) > 0.0)  # further than ever
+    assert gain[2400] == pytest.approx(more, abs=1e-4)
+
+
 @given(
-    gained=st.floats(1e-3, 1.0), width=st.floats(0.02, 3.0), before=st.floats(0.0, 1.5),
+    gained=st.floats(1e-3, 1.0), width=st.floats(0.02, 3.0), at_once=st.sampled_from([0.0, 0.3, 1.0]),
+    before=st.floats(0.0, 1.5),
     loads=st.lists(st.floats(-0.5, 1.5), min_size=2, max_size=6), noise=st.sampled_from([0.0, 1e-3]),
 )  # fmt: skip
 @settings(max_examples=40)
 def test_softened_rubber_bears_the_load_to_the_last_digit(
-    gained: float, width: float, before: float, loads: list[float], noise: float
+    gained: float, width: float, at_once: float, before: float, loads: list[float], noise: float
 ) -> None:
     """The kernel against bisection, sample by sample: steep bends, jumps, pulls, whatever came before."""
     load = between(loads, 15) + noise * np.random.default_rng(1).standard_normal(15 * len(loads) + 1)
-    out = run("mullins_softening", np.array([gained, width]), load, noise, largest_load=before)
+    out = run("mullins_softening", np.array([gained, width, at_once]), load, noise, largest_load=before)
     zone = dead_zone(Conditions(np.zeros(1), load, STEP_S, noise))
-    amount = gained / (1.0 + gained) / np.tanh(0.75 / width)
+    below, whole = (1.0 - at_once) * gained, np.tanh(0.75 / width)
+    amount = below / (1.0 + below) / whole
+    assume(amount * np.tanh((1.5 * (1.0 + at_once * gained / whole)) ** 2 / width) < 0.95)  # else it bears no load
+
+    def rise(most: float) -> float:
+        return float(1.0 + at_once * gained / whole * np.tanh(most * most / width))
+
     largest = before
     for f, u in zip(load, out, strict=True):
         largest = max(largest, f)
         most = max(largest - zone, 0.0)
         if f >= most:  # virgin
-            assert u == f
+            assert u == pytest.approx(f * rise(f), rel=1e-15)
             continue
+        highest, given_ = most * rise(most), f * rise(most)
 
-        def off(v: float, f: float = f, most: float = most) -> float:
+        def off(v: float, f: float = given_, most: float = highest) -> float:
             return float(v * (1.0 - amount * np.tanh(max(most**2 - v * v, 0.0) / width)) - f)
 
-        low, high = (f, most) if f > 0.0 else (f / (1.0 - amount), f)
+        low, high = (given_, highest) if f > 0.0 else (20.0 * given_, given_)
         assert u == pytest.approx(brentq(off, low, high, xtol=1e-14), abs=1e-10)
 
 
@@ -183,7 +205,8 @@ def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not()
 @pytest.mark.parametrize(
     ("name", "values", "key"),
     [
-        ("mullins_softening", np.array([0.05, 0.3]), "largest_load"),
+        ("mullins_softening", np.array([0.05, 0.3, 0.0]), "largest_load"),
+        ("mullins_softening", np.array([0.05, 0.3, 1.0]), "largest_load"),
         ("cycle_conditioning", np.array([0.05, 3.0, 0.0]), "cycles"),
         ("cycle_conditioning", np.array([0.05, 3.0, 1.0]), "way"),
         ("permanent_set", np.array([1e-3, 1.0]), "dose"),

@@ -287,6 +287,21 @@ def test_a_spring_that_bends_in_the_loop_keeps_the_balance(
     assert np.max(np.abs(off)) <= 5e-3 * bent
 
 
+def _softened(trial: float, most: float, values: Array) -> float:
+    """phi of a deformation where ``most`` is the largest so far, by a plain search for the root."""
+    gained, width, at_once = values
+    below, whole = (1.0 - at_once) * gained, np.tanh(0.75 / width)
+
+    def rise(largest: float) -> float:
+        return float(1.0 + at_once * gained / whole * np.tanh(largest**2 / width))
+
+    highest = most * rise(most)
+    if trial >= highest:
+        return float(brentq(lambda phi: phi * rise(phi) - trial, 0.0, trial, xtol=1e-15)) if trial else 0.0
+    lost = below / (1.0 + below) / whole * np.tanh(max(highest**2 - trial**2, 0.0) / width)
+    return float(trial * (1.0 - lost) / rise(most))
+
+
 @pytest.mark.parametrize("name", ["wall_hardening", "gas_compression", "mullins_softening"])
 @given(seed=seeds, share=st.floats(0.0, 0.5), rate_per_s=st.floats(0.05, 5.0))
 @settings(max_examples=8)
@@ -312,8 +327,7 @@ def test_springs_beside_the_arm_are_those_of_a_plain_search_for_the_root(
             if name == "gas_compression":  # of a deformation
                 wall, pressure = USUAL_WALL_RATIO - 1.0, trial / (1.0 + values[0] * (1.0 - trial))
                 return pressure * (1.0 + wall / (1.0 + values[0] * pressure)) / (1.0 + wall / (1.0 + values[0]))
-            lost = values[0] / (1.0 + values[0]) / np.tanh(0.75 / values[1])
-            return trial * (1.0 - lost * np.tanh(max(most**2 - trial**2, 0.0) / values[1])) if trial < most else trial
+            return _softened(trial, most, values)
 
         found = brentq(lambda v: spring(v) + share * (v - lagged(v)) - force, -0.5, 1.05, xtol=1e-14)  # noqa: B023
         q, u = lagged(found), found

@@ -18,10 +18,11 @@ from smartshoe.models.elements import Arm
 
 
 class MullinsSoftening(Effect):
-    """f = u (1 - c tanh((M^2 - u^2)/width)), M the largest load so far (after Ogden and Roxburgh 1999).
+    """f r(M) = u (1 - c tanh((M^2 r(M)^2 - u^2)/width)), r(M) = 1 + a tanh(M^2/width), M the largest load so far.
 
-    Loading to a new maximum follows the stiff curve; below it the wall is softer and the gas takes more of the load.
-    ``gained`` = 1/(1 - c tanh(3/(4 width))) - 1 is what the gain rises at half of full scale after full scale.
+    c makes the first loading follow the stiff curve and all below it softer (Ogden and Roxburgh 1999), a makes the wall
+    softer by what it has borne, the first loading included (damage, Simo 1987): ``at_once`` is the share of the latter.
+    ``gained`` is what the gain rises at half of full scale after full scale, for a share of 0.
     """
 
     name, family, stage, place = "mullins_softening", "softening", "wall", "wall"
@@ -33,8 +34,10 @@ class MullinsSoftening(Effect):
         EffectParameter(
             "width", "1", "how far below M^2 softening is complete, squares of full scale", None, 0.02, 3.0, 0.3
         ),
-    )
-    shapes = ({"width": 0.1}, {"width": 0.5})
+        EffectParameter("at_once", "1", "share of it that the first loading bears", None, 0.0, 1.0, 0.5,
+                        absent=0.0, natural="both"),
+    )  # fmt: skip
+    shapes = tuple({"width": width, "at_once": at_once} for width, at_once in ((0.1, 0.0), (0.5, 0.0), (0.5, 1.0)))
     exposed_by = by("peaks", "repeats")
     separated_by = {
         "cycle_conditioning": by("shuffled_loads"),
@@ -50,7 +53,7 @@ class MullinsSoftening(Effect):
         if values[0] == 0.0:
             return signal.copy()
         before, out = float(conditions.before.get("largest_load", 0.0)), np.empty(signal.size)
-        given = *_amount(values), before, dead_zone(conditions), *arm_beside(conditions)
+        given = *_amounts(values), before, dead_zone(conditions), *arm_beside(conditions)
         softened(np.ascontiguousarray(signal), *given, out)
         return out
 
@@ -59,24 +62,49 @@ class MullinsSoftening(Effect):
         return BesideArm(self.inverse(values, step_s), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """f (static) from u, in closed form; exact for a load without noise."""
+        """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
         from smartshoe.kernels.memory import softened_undone
 
-        amount, width = _amount(values)
+        strength, width, raised = _amounts(values)
 
         def body(of: Mapping[str, str]) -> str:
-            most = of["largest"]
+            most, per_width, a = of["largest"], c_number(1.0 / width), c_number(raised)
             return f"""{{
-    const double below = {most} * {most} - x * x;
-    x *= 1.0 - {c_number(amount)} * tanh((below > 0.0 ? below : 0.0) / {c_number(width)});
+    const double rise = 1.0 + {a} * tanh({most} * {most} * {per_width}), highest = {most} * rise;
+    if (x < highest) {{
+        const double below = highest * highest - x * x;
+        x *= (1.0 - {c_number(strength)} * tanh((below > 0.0 ? below : 0.0) * {per_width})) / rise;
+    }} else {{
+        const double u = x;
+        double low = u / (1.0 + {a}), high = u;
+        int k;
+        for (k = 0; k < 60; k++) {{
+            const double bend = tanh(x * x * {per_width}), was = x;
+            const double more = 1.0 + {a} * bend;
+            if (x * more > u) {{
+                high = x;
+            }} else {{
+                low = x;
+            }}
+            x -= (x * more - u) / (more + {a} * 2.0 * x * x * {per_width} * (1.0 - bend * bend));
+            if (!(low <= x && x <= high)) {{
+                x = 0.5 * (low + high);
+            }} else if (fabs(x - was) <= 1e-9) {{
+                break;
+            }}
+        }}
+    }}
     if (x - {c_number(LEAST_DEAD_ZONE)} > {most}) {{
         {most} = x - {c_number(LEAST_DEAD_ZONE)};
     }}
 }}"""
 
-        return Undone(softened_undone, (amount, width, LEAST_DEAD_ZONE), np.zeros(1), ("largest",), body)
+        constants = (strength, width, raised, LEAST_DEAD_ZONE)
+        return Undone(softened_undone, constants, np.zeros(1), ("largest",), body)
 
 
-def _amount(values: Array) -> tuple[float, float]:
-    gained, width = (float(value) for value in values)
-    return gained / (1.0 + gained) / math.tanh(0.75 / width), width
+def _amounts(values: Array) -> tuple[float, float, float]:
+    """What is lost below the largest load, its width, and by how much the first loading rises at most."""
+    gained, width, at_once = (float(value) for value in values)
+    below, whole = (1.0 - at_once) * gained, math.tanh(0.75 / width)
+    return below / (1.0 + below) / whole, width, at_once * gained / whole
