@@ -32,7 +32,7 @@ from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, MOST_MEMBERS, additions
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._state import State, searched, state_at, with_members
+from smartshoe.diagnosis._state import State, evidence_about, searched, state_at, with_members
 from smartshoe.diagnosis._validation import LeftOut, apart, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
@@ -157,6 +157,8 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
         own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
         extended, best = plain, evidence.posterior(own)
     left = tuple(name for name in undone if name in extended.model.names)
+    if refused and extended.model.parts:
+        evidence, best = evidence_about(extended.model, sessions, evidence)
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left)
 
 

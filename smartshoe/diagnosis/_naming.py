@@ -30,7 +30,7 @@ class Name:
 def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
-    A flexible block is named by the law of its family that comes nearest.
+    A flexible block is named by the law of its family, and of its stage in the chain, that comes nearest.
     """
     likely = ((one, probability_of_kind(one, left, thresholds)) for one in members if one.size >= thresholds.material)
     return tuple(_named(one, kind, left, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
@@ -42,7 +42,9 @@ def _named(one: Member, kind: float, left: float, thresholds: Thresholds) -> Nam
         return Name(one, one.effect, kind, law, equivalents)
     family = [e for e in catalogue().values() if e.family == one.effect.family]
     margins = {a.effect: a.margin for a in one.laws}
-    nearest = min(family, key=lambda e: margins.get(e.name, math.inf))
+    # What grows with the load borne is none that goes with the clock; but curves look alike wherever they stand.
+    alike = [e for e in family if e.stage == one.effect.stage and not one.effect.is_memoryless]
+    nearest = min(alike or family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
     # Of a family of one law nothing follows better or worse than another.
     sure = probability_of_kind(one, left, thresholds, lawless=bool(others))

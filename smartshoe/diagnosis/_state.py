@@ -74,6 +74,12 @@ def searched(
     return given, evidence, search(evidence, first.members, banned)
 
 
+def evidence_about(model: ExtendedModel, sessions: Sequence[Session], other: Evidence) -> tuple[Evidence, Posterior]:
+    """The evidence about a model, under the noise that the ``other`` one has, and the model's own set in it."""
+    evidence = Evidence(linearised(model, sessions, other.thresholds), other.noise_sd)
+    return evidence, evidence.posterior(_set_of(model, evidence.given))
+
+
 def _set_of(model: ExtendedModel, given: Linearised) -> Members:
     """The candidates that stand in a model."""
     return tuple(k for k, one in enumerate(given.candidates) if one.name in model.names)

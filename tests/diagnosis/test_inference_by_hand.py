@@ -261,9 +261,15 @@ class _Judge:
         monkeypatch.setattr(_inference, "cancelling", lambda *given: self.undone.pop() if self.undone else [])
         monkeypatch.setattr(_inference, "begun_with", lambda one, model, likelihood: self.model(*model.names, one.name))
         monkeypatch.setattr(_inference, "extrapolating", lambda *given: self.beyond.pop() if self.beyond else None)
+        self.weighed_about: list[Any] = []
+        monkeypatch.setattr(_inference, "evidence_about", self.about)
         monkeypatch.setattr(
             _inference, "members_of", lambda evidence, best, refused, *rest: (best.members, tuple(refused))
         )
+
+    def about(self, model: Any, sessions: Any, other: Any) -> Any:
+        self.weighed_about.append(model.names)
+        return other, other.posterior(tuple(k for k, one in enumerate(self.candidates) if one.name in model.names))
 
     def model(self, *names: str) -> Any:
         made = SimpleNamespace(names=names, parts=names)
@@ -293,6 +299,19 @@ def test_what_does_not_follow_what_is_left_out_is_refused(monkeypatch: pytest.Mo
     judge.follows, judge.beyond = ("a", "b"), ["b"]
     fit, members, refused = judge.judged()
     assert (fit.model.names, members, refused) == (("a",), ((0,), ("b",)), ("b",))
+
+
+def test_effects_are_weighed_about_the_model_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Anew where some were taken out: those had bent what the others were weighed about."""
+    judge = _Judge(monkeypatch)
+    judge.judged()
+    assert judge.weighed_about == []
+    judge.follows = ("b",)
+    judge.judged()
+    assert judge.weighed_about == [("b",)]
+    judge.stands = False
+    judge.judged()
+    assert judge.weighed_about == [("b",)]
 
 
 def test_of_effects_that_undo_one_another_the_idle_one_goes(monkeypatch: pytest.MonkeyPatch) -> None:

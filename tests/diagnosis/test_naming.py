@@ -131,6 +131,14 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.law == pytest.approx(1.0 / len(family))
 
 
+def test_a_block_is_named_by_a_law_of_its_own_stage() -> None:
+    """A set grows with what the wall has borne: a drift by the clock may come near, and is none of a wall."""
+    (block,) = blocks()["zero"]
+    name = only(names_of([member(block, laws=(("zero_drift", 3.0), ("permanent_set", 90.0)))], 0.0, STANDARD))
+    assert name.effect.name == "permanent_set"
+    assert "zero_drift" in name.equivalents
+
+
 def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
     """No law of it follows better or worse than another, so that nothing speaks for a kind that is not there."""
     (block,) = blocks()["gain_drift"]
