@@ -404,11 +404,12 @@ def rise(largest, raised, width):  # type: ignore[no-untyped-def]
 def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untyped-def]
     """phi of a first loading, own phi + arm u = ``load`` >= 0 and u = phi rise(phi), and the slope of the load in u.
 
-    Newton from ``phi``, held in a bracket: both terms rise.
+    Newton from ``phi``, held in a bracket; own + arm (1 + raised) is above zero.
     """
     if raised == 0.0:
         return load / (own + arm), own + arm
-    low, high = load / (own + arm * (1.0 + raised)), load / (own + arm)
+    one, other = load / (own + arm * (1.0 + raised)), load / (own + arm)
+    low, high = min(one, other), max(one, other)
     phi, slope = min(max(phi, low), high), 1.0
     for _ in range(60):
         bend = math.tanh(phi * phi / width)

@@ -78,6 +78,8 @@ def softened(load, strength, width, raised, largest, dead_zone, share, decay, no
     bound = strength / width * (3.0 + 2.0 / width)
     arm = held = 0.0
     u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
+    if share < 0.0:  # an arm that pushes leaves a tenth of the wall's own stiffness, at least
+        raised = min(raised, max(-0.9 / share - 1.0, 0.0))
     for k in range(load.size):
         last, f = u, load[k] + held
         most = max(largest - dead_zone, 0.0)
