@@ -96,9 +96,9 @@ def _lag_line(view: View) -> tuple[float, float] | None:
             before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
             after = _unexplained(grid, shifted, reading, smooth_s, given)
             agreed = lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
-            # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock; and
-            # seconds late where it relaxes by half: then the shifted clock explains it far worse, where blunt edges
-            # tell a constant lag from a relaxation neither way.
+            # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
+            # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
+            # a constant lag from a relaxation neither way.
             if agreed and after < before / (1.0 if rate else 1.0 - given.same):
                 return offset_s, rate
             offered.append((after, offset_s, rate))

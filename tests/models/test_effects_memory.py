@@ -16,7 +16,7 @@ from smartshoe.models.effects.effect import Conditions
 STEP_S = 0.02
 PLAY = np.array([0.02, 0.06, 0.5, 0.6, 0.0])
 STOPS = np.array([0.02, 0.06, 0.8, 0.6, 1.0])
-BOUC_WEN = np.array([0.02, 0.08, 1.5, 0.5])
+BOUC_WEN = np.array([0.02, 0.08, 1.5, 0.5, 0.0])
 LOOPS = (("play_hysteresis", PLAY), ("play_hysteresis", STOPS), ("bouc_wen_hysteresis", BOUC_WEN))
 MEMORIES = (
     *LOOPS,
@@ -89,6 +89,15 @@ def test_a_closed_loop_reads_zero_without_load_and_an_open_one_keeps_friction() 
     assert run("play_hysteresis", PLAY, path)[-1] == pytest.approx(0.0, abs=1e-12)
     assert run("play_hysteresis", STOPS, path)[-1] == pytest.approx(STOPS[0], rel=0.02)
     assert run("bouc_wen_hysteresis", BOUC_WEN, path)[-1] == pytest.approx(BOUC_WEN[0], rel=0.02)
+
+
+@pytest.mark.parametrize("growth", [-0.9, 0.5, 3.0])
+def test_friction_grows_with_the_load_as_it_is_said_to(growth: float) -> None:
+    path = between([1.0, 0.0, 0.5], 200)
+    plain, grown = (run("bouc_wen_hysteresis", np.array([0.02, 0.03, 1.5, 0.5, g]), path) for g in (0.0, growth))
+    np.testing.assert_allclose(
+        path - grown, (path - plain) * (1.0 + growth * path), atol=0.02 * 2 * LEAST_DEAD_ZONE * 3
+    )
 
 
 @pytest.mark.parametrize(("name", "values"), MEMORIES)

@@ -13,24 +13,28 @@ from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter,
 from smartshoe.models.effects.exposure import by
 
 WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
+LARGEST = 2.0  # full scales of load up to which friction is undone
 
 
 class BoucWenHysteresis(Effect):
-    """f - h z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width with gamma + beta = 1 (Wen 1976), z in [-1, 1].
+    """f - h (1 + g max(f, 0)) z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width, gamma + beta = 1 (Wen 1976).
 
-    z begins at 0. ``turn`` is beta - gamma: 0 unloads in a straight line, 1 with n = 1 is Dahl's friction.
+    z in [-1, 1] begins at 0. ``turn`` is beta - gamma: 0 unloads in a straight line, 1 with n = 1 is Dahl's friction.
+    ``growth`` g: friction grows with the force that presses (Amontons), or falls as what slides comes to its end.
     """
 
     name, family, stage, place = "bouc_wen_hysteresis", "hysteresis", "wall", "wall"
     is_steep_undone = True
     says = "the reading lies lower while loading than while unloading, at any rate, and friction is there at any load"
     parameters = (
-        EffectParameter("half_height", "FS_load", "friction of a long slide", 0.0, 0.0, 0.4, 0.01),
+        EffectParameter("half_height", "FS_load", "friction of a long slide without load", 0.0, 0.0, 0.4, 0.01),
         EffectParameter("width", "FS_load", "load over which friction turns over", None, 0.005, 1.0, 0.1),
         EffectParameter("exponent", "1", "n: how abruptly friction comes to its end value", None, 0.6, 5.0, 0.5),
         EffectParameter("turn", "1", "how much faster friction falls after a reversal", None, 0.0, 2.0, 0.5),
-    )
-    shapes = tuple({"width": width, "exponent": 1.5, "turn": 0.5} for width in (0.03, 0.1, 0.3))
+        EffectParameter("growth", "1", "friction under full load over that without load, less 1", None, -0.9, 3.0, 0.5,
+                        absent=0.0),
+    )  # fmt: skip
+    shapes = tuple({"width": width, "exponent": 1.5, "turn": 0.5, "growth": 0.0} for width in (0.03, 0.1, 0.3))
     exposed_by = by("rates", "peaks", "minor_loops")
     separated_by = {
         "load_unload_asymmetry": by("minor_loops"),
@@ -49,25 +53,28 @@ class BoucWenHysteresis(Effect):
         load = cleaned(signal, dead_zone(conditions))
         out = np.empty(load.size)
         bouc_wen(load, *_branch(values), np.array(START), out)
-        return signal - float(values[0]) * out
+        return signal - float(values[0]) * (1.0 + float(values[4]) * np.maximum(load, 0.0)) * out
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """The load whose friction gives the output, by bisection; exact for a load without noise.
 
-        There is one such load where friction turns over less fast than load: half_height (1 + turn) < width.
+        There is one such load where friction turns over less fast than load: half_height (1 + growth) (1 + turn) <
+        width.
         """
         from smartshoe.kernels.memory import bouc_wen_undone
 
-        strength = float(values[0])
+        strength, growth = float(values[0]), float(values[4])
+        most = strength * (1.0 + max(growth, 0.0) * LARGEST)
         per_load, z, slope = _branch(values)
 
         def body(of: Mapping[str, str]) -> str:
             return _C_BODY.format(
                 **of, points=z.size, z=_row(z), slope=_row(slope), last_point=z.size - 1, no_load=NO_LOAD,
-                strength=c_number(strength), zone=c_number(LEAST_DEAD_ZONE), per_load=c_number(per_load),
+                strength=c_number(strength), growth=c_number(growth), most=c_number(most),
+                zone=c_number(LEAST_DEAD_ZONE), per_load=c_number(per_load),
             )  # fmt: skip
 
-        constants = (strength, per_load, z, slope, LEAST_DEAD_ZONE)
+        constants = (strength, growth, most, per_load, z, slope, LEAST_DEAD_ZONE)
         return Undone(bouc_wen_undone, constants, np.array(START), ("last", "value", "direction", "place"), body)
 
 
@@ -78,7 +85,7 @@ def _branch(values: Array) -> tuple[float, Array, Array]:
     """Spacings per load, and the rising branch."""
     from smartshoe.kernels.memory import bouc_wen_branch
 
-    _, width, exponent, turn = (float(value) for value in values)
+    width, exponent, turn = (float(value) for value in values[1:4])
     z, slope = np.empty(SPACINGS + 1), np.empty(SPACINGS + 1)
     bouc_wen_branch(exponent, turn, WIDTHS / SPACINGS, z, slope)
     return SPACINGS / (WIDTHS * width), z, slope
@@ -109,7 +116,7 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
     static const double z[{{points}}] = {{{{{{z}}}}}};
     static const double slope[{{points}}] = {{{{{{slope}}}}}};
     const double y = x;
-    x = y + {{strength}} * {{value}};
+    x = y + {{strength}} * (1.0 + {{growth}} * fmax({{last}}, 0.0)) * {{value}};
     if (fabs(x - {{last}}) > {{zone}}) {{{{
         const double sense = x > {{last}} ? 1.0 : -1.0;
         double on = {{place}}, low, high, move = 0.0, now;
@@ -128,8 +135,8 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
             }}}}
             on = 0.5 * (low + high);
         }}}}
-        low = sense > 0.0 ? {{last}} : y - {{strength}};
-        high = sense > 0.0 ? y + {{strength}} : {{last}};
+        low = sense > 0.0 ? {{last}} : y - {{most}};
+        high = sense > 0.0 ? y + {{most}} : {{last}};
         for (k = 0; k <= 50; k++) {{{{
             x = 0.5 * (low + high);
             move = sense * (x - {{last}}) - {{zone}};
@@ -138,7 +145,7 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
             if (k == 50) {{{{
                 break;
             }}}}
-            if (x - {{strength}} * sense * now < y) {{{{
+            if (x - {{strength}} * (1.0 + {{growth}} * fmax({{last}} + sense * move, 0.0)) * sense * now < y) {{{{
                 low = x;
             }}}} else {{{{
                 high = x;
