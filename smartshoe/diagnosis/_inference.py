@@ -150,15 +150,19 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         extended = fit(likelihood, extended.model.without(beyond))
-    best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name not in refused))
-    went_astray = extended.model.names == plain.model.names or error_of(sessions, extended.model) >= most
-    if went_astray or not left_out.stands(extended.model, plain.model):
-        # What the baseline itself holds, two clocks, was told before any model.
-        own = tuple(m for m in best.members if given.candidates[m].name in plain.model.names)
-        extended, best = plain, evidence.posterior(own)
-    left = tuple(name for name in undone if name in extended.model.names)
-    if refused and extended.model.parts:
+    # What the baseline itself holds, two clocks, was told before any model.
+    extra = [name for name in extended.model.names if name not in plain.model.names]
+    while extra and (error_of(sessions, extended.model) >= most or not left_out.stands(extended.model, plain.model)):
+        smaller = [fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra]
+        extended = min(smaller, key=lambda one: float(left_out.errors(one.model).sum()))
+        refused += [name for name in extra if name not in extended.model.names]
+        extra = [name for name in extra if name in extended.model.names]
+    extended = extended if extra else plain
+    kept = extended.model.names
+    best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
+    if refused and kept:
         evidence, best = evidence_about(extended.model, sessions, evidence)
+    left = tuple(name for name in undone if name in kept)
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left)
 
 

@@ -176,10 +176,10 @@ def bouc_wen(load, per_load, z, slope, state, out):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True)
-def bouc_wen_undone(signal, strength, growth, most, per_load, z, slope, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out - strength (1 + growth max(b, 0)) friction = ``signal`` (n,), along b, the backlash of out.
+def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out - strength (1 - fading b) friction = ``signal`` (n,), friction along b, the backlash of out.
 
-    ``most`` is the largest of it. ``state`` (4,) as in `bouc_wen`.
+    ``state`` (4,) as in `bouc_wen`.
     """
     last, value, direction, place = state
     for k in range(signal.size):
@@ -188,15 +188,15 @@ def bouc_wen_undone(signal, strength, growth, most, per_load, z, slope, dead_zon
             last = y
             out[k] = y
             continue
-        f = y + strength * (1.0 + growth * max(last, 0.0)) * value
+        f = y + strength * min(max(1.0 - fading * last, 0.0), 1.0) * value
         if abs(f - last) > dead_zone:  # else the load has not moved, as far as friction knows
             sense = 1.0 if f > last else -1.0
             on = place if sense == direction else _place_of(sense * value, z, slope)
-            low, high = (last, y + most) if sense > 0.0 else (y - most, last)
+            low, high = (last, y + strength) if sense > 0.0 else (y - strength, last)
             for _ in range(_BISECTIONS):
                 f = 0.5 * (low + high)
                 move = max(sense * (f - last) - dead_zone, 0.0)
-                height = strength * (1.0 + growth * max(last + sense * move, 0.0))
+                height = strength * min(max(1.0 - fading * (last + sense * move), 0.0), 1.0)
                 if f - height * sense * _along(on + move * per_load, z, slope) < y:
                     low = f
                 else:

@@ -231,6 +231,8 @@ class _Judge:
         self.undone: list[list[str]] = []
         self.costs: dict[tuple[str, ...], float] = {}
         self.stands = True
+        self.falls: list[tuple[str, ...]] = []
+        self.left_out: dict[tuple[str, ...], float] = {}
         names = ("a", "b", "clock")
         self.candidates = [candidate(name) for name in names]
         self.evidence: Any = ToldEvidence(self.candidates, worth(1.0, 1.0, 1.0))
@@ -246,7 +248,10 @@ class _Judge:
                 return SimpleNamespace(model=judge.model(*judge.follows), how="followed")
 
             def stands(self, model: Any, plain: Any) -> bool:
-                return judge.stands
+                return judge.stands and model.names not in judge.falls
+
+            def errors(self, model: Any) -> Any:
+                return np.array([judge.left_out.get(model.names, 1.0)])
 
         monkeypatch.setattr(_inference, "error_of", lambda sessions, model: self.errors.get(model.names, 0.5))
         monkeypatch.setattr(_inference, "LeftOut", Left)
@@ -349,7 +354,7 @@ def test_a_model_that_others_had_bent_is_begun_anew_from_the_plain_one(
     judge = _Judge(monkeypatch)
     judge.follows, judge.errors[("b",)] = ("b",), error
     fit, members, refused = judge.judged()
-    assert (fit, members, refused) == (judge.plain, ((), ("a",)), ("a",))
+    assert (fit, members, refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
     judge.errors[("b",)] = 0.9999
     assert judge.judged()[0].how == "followed"
     judge.follows, judge.errors[("a", "b")] = ("a", "b"), error
@@ -358,12 +363,23 @@ def test_a_model_that_others_had_bent_is_begun_anew_from_the_plain_one(
     assert (fit.model.names, fit.how) == (("a", "c"), ())
 
 
+def test_of_a_set_that_does_not_stand_as_much_is_kept_as_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That goes first without which what is left out is foreseen best."""
+    judge = _Judge(monkeypatch)
+    judge.falls, judge.left_out = [("a", "b")], {("a",): 2.0, ("b",): 1.0}
+    fit, members, refused = judge.judged()
+    assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
+    judge.falls.append(("b",))
+    fit, members, refused = judge.judged()
+    assert (fit, members, refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
+
+
 def test_what_went_astray_leaves_the_plain_model_and_what_that_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = _Judge(monkeypatch)
     judge.stands = False
-    assert judge.judged()[:2] == (judge.plain, ((), ()))
+    assert judge.judged()[:2] == (judge.plain, ((), ("a", "b")))
     judge.plain.model = judge.model("b")
-    assert judge.judged()[:2] == (judge.plain, ((1,), ()))
+    assert judge.judged()[:2] == (judge.plain, ((1,), ("a",)))
     judge.stands, judge.follows = True, ("b",)
     fit, members, _ = judge.judged()
     assert (fit, members) == (judge.plain, ((1,), ("a",)))

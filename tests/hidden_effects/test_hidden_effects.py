@@ -201,7 +201,9 @@ def test_two_effects_are_both_named(effects, protocol):
     case = hide(effects, protocol=protocol, seed=drawn("pair", 1000).seed, recordings=2)
     diagnosis, one = diagnosed(case)
     assert one.family, told(effects, diagnosis, one)
-    assert set(effects) <= {named.effect for named in one.named}, told(effects, diagnosis, one)
+    # In a dead heat of two laws of a kind either may be named, with the other one beside it.
+    names = {name for cause in diagnosis.causes for name in (cause.name, *cause.equivalents)}
+    assert set(effects) <= names, told(effects, diagnosis, one)
     assert one.gain_percent > 0
     assert one.removed is not None
     assert one.removed > 0.9

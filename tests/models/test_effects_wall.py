@@ -335,3 +335,14 @@ def test_springs_beside_the_arm_are_those_of_a_plain_search_for_the_root(
         bent = found / (1.0 + values[0] * (1.0 - found)) if name == "gas_compression" else found + share * (found - q)
         wanted[k] = bent
     assert np.max(np.abs(made.apply(given_.load, given_, values) - wanted)) < 1e-9
+
+
+@given(seed=seeds, share=st.floats(-0.9, 5.0), width=st.floats(0.02, 3.0), at_once=st.floats(0.0, 1.0))
+@settings(max_examples=20)
+def test_softened_rubber_beside_any_arm_stays_within_bounds(
+    seed: int, share: float, width: float, at_once: float
+) -> None:
+    """A fit tries arms that push, and ones that bear most of the load: what it then finds is finite, if it is wrong."""
+    given_ = conditions(corners(seed)).within(share, 0.3)
+    out = effect("mullins_softening").apply(given_.load, given_, np.array([1.0, width, at_once]))
+    assert np.max(np.abs(out)) < 1e3 * np.max(np.abs(given_.load))

@@ -51,8 +51,8 @@ def drawn(made: Effect, seed: int) -> Array:
             values[k] = parameter.null + parameter.size * generator.uniform(0.3, 3.0)
         values[k] = min(max(values[k], parameter.lower), parameter.upper)
     if made.name == "bouc_wen_hysteresis":  # more friction than this lets no load through after a reversal
-        values[4] = generator.uniform(-0.5, 1.5)
-        values[0] = min(values[0], 0.5 * values[1] / (1.0 + values[3]) / (1.0 + max(values[4], 0.0)))
+        values[4] = generator.uniform(0.0, 1.0)
+        values[0] = min(values[0], 0.5 * values[1] / (1.0 + values[3]))
     return values
 
 

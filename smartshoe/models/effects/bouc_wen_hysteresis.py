@@ -13,14 +13,14 @@ from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter,
 from smartshoe.models.effects.exposure import by
 
 WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
-LARGEST = 2.0  # full scales of load up to which friction is undone
 
 
 class BoucWenHysteresis(Effect):
-    """f - h (1 + g max(f, 0)) z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width, gamma + beta = 1 (Wen 1976).
+    """f - h (1 - l f) z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width, gamma + beta = 1 (Wen 1976).
 
     z in [-1, 1] begins at 0. ``turn`` is beta - gamma: 0 unloads in a straight line, 1 with n = 1 is Dahl's friction.
-    ``growth`` g: friction grows with the force that presses (Amontons), or falls as what slides comes to its end.
+    ``fading`` l: friction falls with the load as what slides comes to its end; that which grows from nothing is
+    `play_hysteresis`. None is left from 1/l on, all of it below zero.
     """
 
     name, family, stage, place = "bouc_wen_hysteresis", "hysteresis", "wall", "wall"
@@ -31,10 +31,10 @@ class BoucWenHysteresis(Effect):
         EffectParameter("width", "FS_load", "load over which friction turns over", None, 0.005, 1.0, 0.1),
         EffectParameter("exponent", "1", "n: how abruptly friction comes to its end value", None, 0.6, 5.0, 0.5),
         EffectParameter("turn", "1", "how much faster friction falls after a reversal", None, 0.0, 2.0, 0.5),
-        EffectParameter("growth", "1", "friction under full load over that without load, less 1", None, -0.9, 3.0, 0.5,
-                        absent=0.0),
+        EffectParameter("fading", "1", "share of friction that is gone under full load", None, 0.0, 1.0, 0.5,
+                        absent=0.0, natural="both"),
     )  # fmt: skip
-    shapes = tuple({"width": width, "exponent": 1.5, "turn": 0.5, "growth": 0.0} for width in (0.03, 0.1, 0.3))
+    shapes = tuple({"width": width, "exponent": 1.5, "turn": 0.5, "fading": 0.0} for width in (0.03, 0.1, 0.3))
     exposed_by = by("rates", "peaks", "minor_loops")
     separated_by = {
         "load_unload_asymmetry": by("minor_loops"),
@@ -53,28 +53,26 @@ class BoucWenHysteresis(Effect):
         load = cleaned(signal, dead_zone(conditions))
         out = np.empty(load.size)
         bouc_wen(load, *_branch(values), np.array(START), out)
-        return signal - float(values[0]) * (1.0 + float(values[4]) * np.maximum(load, 0.0)) * out
+        return signal - float(values[0]) * np.clip(1.0 - float(values[4]) * load, 0.0, 1.0) * out
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """The load whose friction gives the output, by bisection; exact for a load without noise.
 
-        There is one such load where friction turns over less fast than load: half_height (1 + growth) (1 + turn) <
-        width.
+        There is one such load where friction turns over less fast than load: half_height (1 + turn) < width.
         """
         from smartshoe.kernels.memory import bouc_wen_undone
 
-        strength, growth = float(values[0]), float(values[4])
-        most = strength * (1.0 + max(growth, 0.0) * LARGEST)
+        strength, fading = float(values[0]), float(values[4])
         per_load, z, slope = _branch(values)
 
         def body(of: Mapping[str, str]) -> str:
             return _C_BODY.format(
                 **of, points=z.size, z=_row(z), slope=_row(slope), last_point=z.size - 1, no_load=NO_LOAD,
-                strength=c_number(strength), growth=c_number(growth), most=c_number(most),
-                zone=c_number(LEAST_DEAD_ZONE), per_load=c_number(per_load),
+                strength=c_number(strength), fading=c_number(fading), zone=c_number(LEAST_DEAD_ZONE),
+                per_load=c_number(per_load),
             )  # fmt: skip
 
-        constants = (strength, growth, most, per_load, z, slope, LEAST_DEAD_ZONE)
+        constants = (strength, fading, per_load, z, slope, LEAST_DEAD_ZONE)
         return Undone(bouc_wen_undone, constants, np.array(START), ("last", "value", "direction", "place"), body)
 
 
@@ -116,10 +114,10 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
     static const double z[{{points}}] = {{{{{{z}}}}}};
     static const double slope[{{points}}] = {{{{{{slope}}}}}};
     const double y = x;
-    x = y + {{strength}} * (1.0 + {{growth}} * fmax({{last}}, 0.0)) * {{value}};
+    x = y + {{strength}} * fmin(fmax(1.0 - {{fading}} * {{last}}, 0.0), 1.0) * {{value}};
     if (fabs(x - {{last}}) > {{zone}}) {{{{
         const double sense = x > {{last}} ? 1.0 : -1.0;
-        double on = {{place}}, low, high, move = 0.0, now;
+        double on = {{place}}, low, high, height, move = 0.0, now;
         int k;
         if (sense * {{direction}} <= 0.0) {{{{
             low = 0.0;
@@ -135,17 +133,19 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
             }}}}
             on = 0.5 * (low + high);
         }}}}
-        low = sense > 0.0 ? {{last}} : y - {{most}};
-        high = sense > 0.0 ? y + {{most}} : {{last}};
+        low = sense > 0.0 ? {{last}} : y - {{strength}};
+        high = sense > 0.0 ? y + {{strength}} : {{last}};
         for (k = 0; k <= 50; k++) {{{{
             x = 0.5 * (low + high);
             move = sense * (x - {{last}}) - {{zone}};
             move = move > 0.0 ? move : 0.0;
             {_at("on + move * {per_load}", "now")}
+            now *= sense;
             if (k == 50) {{{{
                 break;
             }}}}
-            if (x - {{strength}} * (1.0 + {{growth}} * fmax({{last}} + sense * move, 0.0)) * sense * now < y) {{{{
+            height = fmin(fmax(1.0 - {{fading}} * ({{last}} + sense * move), 0.0), 1.0);
+            if (x - {{strength}} * height * now < y) {{{{
                 low = x;
             }}}} else {{{{
                 high = x;
@@ -154,7 +154,7 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
         if (move > 0.0) {{{{
             {{direction}} = sense;
             {{place}} = on + move * {{per_load}};
-            {{value}} = sense * now;
+            {{value}} = now;
             {{last}} += sense * move;
         }}}}
     }}}}
