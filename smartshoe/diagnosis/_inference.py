@@ -7,7 +7,7 @@ What is held out for judging is not looked at here. Validation is within the fit
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -103,12 +103,20 @@ def infer(
         if _score(other.fit.model, other.likelihood, odds) >= _score(found.fit.model, other.likelihood, odds):
             break  # a law that follows better in its place led to a set that does not
         found, members = other, other.members()
+    if found.is_stepped_down:
+        found = found.without_all_but(plain)
+        members = found.members()
     return Inference(plain, found.fit, found.likelihood, members, screening, found.refused, undone=found.undone)
 
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """What of a state's effects predicts what is left out: the set and its ``fit``, and what was taken out of it."""
+    """What of a state's effects predicts what is left out: the set and its ``fit``, and what was taken out of it.
+
+    ``is_stepped_down``: effects were taken out for no other reason than that what is left out is foreseen better. That
+    shows which laws may be likelier in the place of those that are left. As an answer it is none: what was chosen for
+    what is left out says nothing of whether it is there, nor of any other recording.
+    """
 
     evidence: Evidence
     best: Posterior
@@ -116,6 +124,14 @@ class _Judged:
     likelihood: Likelihood
     refused: tuple[str, ...]
     undone: tuple[str, ...]
+    is_stepped_down: bool
+
+    def without_all_but(self, plain: Fit) -> _Judged:
+        """What the plain model itself has, two clocks, which were told before any model."""
+        candidates, own = self.evidence.given.candidates, plain.model.names
+        best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
+        refused = (*self.refused, *(name for name in self.fit.model.names if name not in own))
+        return replace(self, fit=plain, best=best, refused=refused, undone=())
 
     def members(self) -> tuple[Member, ...]:
         """Each effect weighed against its alternatives."""
@@ -150,8 +166,8 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     while (beyond := extrapolating(sessions, extended.model, state.thresholds)) is not None:
         refused.append(beyond)
         extended = fit(likelihood, extended.model.without(beyond))
-    # What the baseline itself holds, two clocks, was told before any model.
     extra = [name for name in extended.model.names if name not in plain.model.names]
+    followed = extended
     while extra and (error_of(sessions, extended.model) >= most or not left_out.stands(extended.model, plain.model)):
         smaller = [fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra]
         extended = min(smaller, key=lambda one: float(left_out.errors(one.model).sum()))
@@ -163,7 +179,8 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     if refused and kept:
         evidence, best = evidence_about(extended.model, sessions, evidence)
     left = tuple(name for name in undone if name in kept)
-    return _Judged(evidence, best, extended, likelihood, tuple(refused), left)
+    is_stepped_down = bool(extra) and extended is not followed
+    return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

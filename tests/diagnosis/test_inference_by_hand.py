@@ -152,8 +152,13 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def judged(one: Any, plain: Any, sessions: Any) -> Any:
         return SimpleNamespace(
-            members=lambda: (), fit=SimpleNamespace(model=one.name), likelihood="likelihood", refused=(), undone=()
-        )
+            members=lambda: (),
+            fit=SimpleNamespace(model=one.name),
+            likelihood="likelihood",
+            refused=(),
+            undone=(),
+            is_stepped_down=False,
+        )  # fmt: skip
 
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
     monkeypatch.setattr(
@@ -369,9 +374,14 @@ def test_of_a_set_that_does_not_stand_as_much_is_kept_as_does(monkeypatch: pytes
     judge.falls, judge.left_out = [("a", "b")], {("a",): 2.0, ("b",): 1.0}
     fit, members, refused = judge.judged()
     assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
+    assert judge.inference().is_stepped_down
+    found = judge.inference().without_all_but(judge.plain)
+    assert (found.fit, found.members(), found.refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
     judge.falls.append(("b",))
     fit, members, refused = judge.judged()
     assert (fit, members, refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
+    judge.falls = []
+    assert not judge.inference().is_stepped_down
 
 
 def test_what_went_astray_leaves_the_plain_model_and_what_that_holds(monkeypatch: pytest.MonkeyPatch) -> None:
