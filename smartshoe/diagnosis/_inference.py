@@ -104,7 +104,7 @@ def infer(
             break  # a law that follows better in its place led to a set that does not
         found, members = other, other.members()
     if found.is_stepped_down:
-        found = found.without_all_but(plain)
+        found = found.with_nothing_but(plain)
         members = found.members()
     return Inference(plain, found.fit, found.likelihood, members, screening, found.refused, undone=found.undone)
 
@@ -126,7 +126,7 @@ class _Judged:
     undone: tuple[str, ...]
     is_stepped_down: bool
 
-    def without_all_but(self, plain: Fit) -> _Judged:
+    def with_nothing_but(self, plain: Fit) -> _Judged:
         """What the plain model itself has, two clocks, which were told before any model."""
         candidates, own = self.evidence.given.candidates, plain.model.names
         best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
@@ -169,15 +169,17 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     extra = [name for name in extended.model.names if name not in plain.model.names]
     followed = extended
     while extra and (error_of(sessions, extended.model) >= most or not left_out.stands(extended.model, plain.model)):
-        smaller = [fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra]
-        extended = min(smaller, key=lambda one: float(left_out.errors(one.model).sum()))
-        refused += [name for name in extra if name not in extended.model.names]
-        extra = [name for name in extra if name in extended.model.names]
+        less = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
+        worst = min(extra, key=lambda name: float(left_out.errors(less[name].model).sum()))
+        refused.append(worst)
+        extra.remove(worst)
+        extended = less[worst]
     extended = extended if extra else plain
     kept = extended.model.names
-    best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     if refused and kept:
         evidence, best = evidence_about(extended.model, sessions, evidence)
+    else:
+        best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = bool(extra) and extended is not followed
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)

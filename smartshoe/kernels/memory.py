@@ -13,6 +13,7 @@ from numba import njit
 
 _LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
 _BISECTIONS = 50
+STEPS, CLOSE = 60, 1e-9  # of Newton's for a first loading: a step that is less leaves about its square
 NO_LOAD = 1e30  # stands for a load before the first one
 CYCLE_ENDS = 0.05  # of the cycle's height
 
@@ -176,6 +177,12 @@ def bouc_wen(load, per_load, z, slope, state, out):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True)
+def _left(fading, load):  # type: ignore[no-untyped-def]
+    """The share of friction that is left under a ``load``."""
+    return min(max(1.0 - fading * load, 0.0), 1.0)
+
+
+@njit(cache=True)
 def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out - strength (1 - fading b) friction = ``signal`` (n,), friction along b, the backlash of out.
 
@@ -188,7 +195,7 @@ def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, sta
             last = y
             out[k] = y
             continue
-        f = y + strength * min(max(1.0 - fading * last, 0.0), 1.0) * value
+        f = y + strength * _left(fading, last) * value
         if abs(f - last) > dead_zone:  # else the load has not moved, as far as friction knows
             sense = 1.0 if f > last else -1.0
             on = place if sense == direction else _place_of(sense * value, z, slope)
@@ -196,7 +203,7 @@ def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, sta
             for _ in range(_BISECTIONS):
                 f = 0.5 * (low + high)
                 move = max(sense * (f - last) - dead_zone, 0.0)
-                height = strength * min(max(1.0 - fading * (last + sense * move), 0.0), 1.0)
+                height = strength * _left(fading, last + sense * move)
                 if f - height * sense * _along(on + move * per_load, z, slope) < y:
                     low = f
                 else:
@@ -412,12 +419,12 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
     one, other = load / (own + arm * (1.0 + raised)), load / (own + arm)
     low, high = min(one, other), max(one, other)
     phi, slope = min(max(phi, low), high), 1.0
-    for _ in range(60):
+    for _ in range(STEPS):
         bend = math.tanh(phi * phi / width)
         off = phi * (own + arm * (1.0 + raised * bend)) - load
         slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # of u in phi
         phi, low, high, step = newton(phi, off, own + arm * slope, low, high)
-        if abs(step) <= 1e-9:  # the next one would be about its square
+        if abs(step) <= CLOSE:
             break
     return phi, own / slope + arm
 

@@ -375,7 +375,7 @@ def test_of_a_set_that_does_not_stand_as_much_is_kept_as_does(monkeypatch: pytes
     fit, members, refused = judge.judged()
     assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
     assert judge.inference().is_stepped_down
-    found = judge.inference().without_all_but(judge.plain)
+    found = judge.inference().with_nothing_but(judge.plain)
     assert (found.fit, found.members(), found.refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
     judge.falls.append(("b",))
     fit, members, refused = judge.judged()

@@ -63,7 +63,7 @@ class MullinsSoftening(Effect):
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
-        from smartshoe.kernels.memory import softened_undone
+        from smartshoe.kernels.memory import CLOSE, STEPS, softened_undone
 
         strength, width, raised = _amounts(values)
 
@@ -78,7 +78,7 @@ class MullinsSoftening(Effect):
         const double u = x;
         double low = u / (1.0 + {a}), high = u;
         int k;
-        for (k = 0; k < 60; k++) {{
+        for (k = 0; k < {STEPS}; k++) {{
             const double bend = tanh(x * x * {per_width}), was = x;
             const double more = 1.0 + {a} * bend;
             if (x * more > u) {{
@@ -89,7 +89,7 @@ class MullinsSoftening(Effect):
             x -= (x * more - u) / (more + {a} * 2.0 * x * x * {per_width} * (1.0 - bend * bend));
             if (!(low <= x && x <= high)) {{
                 x = 0.5 * (low + high);
-            }} else if (fabs(x - was) <= 1e-9) {{
+            }} else if (fabs(x - was) <= {c_number(CLOSE)}) {{
                 break;
             }}
         }}
