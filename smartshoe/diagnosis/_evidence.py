@@ -31,7 +31,8 @@ from functools import cached_property
 from itertools import combinations, cycle
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis._sensitivity import (
@@ -40,6 +41,7 @@ from smartshoe.diagnosis._sensitivity import (
     directions,
     nuisance_precision,
     ridged,
+    where,
 )
 
 Members = tuple[int, ...]
@@ -77,7 +79,7 @@ class _Departures:
     """
 
     columns: _Columns
-    places: range
+    places: slice
     half: Array
 
 
@@ -111,11 +113,14 @@ class Evidence:
         inner[np.diag_indices_from(inner)] += 1.0
         self._factor = _factor(inner)
         self._half = self._taken_out(self.gram)
-        self._reduced = self.gram - self._half.T @ self._half
+        self._directions = directions(self.thresholds)
+        self._first = self.gram.shape[0]  # of all departures, a candidate's after the other's
+        # Of the departures little is ever asked for, and only that takes room.
+        self._reduced = np.zeros((self._first + self._directions * len(given.candidates),) * 2)
+        self._reduced[: self._first, : self._first] = self.gram - self._half.T @ self._half
         self._nothing = float(self._reduced[0, 0]) + 2.0 * float(np.sum(np.log(np.diag(self._factor))))
         self._departures: dict[int, _Departures] = {}
         self._known: set[tuple[int, int]] = set()
-        self._directions = directions(self.thresholds)
         effects = {one.name for one in given.candidates}
         self.odds = 2.0 * math.log(len(effects) / self.thresholds.false_name)
 
@@ -139,8 +144,8 @@ class Evidence:
 
     def visible_rms(self, columns: Sequence[int], strengths: Array) -> float:
         """Rms by which strengths of these columns move the reading beyond what the baseline absorbs."""
-        part = self.raw[np.ix_(list(columns), list(columns))]
-        return float(np.sqrt(max(float(strengths @ part @ strengths), 0.0)))
+        index = np.asarray(columns, dtype=np.intp)
+        return math.sqrt(max(float(strengths @ self.raw[index[:, None], index] @ strengths), 0.0))
 
     def _departures_of(self, members: Members) -> list[range]:
         """Where the columns of members' departures stand, made when they are first asked for."""
@@ -152,12 +157,12 @@ class Evidence:
                 self._known.add(pair)
                 one, other = (self._departures[member] for member in pair)
                 found = self._between(one.columns, other.columns) - one.half.T @ other.half
-                self._reduced[np.ix_(one.places, other.places)] = found
-                self._reduced[np.ix_(other.places, one.places)] = found.T
-        return [self._departures[member].places for member in members]
+                self._reduced[one.places, other.places] = found
+                self._reduced[other.places, one.places] = found.T
+        return [range(self._reduced.shape[0])[self._departures[member].places] for member in members]
 
     def _departing(self, member: int) -> _Departures:
-        given, first = self.given, int(self._reduced.shape[0])
+        given = self.given
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
         absorbed = self._absorbed[:, columns] @ weights
@@ -166,17 +171,16 @@ class Evidence:
             visible = rows[:, columns] @ weights - rows[:, 1 : 1 + given.own] @ absorbed
             known = products[-2:, columns] @ weights - products[-2:, 1 : 1 + given.own] @ absorbed
             signatures.append(visible - own @ np.linalg.solve(ridged(products[-2:, -2:]), known))
-        seen = [part[one.fitted] for part, one in zip(departures(given, signatures), given.sessions, strict=True)]
-        past = [part.T @ own[one.fitted] for part, own, one in zip(seen, given.nuisances, given.sessions, strict=True)]
+        parts = zip(departures(given, signatures), given.sessions, strict=True)
+        seen = [where(one.fitted, part) for part, one in parts]
+        past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
         made = _Columns(seen, past)
         cross = self._between(self._all, made)
-        half, places = self._taken_out(cross), range(first, first + self._directions)
-        reduced = cross - self._half.T @ half
-        grown = np.zeros((places.stop, places.stop))
-        grown[:first, :first] = self._reduced
-        grown[: len(reduced), first:], grown[first:, : len(reduced)] = reduced, reduced.T
-        grown[first:, first:] = self._between(made, made) - half.T @ half
-        self._reduced = grown
+        half, first = self._taken_out(cross), self._first + member * self._directions
+        places = slice(first, first + self._directions)
+        self._reduced[: self._first, places] = cross - self._half.T @ half
+        self._reduced[places, : self._first] = self._reduced[: self._first, places].T
+        self._reduced[places, places] = self._between(made, made) - half.T @ half
         return _Departures(made, places, half)
 
     def _direction(self, columns: Sequence[int]) -> Array:
@@ -196,31 +200,38 @@ class Evidence:
         members = tuple(sorted(members))
         asked = members, of_any_law
         if asked not in self._seen:
-            found = self.exact(members)
+            pull, fall = self._solved(members, None)
             # How far an equation departs goes with its size, which is first found as if it were exact.
             for _ in range(2 if members else 0):
-                found = self._solved(members, found.strengths, of_any_law=of_any_law)
-            self._seen[asked] = found
+                pull, fall = self._solved(members, self._strengths(members, pull), of_any_law=of_any_law)
+            self._seen[asked] = self._described(members, pull, fall)
         return self._seen[asked]
 
     def exact(self, members: Members) -> Posterior:
         """The evidence of a set whose equations are taken for exact."""
-        return self._solved(members, None)
+        return self._described(members, *self._solved(members, None))
 
-    def _solved(self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False) -> Posterior:
-        if not members:
-            return Posterior((), self._nothing, (), (), ())
-        index, sds = self._widened(members, strengths, of_any_law=of_any_law)
-        _, pull, fall = self._moved(index, sds)
+    def _solved(
+        self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
+    ) -> tuple[Array, float]:
+        """`_moved` by a set: the solution (k,), and by how much -2 log evidence falls."""
+        _, pull, fall = self._moved(*self._widened(members, strengths, of_any_law=of_any_law))
+        return pull, fall
+
+    def _strengths(self, members: Members, pull: Array) -> tuple[Array, ...]:
+        """Each member's (k,), of a solution that begins with them."""
+        ends = np.cumsum([len(self.given.candidates[m].columns) for m in members], dtype=np.intp)
+        return tuple(np.split(self.thresholds.strength_sd * pull[: ends[-1]], ends[:-1])) if members else ()
+
+    def _described(self, members: Members, pull: Array, fall: float) -> Posterior:
         columns = [self.given.candidates[m].columns for m in members]
-        ends = np.cumsum([len(own) for own in columns], dtype=np.intp)
-        found = self.thresholds.strength_sd * pull[: ends[-1]]
-        each = tuple(np.split(found, ends[:-1]))
+        each = self._strengths(members, pull)
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
-        beyond = pull[ends[-1] :][: len(members) * self._directions].reshape(len(members), -1)
-        departed = tuple(float(np.sqrt(np.mean(one**2))) if one.size else 0.0 for one in beyond)
-        together = self.visible_rms([c for own in columns for c in own], found)
-        return Posterior(members, self._nothing - fall + self.odds_of(members), each, sizes, departed, together)
+        beyond = pull[sum(map(len, columns)) :][: len(members) * self._directions]
+        departed = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
+        together = self.visible_rms([c for own in columns for c in own], np.concatenate([*each, ()]))
+        score = self._nothing - fall + self.odds_of(members)
+        return Posterior(members, score, each, sizes, tuple(departed or [0.0] * len(members)), together)
 
     def _widened(
         self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
@@ -249,11 +260,11 @@ class Evidence:
 
     def _moved(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
         """Factor of I + D R, its solution (k,) of D q, and by how much -2 log evidence falls; D by halves each side."""
-        inner = self._reduced[np.ix_(index, index)] * np.outer(sds, sds)
+        inner = self._reduced[index[:, None], index] * (sds[:, None] * sds)
         inner[np.diag_indices_from(inner)] += 1.0
         factor = _factor(inner)
         asked = sds * self._reduced[index, 0]
-        pull = np.asarray(cho_solve((factor, True), asked, check_finite=False)) if index.size else asked
+        pull = np.asarray(dpotrs(factor, asked, lower=1)[0]) if index.size else asked
         return factor, pull, float(asked @ pull) - 2.0 * float(np.sum(np.log(np.diag(factor))))
 
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
@@ -298,9 +309,12 @@ class Evidence:
 
 
 def _factor(matrix: Array) -> Array:
-    """The lower Cholesky factor; where rounding has made it indefinite, with a billionth more on the diagonal."""
-    try:
-        return np.asarray(cholesky(matrix, lower=True, check_finite=False))
-    except LinAlgError:
+    """The lower Cholesky factor; where rounding has made it indefinite, with a billionth more on the diagonal.
+
+    By LAPACK itself: it is asked for thousands of times, of a few dozen rows.
+    """
+    factor, failed = dpotrf(matrix, lower=1)
+    if failed:
         matrix[np.diag_indices_from(matrix)] *= 1.0 + 1e-9
-        return np.asarray(cholesky(matrix, lower=True, check_finite=False))
+        factor = cholesky(matrix, lower=True, check_finite=False)
+    return np.asarray(factor)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged
+from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged, where
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel, Trace
@@ -47,9 +47,9 @@ class Likelihood:
             self._inverse.append(np.asarray(np.linalg.inv(inner), dtype=np.float64))
 
     def _gram(self, k: int, rows: Array) -> Array:
-        white = rows[self.sessions[k].fitted] / self.noise_sd
-        cross = self._past[k].T @ white
-        return np.asarray(white.T @ white - cross.T @ self._inverse[k] @ cross)
+        seen = where(self.sessions[k].fitted, rows)
+        cross = self._past[k].T @ seen
+        return np.asarray((seen.T @ seen - cross.T @ self._inverse[k] @ cross) / self.noise_sd**2)
 
     def cost(self, model: ExtendedModel) -> float:
         """Sum of squares over what is fitted, in units of the noise's variance."""

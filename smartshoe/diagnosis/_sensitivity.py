@@ -126,15 +126,19 @@ class Linearised:
         return tuple(nuisances(session, self.model.relaxation_rate_per_s) for session in self.sessions)
 
     @cached_property
+    def past(self) -> tuple[Array, ...]:
+        """``nuisances`` where they may be fitted."""
+        return tuple(where(session.fitted, own) for own, session in zip(self.nuisances, self.sessions, strict=True))
+
+    @cached_property
     def seen(self) -> tuple[Array, ...]:
         """``rows`` where they may be fitted."""
-        return tuple(_where(session.fitted, rows) for rows, session in zip(self.rows, self.sessions, strict=True))
+        return tuple(where(session.fitted, rows) for rows, session in zip(self.rows, self.sessions, strict=True))
 
     @cached_property
     def products(self) -> tuple[Array, ...]:
         """(m + 2, m + 2) a session: inner products over what is fitted, the nuisances' last."""
-        parts = zip(self.seen, self.nuisances, self.sessions, strict=True)
-        return tuple(_products(seen, past[session.fitted]) for seen, past, session in parts)
+        return tuple(_products(seen, past) for seen, past in zip(self.seen, self.past, strict=True))
 
     @cached_property
     def gram(self) -> Array:
@@ -166,7 +170,7 @@ def marginal(rows: Array, session: Session, rate_per_s: float) -> Array:
     return _without_last(_products(rows[session.fitted], nuisances(session, rate_per_s)[session.fitted]))
 
 
-def _where(mask: Mask, columns: Array) -> Array:
+def where(mask: Mask, columns: Array) -> Array:
     """Rows of (n, m) columns, each column in one piece; themselves where none is left out."""
     return columns if mask.all() else np.asfortranarray(columns.T[:, mask].T)
 
@@ -245,14 +249,20 @@ def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
     the direction, the rate and the time, or follows with other time constants: the signature times smooth functions of
     these, and its lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
     """
-    out = []
+    out, power, size = [], np.zeros(directions(given.thresholds)), 0.0
     for session, factors, own in zip(given.sessions, given.factors, column, strict=True):
-        lags = [lagged(own, session.conditions.step_s, tau_s) - own for tau_s in given.thresholds.memory_s]
-        out.append(np.column_stack([own[:, None] * factors, *lags]))
-    power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(out, given.sessions, strict=True))
-    size = sum(float(np.sum(own[s.fitted] ** 2)) for own, s in zip(column, given.sessions, strict=True))
-    ratio = np.sqrt(size / np.maximum(np.asarray(power), 1e-300))
-    return [part * np.minimum(ratio, 1e6) for part in out]
+        part = np.empty((own.size, power.size), order="F")
+        np.multiply(own[:, None], factors, out=part[:, : -len(given.thresholds.memory_s)])
+        for k, tau_s in enumerate(given.thresholds.memory_s, start=factors.shape[1]):
+            np.subtract(lagged(own, session.conditions.step_s, tau_s), own, out=part[:, k])
+        seen = where(session.fitted, part)
+        power += np.einsum("nk,nk->k", seen, seen)
+        size += float(np.sum(own[session.fitted] ** 2))
+        out.append(part)
+    ratio = np.minimum(np.sqrt(size / np.maximum(power, 1e-300)), 1e6)
+    for part in out:
+        part *= ratio
+    return out
 
 
 def _factors(session: Session, thresholds: Thresholds) -> Array:
@@ -263,7 +273,8 @@ def _factors(session: Session, thresholds: Thresholds) -> Array:
     direction = rate / np.sqrt(rate**2 + still**2)
     speed = np.log10(1.0 + np.abs(rate) / still) - 1.0
     elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
-    return np.column_stack([linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5])
+    found = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5]
+    return np.asfortranarray(np.column_stack(found))
 
 
 def lagged(signal: Array, step_s: float, tau_s: float) -> Array:

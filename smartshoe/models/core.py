@@ -80,8 +80,8 @@ class Core:
         apart = 1e-6 * np.diag(np.diag(self.matrix) * np.arange(self.drive.size))
         for shift in (0.0, 1.0, 10.0):
             values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
-            if np.linalg.cond(vectors) < MOST_SKEWED:
-                break
+            if np.linalg.cond(vectors, "fro") < MOST_SKEWED:
+                return values, vectors, np.linalg.inv(vectors)
         return values, vectors, np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
 
     def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
