@@ -85,12 +85,14 @@ def infer(
     state = _settled(state, sessions, progress)
     if is_beyond_memory(state.fit.model, thresholds):
         progress("beginning anew from arms as units have")
-        state = _simpler(_settled(with_a_usual_arm(begun, sessions), sessions, progress), state, sessions)
+        state = _better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        state = _simpler(_settled(with_another_pole(state, sessions), sessions, progress), state, sessions)
+        state = _better_from(with_another_pole(state, sessions), state, sessions, progress)
     if state.fit.model.relaxing_share < 0.0:
-        state = _simpler(_settled(with_an_arm_that_creeps(state, sessions), sessions, progress), state, sessions)
+        state = _better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
+    if flexible := [one.name.replace("_", " ") for one in state.chosen if one.effect.is_flexible]:
+        progress(f"trying laws in the place of {', '.join(flexible)}")
     lawful = with_laws(state, plain.model, sessions)
     state = state if lawful is state else _settled(lawful, sessions, progress)
     progress("weighing alternatives")
@@ -191,6 +193,12 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
     return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start)
 
 
+def _better_from(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
+    """What settles from ``begun``, where that is simpler than ``state``."""
+    other = _settled(begun, sessions, progress, state)
+    return state if other is state else replace(_simpler(other, state, sessions), path=(*state.path, *other.path))
+
+
 def _simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
     return other if _is_simpler(other.fit, state, sessions) else state
 
@@ -204,9 +212,18 @@ def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
     thresholds, likelihood = state.thresholds, state.likelihood(sessions)
     odds = state.evidence.odds
     new, old = ((_score(one.model, likelihood, odds), effect_count(one.model)) for one in (other, state.fit))
-    if apart(likelihood.sessions, state.fit.model, other.model) < thresholds.alike * thresholds.material:
+    if _read_alike(other.model, state.fit.model, likelihood, thresholds):
         return (new[1], new[0]) < (old[1], old[0])
     return new[0] < old[0]
+
+
+def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+    return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.material
+
+
+def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+    """Whether two models have the same effects, and hardly read differently."""
+    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
 
 
 def _score(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
@@ -214,19 +231,19 @@ def _score(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
     return with_odds(likelihood.cost(model), model, odds)
 
 
-def _settled(state: State, sessions: Sequence[Session], progress: Progress) -> State:
-    """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
+def _settled(state: State, sessions: Sequence[Session], progress: Progress, known: State | None = None) -> State:
+    """Fit, linearise and search in turn until nothing is worth another fit.
 
-    In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one.
+    Where fits lead to one another in a circle, the likeliest of them is the answer; where one comes upon the path of a
+    state that is ``known``, it would go the same way, and that state is. In the end an effect's arm is tried in the
+    place of the baseline's: it may be the unit's only one.
     """
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
-    for _ in range(ROUNDS):
-        chosen = tuple(sorted(one.name for one in state.chosen))
-        # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
-        here = tuple(sorted(state.fit.model.names)), chosen
-        if here in seen or state.improved < state.evidence.odds:
-            break
-        seen.add(here)
+    visited = [state]
+    # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
+    while state.improved >= state.evidence.odds and _names(state) not in seen and len(visited) <= ROUNDS:
+        seen.add(_names(state))
+        _, chosen = _names(state)
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
         likelihood = state.likelihood(sessions)
         found = min(
@@ -236,13 +253,33 @@ def _settled(state: State, sessions: Sequence[Session], progress: Progress) -> S
             ),
             key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
         )
+        if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
+            return known
         state = state_at(found, sessions, state.thresholds, state.banned)
+        visited.append(state)
+    if state.improved >= state.evidence.odds:
+        state = _likeliest(visited)
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood(sessions)
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
         if _is_simpler(found, state, sessions):
             state = state_at(found, sessions, state.thresholds, state.banned)
-    return state
+    return replace(state, path=tuple(one.fit.model for one in visited))
+
+
+def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Effects that are fitted, and those that the search about the fit came to."""
+    return tuple(sorted(state.fit.model.names)), tuple(sorted(one.name for one in state.chosen))
+
+
+def _likeliest(visited: Sequence[State]) -> State:
+    """The one whose own set has most evidence, and that set as its answer: what it leads to is among them.
+
+    A linearisation promises more of a set than a fit of it keeps, so that each may promise most of another.
+    """
+    noise_sd = visited[-1].evidence.noise_sd
+    best = min(visited, key=lambda one: Evidence(one.given, noise_sd).posterior(one.start).score)
+    return replace(best, best=best.evidence.posterior(best.start))
 
 
 def _promising(state: State) -> list[Posterior]:

@@ -18,13 +18,17 @@ LENGTHS = (1.0, 0.5, 0.2, 0.05)  # of a first step, a resolution: halved or doub
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A linearisation about ``fit``, and the best set in it; ``banned`` are blocks that a law has replaced."""
+    """A linearisation about ``fit``, and the best set in it; ``banned`` are blocks that a law has replaced.
+
+    ``path``: models that it has been settled through.
+    """
 
     given: Linearised
     evidence: Evidence
     best: Posterior
     fit: Fit
     banned: tuple[str, ...] = ()
+    path: tuple[ExtendedModel, ...] = ()
 
     @property
     def thresholds(self) -> Thresholds:

@@ -175,6 +175,7 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
     monkeypatch.setattr(_inference, "fit", lambda likelihood, model: model)
     monkeypatch.setattr(_inference, "_is_simpler", lambda *given: simpler)
     monkeypatch.setattr(_inference, "state_at", stated)
+    monkeypatch.setattr(_inference, "replace", lambda one, **given: one)
     assert _inference._settled(state("first"), [], lambda said: None).name == ends  # type: ignore[attr-defined]
     assert tried == [("without a", "arm a"), ("without b", "arm b")]
     assert banned == [("z",), ("z",)] * simpler

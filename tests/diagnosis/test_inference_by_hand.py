@@ -124,6 +124,7 @@ def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_i
         return state("next", 0.0)
 
     monkeypatch.setattr(_inference, "state_at", stated)
+    monkeypatch.setattr(_inference, "replace", lambda one, **given: one)
     said: list[str] = []
     assert _inference._settled(state("first", 50.0), [], said.append).name == "next"  # type: ignore[attr-defined]
     assert (taken, said) == ([(chosen, 6, ("z",))], ["fitting a, b c"])
@@ -140,11 +141,11 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     def state(name: str) -> Any:
         fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name))
         return SimpleNamespace(
-            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0),
+            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0), path=(),
             likelihood=lambda sessions: "likelihood",
         )  # fmt: skip
 
-    def settled(one: Any, sessions: Any, progress: Any) -> Any:
+    def settled(one: Any, sessions: Any, progress: Any, known: Any = None) -> Any:
         return state(f"settled {one.name}")
 
     def named(name: str) -> Callable[..., Any]:
@@ -171,6 +172,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "_settled", settled)
+    monkeypatch.setattr(_inference, "replace", lambda one, **given: one)
     monkeypatch.setattr(_inference, "_simpler", lambda other, one, sessions: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "with_a_latency", named("late"))
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
