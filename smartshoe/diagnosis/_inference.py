@@ -6,23 +6,19 @@ What is held out for judging is not looked at here. Validation is within the fit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from smartshoe.diagnosis._arms import (
-    arms_of,
-    effect_count,
     is_beyond_memory,
     is_stretched,
     with_a_latency,
     with_a_usual_arm,
     with_an_arm_that_creeps,
     with_another_pole,
-    with_arm,
-    with_odds,
 )
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
@@ -30,22 +26,15 @@ from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_la
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._search import BREADTH, MOST_MEMBERS, additions
+from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._state import State, evidence_about, searched, state_at, with_members
-from smartshoe.diagnosis._validation import LeftOut, apart, cancelling, error_of, extrapolating
+from smartshoe.diagnosis._settling import Progress, better_from, score_of, settled, simpler
+from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
+from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.loading import turning_points
-
-Progress = Callable[[str], None]
-
-# Resolutions: half and twice of each changed no name in two cases. With four steps one measured sensor, of which no
-# equation fits, is left unnamed.
-ROUNDS = 6
-ROUND_STEPS = 6  # of a fit that is linearised anew anyway
-RIVALS = 2  # that are fitted beside a set that bends
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,21 +69,21 @@ def infer(
         return Inference(plain, plain, likelihood, (), screening, (), can_validate)
     state = State(given, evidence, best, plain)
     if is_stretched(plain.model):
-        state = _simpler(with_a_latency(state, sessions), state, sessions)
+        state = simpler(with_a_latency(state, sessions), state, sessions)
     begun = state
-    state = _settled(state, sessions, progress)
+    state = settled(state, sessions, progress)
     if is_beyond_memory(state.fit.model, thresholds):
         progress("beginning anew from arms as units have")
-        state = _better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
+        state = better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        state = _better_from(with_another_pole(state, sessions), state, sessions, progress)
+        state = better_from(with_another_pole(state, sessions), state, sessions, progress)
     if state.fit.model.relaxing_share < 0.0:
-        state = _better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
+        state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
     if flexible := [one.name.replace("_", " ") for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {', '.join(flexible)}")
     lawful = with_laws(state, plain.model, sessions)
-    state = state if lawful is state else _settled(lawful, sessions, progress)
+    state = state if lawful is state else settled(lawful, sessions, progress)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     members = found.members()
@@ -102,7 +91,7 @@ def infer(
         state = with_likelier_laws(state, found.fit.model, laws, sessions)
         other = _judged(state, plain, sessions)
         odds = state.evidence.odds
-        if _score(other.fit.model, other.likelihood, odds) >= _score(found.fit.model, other.likelihood, odds):
+        if score_of(other.fit.model, other.likelihood, odds) >= score_of(found.fit.model, other.likelihood, odds):
             break  # a law that follows better in its place led to a set that does not
         found, members = other, other.members()
     if found.is_stepped_down:
@@ -191,121 +180,6 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
     """The best predictor of the form of ``start``: output error, each correlation time of what is left counted once."""
     residuals, kept = [residual_of(one, start) for one in sessions], [one.fitted for one in sessions]
     return fit(Likelihood(sessions, correlated_sd(residuals, kept), start, thresholds), start)
-
-
-def _better_from(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
-    """What settles from ``begun``, where that is simpler than ``state``."""
-    other = _settled(begun, sessions, progress, state)
-    return state if other is state else replace(_simpler(other, state, sessions), path=(*state.path, *other.path))
-
-
-def _simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
-    return other if _is_simpler(other.fit, state, sessions) else state
-
-
-def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
-    """Whether ``other`` is likelier than the fit of ``state``, odds against effects counted; or has fewer of them.
-
-    The number decides where the two hardly read differently: what is immaterial counts for nothing, however sure it is.
-    An arm that imitates a lag of a millisecond needs another one in its own place.
-    """
-    thresholds, likelihood = state.thresholds, state.likelihood(sessions)
-    odds = state.evidence.odds
-    new, old = ((_score(one.model, likelihood, odds), effect_count(one.model)) for one in (other, state.fit))
-    if _read_alike(other.model, state.fit.model, likelihood, thresholds):
-        return (new[1], new[0]) < (old[1], old[0])
-    return new[0] < old[0]
-
-
-def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
-    return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.material
-
-
-def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
-    """Whether two models have the same effects, and hardly read differently."""
-    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
-
-
-def _score(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
-    """-2 log likelihood of a model, with the ``odds`` against each of its effects; the less, the better."""
-    return with_odds(likelihood.cost(model), model, odds)
-
-
-def _settled(state: State, sessions: Sequence[Session], progress: Progress, known: State | None = None) -> State:
-    """Fit, linearise and search in turn until nothing is worth another fit.
-
-    Where fits lead to one another in a circle, the likeliest of them is the answer; where one comes upon the path of a
-    state that is ``known``, it would go the same way, and that state is. In the end an effect's arm is tried in the
-    place of the baseline's: it may be the unit's only one.
-    """
-    seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
-    visited = [state]
-    # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
-    while state.improved >= state.evidence.odds and _names(state) not in seen and len(visited) <= ROUNDS:
-        seen.add(_names(state))
-        _, chosen = _names(state)
-        progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
-        likelihood = state.likelihood(sessions)
-        found = min(
-            (
-                fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
-                for one in _promising(state)
-            ),
-            key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
-        )
-        if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
-            return known
-        state = state_at(found, sessions, state.thresholds, state.banned)
-        visited.append(state)
-    if state.improved >= state.evidence.odds:
-        state = _likeliest(visited)
-    for name, arm in arms_of(state.fit.model):
-        likelihood = state.likelihood(sessions)
-        found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
-        if _is_simpler(found, state, sessions):
-            state = state_at(found, sessions, state.thresholds, state.banned)
-    return replace(state, path=tuple(one.fit.model for one in visited))
-
-
-def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Effects that are fitted, and those that the search about the fit came to."""
-    return tuple(sorted(state.fit.model.names)), tuple(sorted(one.name for one in state.chosen))
-
-
-def _likeliest(visited: Sequence[State]) -> State:
-    """The one whose own set has most evidence, and that set as its answer: what it leads to is among them.
-
-    A linearisation promises more of a set than a fit of it keeps, so that each may promise most of another.
-    """
-    noise_sd = visited[-1].evidence.noise_sd
-    best = min(visited, key=lambda one: Evidence(one.given, noise_sd).posterior(one.start).score)
-    return replace(best, best=best.evidence.posterior(best.start))
-
-
-def _promising(state: State) -> list[Posterior]:
-    """The best set; beside it others with one more effect, where the best one is too large for one linearisation.
-
-    A large effect bends the model that its rivals were linearised about, so that fits of the best few decide.
-    """
-    start = state.start
-    if not state.bends or len(start) >= MOST_MEMBERS:
-        return [state.best]
-    taken = {state.given.candidates[m].slot for m in start}
-    flexible = [
-        k
-        for k, one in enumerate(state.given.candidates)
-        if one.effect.is_flexible
-        and one.effect.is_memoryless
-        and one.slot not in taken
-        and one.name not in state.banned
-    ]
-    tried = {*additions(state.evidence, start, RIVALS, state.banned), *flexible}
-    return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
-
-
-def _strengths(model: ExtendedModel) -> int:
-    """How many strengths a model's effects have: parameters that are null where the effect is not there."""
-    return sum(parameter.null is not None for part in model.parts for parameter in part.effect.parameters)
 
 
 def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:

@@ -13,7 +13,7 @@ from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
-from smartshoe.diagnosis._inference import Inference, Progress, infer
+from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
@@ -22,6 +22,7 @@ from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,

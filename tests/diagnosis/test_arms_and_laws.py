@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from told_evidence import STANDARD
 
-from smartshoe.diagnosis import _arms, _inference, _laws
+from smartshoe.diagnosis import _arms, _laws, _settling
 from smartshoe.diagnosis._arms import arms_of, effect_count, is_beyond_memory, is_stretched
 from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, with_laws, with_likelier_laws
 from smartshoe.models.effects import blocks, catalogue, effect
@@ -170,13 +170,13 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
         banned.append(without)
         return state(f"tried {found[-1]}")
 
-    monkeypatch.setattr(_inference, "arms_of", lambda model: [("a", "arm a"), ("b", "arm b")])
-    monkeypatch.setattr(_inference, "with_arm", swapped)
-    monkeypatch.setattr(_inference, "fit", lambda likelihood, model: model)
-    monkeypatch.setattr(_inference, "_is_simpler", lambda *given: simpler)
-    monkeypatch.setattr(_inference, "state_at", stated)
-    monkeypatch.setattr(_inference, "replace", lambda one, **given: one)
-    assert _inference._settled(state("first"), [], lambda said: None).name == ends  # type: ignore[attr-defined]
+    monkeypatch.setattr(_settling, "arms_of", lambda model: [("a", "arm a"), ("b", "arm b")])
+    monkeypatch.setattr(_settling, "with_arm", swapped)
+    monkeypatch.setattr(_settling, "fit", lambda likelihood, model: model)
+    monkeypatch.setattr(_settling, "_is_simpler", lambda *given: simpler)
+    monkeypatch.setattr(_settling, "state_at", stated)
+    monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
+    assert _settling.settled(state("first"), [], lambda said: None).name == ends  # type: ignore[attr-defined]
     assert tried == [("without a", "arm a"), ("without b", "arm b")]
     assert banned == [("z",), ("z",)] * simpler
 

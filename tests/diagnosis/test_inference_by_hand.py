@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, worth
+from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, told_fit, worth
 
 from smartshoe.diagnosis import _inference
-from smartshoe.diagnosis._inference import _is_simpler, _judged, _promising, _screening, _strengths, independent, infer
+from smartshoe.diagnosis._inference import _judged, _screening, independent, infer
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -19,65 +19,6 @@ MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 
 
 # -- inference --------------------------------------------------------------------------------------------------------
-def _fit(cost: float, *names: str, share: float = 0.1) -> Any:
-    parts = tuple(SimpleNamespace(name=name, effect=SimpleNamespace(parameters=())) for name in names)
-    return SimpleNamespace(model=SimpleNamespace(parts=parts, names=names, relaxing_share=share, told=cost), cost=cost)
-
-
-@pytest.mark.parametrize(
-    ("new", "old", "near", "far"),
-    [
-        (_fit(100.0, "a"), _fit(90.0, "a", "b"), True, False),  # 110 and 110: no likelier, but fewer
-        (_fit(99.9, "a"), _fit(90.0, "a", "b"), True, True),
-        (_fit(80.0, "a", "b"), _fit(100.0, "a"), False, True),
-        (_fit(95.0, "a"), _fit(96.0, "a"), True, True),
-        (_fit(96.0, "a"), _fit(96.0, "a"), False, False),
-        (_fit(100.0, "a", share=-0.1), _fit(105.0, "a"), False, False),  # an arm that falls is an effect
-    ],
-)
-def test_the_simpler_is_taken_where_two_hardly_read_differently(
-    monkeypatch: pytest.MonkeyPatch, new: Any, old: Any, near: bool, far: bool
-) -> None:
-    """Odds of ten against an effect; three times what is material apart."""
-    likelihood = SimpleNamespace(cost=lambda model: model.told, sessions=())
-    state: Any = SimpleNamespace(
-        thresholds=STANDARD, likelihood=lambda sessions: likelihood, evidence=SimpleNamespace(odds=10.0), fit=old
-    )
-    bound = STANDARD.alike * STANDARD.material
-    for by, told in ((0.999, near), (1.0, far), (1.001, far)):
-        monkeypatch.setattr(_inference, "apart", lambda *given, by=by: by * bound)
-        assert _is_simpler(new, state, []) is told
-
-
-def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
-    candidates = [
-        candidate("a", "x"), candidate("b"), candidate("c"), candidate("d"),
-        candidate("curve", is_flexible=True, is_memoryless=True), candidate("lag", is_flexible=True),
-        candidate("other", "x", is_flexible=True, is_memoryless=True),
-        candidate("gone", is_flexible=True, is_memoryless=True), candidate("plain", is_memoryless=True),
-    ]  # fmt: skip
-    evidence: Any = ToldEvidence(candidates, worth(1.0, 6.0, 5.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    state: Any = SimpleNamespace(
-        start=(0,), bends=True, best="best", given=evidence.given, evidence=evidence, banned=("gone",)
-    )
-    assert [found if found == "best" else found.members for found in _promising(state)] == [
-        "best", (0, 1), (0, 2), (0, 4),
-    ]  # fmt: skip
-    state.bends = False
-    assert _promising(state) == ["best"]
-    state.bends, state.start = True, tuple(range(7))
-    assert _promising(state) == ["best"]
-    state.start = (0, 1, 2, 3, 5, 8)
-    assert len(_promising(state)) > 1
-
-
-def test_strengths_are_parameters_that_are_null_where_the_effect_is_not_there() -> None:
-    model = MODEL.with_part("dead_band").with_part("sensor_nonlinearity")
-    expected = sum(p.null is not None for name in model.names for p in effect(name).parameters)
-    assert _strengths(model) == expected
-    assert _strengths(MODEL) == 0
-
-
 def test_what_can_be_left_out_is_a_recording_or_a_rise_of_a_single_one() -> None:
     rises = session_of(np.interp(np.arange(200), [0, 20, 40, 60, 80, 199], [0.0, 1.0, 0.2, 0.7, 0.1, 0.15]))
     none = session_of(WAVE, np.zeros(240, dtype=bool))
@@ -96,57 +37,26 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
     assert found == tuple((f"n{k}", float(k)) for k in range(11, 1, -1))
 
 
-@pytest.mark.parametrize(("odds", "chosen"), [(10.0, "plain"), (1.0, "curved")])
-def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_its_strengths(
-    monkeypatch: pytest.MonkeyPatch, odds: float, chosen: str
-) -> None:
-    """Of fits of six steps: each strength of an effect must be worth the odds."""
-    counts = {"plain": 1, "curved": 3}
-    costs = {"plain": 100.0, "curved": 95.0}
-
-    def state(name: str, improved: float) -> Any:
-        return SimpleNamespace(
-            name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
-            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), improved=improved,
-            evidence=SimpleNamespace(odds=odds), thresholds=STANDARD, banned=("z",), likelihood=lambda _: "likelihood",
-        )  # fmt: skip
-
-    monkeypatch.setattr(_inference, "_promising", lambda state: ["curved", "plain"])
-    monkeypatch.setattr(_inference, "with_members", lambda given, one, model, likelihood: one)
-    monkeypatch.setattr(_inference, "_strengths", lambda model: counts[model])
-    monkeypatch.setattr(
-        _inference, "fit", lambda _, model, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
-    )
-    taken: list[Any] = []
-
-    def stated(found: Any, sessions: Any, thresholds: Any, banned: Any) -> Any:
-        taken.append((found.model, found.steps, banned))
-        return state("next", 0.0)
-
-    monkeypatch.setattr(_inference, "state_at", stated)
-    monkeypatch.setattr(_inference, "replace", lambda one, **given: one)
-    said: list[str] = []
-    assert _inference._settled(state("first", 50.0), [], said.append).name == "next"  # type: ignore[attr-defined]
-    assert (taken, said) == ([(chosen, 6, ("z",))], ["fitting a, b c"])
-
-
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={}
     )
-    plain = _fit(100.0)
+    plain = told_fit(100.0)
 
     def state(name: str) -> Any:
         fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name))
         return SimpleNamespace(
-            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0), path=(),
+            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0),
             likelihood=lambda sessions: "likelihood",
         )  # fmt: skip
 
-    def settled(one: Any, sessions: Any, progress: Any, known: Any = None) -> Any:
+    def settled(one: Any, sessions: Any, progress: Any) -> Any:
         return state(f"settled {one.name}")
+
+    def better_from(begun: Any, one: Any, sessions: Any, progress: Any) -> Any:
+        return state(f"(settled {begun.name} or {one.name})")
 
     def named(name: str) -> Callable[..., Any]:
         return lambda one, *rest: state(f"{name} {one.name}")
@@ -171,9 +81,9 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
     monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
-    monkeypatch.setattr(_inference, "_settled", settled)
-    monkeypatch.setattr(_inference, "replace", lambda one, **given: one)
-    monkeypatch.setattr(_inference, "_simpler", lambda other, one, sessions: state(f"({other.name} or {one.name})"))
+    monkeypatch.setattr(_inference, "settled", settled)
+    monkeypatch.setattr(_inference, "better_from", better_from)
+    monkeypatch.setattr(_inference, "simpler", lambda other, one, sessions: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "with_a_latency", named("late"))
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
@@ -182,7 +92,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "_judged", judged)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
-    monkeypatch.setattr(_inference, "_score", lambda model, likelihood, odds: told.scores.get(model, -len(model)))
+    monkeypatch.setattr(_inference, "score_of", lambda model, likelihood, odds: told.scores.get(model, -len(model)))
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
     return told
 

@@ -7,10 +7,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from told_evidence import STANDARD
+from told_evidence import STANDARD, ToldEvidence, candidate, told_fit, worth
 
-from smartshoe.diagnosis import _inference
+from smartshoe.diagnosis import _settling
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
 
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 ODDS = 10.0
 
 
@@ -83,13 +86,13 @@ def _ends(
         fits.append(then[len(fits)].fit)
         return fits[-1]
 
-    monkeypatch.setattr(_inference, "_promising", lambda state: [None])
-    monkeypatch.setattr(_inference, "with_members", lambda *given: None)
-    monkeypatch.setattr(_inference, "fit", fitted)
-    monkeypatch.setattr(_inference, "apart", lambda *given: apart)
-    monkeypatch.setattr(_inference, "Evidence", _Scored)
-    monkeypatch.setattr(_inference, "state_at", lambda *given: next(coming))
-    return _inference._settled(first, [], lambda said: None, known), len(fits)  # type: ignore[arg-type]
+    monkeypatch.setattr(_settling, "_promising", lambda state: [None])
+    monkeypatch.setattr(_settling, "with_members", lambda *given: None)
+    monkeypatch.setattr(_settling, "fit", fitted)
+    monkeypatch.setattr(_settling, "apart", lambda *given: apart)
+    monkeypatch.setattr(_settling, "Evidence", _Scored)
+    monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
+    return _settling.settled(first, [], lambda said: None, known), len(fits)  # type: ignore[arg-type]
 
 
 def test_a_set_that_is_found_again_about_another_fit_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,8 +121,8 @@ def test_nothing_is_fitted_for_less_than_the_odds_against_a_name(
 def test_it_ends_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
     ever = [_State("ab"[k % 2] * (k + 1), "c", 500.0) for k in range(20)]
     end, fits = _ends(monkeypatch, _State("abc", "c", 500.0), ever)
-    assert (end.fitted, fits) == ("a", _inference.ROUNDS)
-    last = [*ever[: _inference.ROUNDS - 1], _State("c" * 9, "c", 0.0)]
+    assert (end.fitted, fits) == ("a", _settling.ROUNDS)
+    last = [*ever[: _settling.ROUNDS - 1], _State("c" * 9, "c", 0.0)]
     assert _ends(monkeypatch, _State("abc", "c", 500.0), last)[0].fitted == "c" * 9
 
 
@@ -139,10 +142,99 @@ def test_what_began_anew_is_weighed_once_and_its_way_remembered(monkeypatch: pyt
     state, begun = _State("a", "a", 0.0, (_model("a"),)), _State("", "b", 1.0)
     other = _State("b", "b", 0.0, (_model(""), _model("b")))
     for taken in (state, other):
-        monkeypatch.setattr(_inference, "_settled", lambda *given: other)
-        monkeypatch.setattr(_inference, "_simpler", lambda one, than, sessions, taken=taken: taken)
-        found: Any = _inference._better_from(begun, state, [], lambda said: None)  # type: ignore[arg-type]
+        monkeypatch.setattr(_settling, "settled", lambda *given: other)
+        monkeypatch.setattr(_settling, "simpler", lambda one, than, sessions, taken=taken: taken)
+        found: Any = _settling.better_from(begun, state, [], lambda said: None)  # type: ignore[arg-type]
         assert (found.fitted, [one.names for one in found.path]) == (taken.fitted, [("a",), (), ("b",)])
-    monkeypatch.setattr(_inference, "_settled", lambda *given: state)
-    monkeypatch.setattr(_inference, "_simpler", lambda *given: pytest.fail("there is nothing to weigh"))
-    assert _inference._better_from(begun, state, [], lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
+    monkeypatch.setattr(_settling, "settled", lambda *given: state)
+    monkeypatch.setattr(_settling, "simpler", lambda *given: pytest.fail("there is nothing to weigh"))
+    assert _settling.better_from(begun, state, [], lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
+
+
+# -- of several which -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("new", "old", "near", "far"),
+    [
+        (told_fit(100.0, "a"), told_fit(90.0, "a", "b"), True, False),  # 110 and 110: no likelier, but fewer
+        (told_fit(99.9, "a"), told_fit(90.0, "a", "b"), True, True),
+        (told_fit(80.0, "a", "b"), told_fit(100.0, "a"), False, True),
+        (told_fit(95.0, "a"), told_fit(96.0, "a"), True, True),
+        (told_fit(96.0, "a"), told_fit(96.0, "a"), False, False),
+        (told_fit(100.0, "a", share=-0.1), told_fit(105.0, "a"), False, False),  # an arm that falls is an effect
+    ],
+)
+def test_the_simpler_is_taken_where_two_hardly_read_differently(
+    monkeypatch: pytest.MonkeyPatch, new: Any, old: Any, near: bool, far: bool
+) -> None:
+    """Odds of ten against an effect; three times what is material apart."""
+    likelihood = SimpleNamespace(cost=lambda model: model.told, sessions=())
+    state: Any = SimpleNamespace(
+        thresholds=STANDARD, likelihood=lambda sessions: likelihood, evidence=SimpleNamespace(odds=10.0), fit=old
+    )
+    bound = STANDARD.alike * STANDARD.material
+    for by, told in ((0.999, near), (1.0, far), (1.001, far)):
+        monkeypatch.setattr(_settling, "apart", lambda *given, by=by: by * bound)
+        assert _settling._is_simpler(new, state, []) is told
+
+
+def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
+    candidates = [
+        candidate("a", "x"), candidate("b"), candidate("c"), candidate("d"),
+        candidate("curve", is_flexible=True, is_memoryless=True), candidate("lag", is_flexible=True),
+        candidate("other", "x", is_flexible=True, is_memoryless=True),
+        candidate("gone", is_flexible=True, is_memoryless=True), candidate("plain", is_memoryless=True),
+    ]  # fmt: skip
+    evidence: Any = ToldEvidence(candidates, worth(1.0, 6.0, 5.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    state: Any = SimpleNamespace(
+        start=(0,), bends=True, best="best", given=evidence.given, evidence=evidence, banned=("gone",)
+    )
+    assert [found if found == "best" else found.members for found in _settling._promising(state)] == [
+        "best", (0, 1), (0, 2), (0, 4),
+    ]  # fmt: skip
+    state.bends = False
+    assert _settling._promising(state) == ["best"]
+    state.bends, state.start = True, tuple(range(7))
+    assert _settling._promising(state) == ["best"]
+    state.start = (0, 1, 2, 3, 5, 8)
+    assert len(_settling._promising(state)) > 1
+
+
+def test_strengths_are_parameters_that_are_null_where_the_effect_is_not_there() -> None:
+    model = MODEL.with_part("dead_band").with_part("sensor_nonlinearity")
+    expected = sum(p.null is not None for name in model.names for p in effect(name).parameters)
+    assert _settling._strengths(model) == expected
+    assert _settling._strengths(MODEL) == 0
+
+
+@pytest.mark.parametrize(("odds", "chosen"), [(10.0, "plain"), (1.0, "curved")])
+def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_its_strengths(
+    monkeypatch: pytest.MonkeyPatch, odds: float, chosen: str
+) -> None:
+    """Of fits of six steps: each strength of an effect must be worth the odds."""
+    counts = {"plain": 1, "curved": 3}
+    costs = {"plain": 100.0, "curved": 95.0}
+
+    def state(name: str, improved: float) -> Any:
+        return SimpleNamespace(
+            name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
+            chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), improved=improved,
+            evidence=SimpleNamespace(odds=odds), thresholds=STANDARD, banned=("z",), likelihood=lambda _: "likelihood",
+        )  # fmt: skip
+
+    monkeypatch.setattr(_settling, "_promising", lambda state: ["curved", "plain"])
+    monkeypatch.setattr(_settling, "with_members", lambda given, one, model, likelihood: one)
+    monkeypatch.setattr(_settling, "_strengths", lambda model: counts[model])
+    monkeypatch.setattr(
+        _settling, "fit", lambda _, model, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
+    )
+    taken: list[Any] = []
+
+    def stated(found: Any, sessions: Any, thresholds: Any, banned: Any) -> Any:
+        taken.append((found.model, found.steps, banned))
+        return state("next", 0.0)
+
+    monkeypatch.setattr(_settling, "state_at", stated)
+    monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
+    said: list[str] = []
+    assert _settling.settled(state("first", 50.0), [], said.append).name == "next"  # type: ignore[attr-defined]
+    assert (taken, said) == ([(chosen, 6, ("z",))], ["fitting a, b c"])

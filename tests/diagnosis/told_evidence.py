@@ -71,3 +71,9 @@ def session_of(load: Array, fitted: Any = None, cycle: Any = None, reading: Any 
 
 
 WAVE = np.abs((np.arange(240) / 10.0) % 2.0 - 1.0)
+
+
+def told_fit(cost: float, *names: str, share: float = 0.1) -> Any:
+    """A fit of a model with these effects and this share of its arm, which costs what it is told."""
+    parts = tuple(SimpleNamespace(name=name, effect=SimpleNamespace(parameters=())) for name in names)
+    return SimpleNamespace(model=SimpleNamespace(parts=parts, names=names, relaxing_share=share, told=cost), cost=cost)

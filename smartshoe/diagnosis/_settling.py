@@ -1,0 +1,139 @@
+"""Fits and searches in turn, until a set of effects is likelier than all that fits of it lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
+from smartshoe.diagnosis._evidence import Evidence, Posterior
+from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
+from smartshoe.diagnosis._search import MOST_MEMBERS, additions
+from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._state import State, state_at, with_members
+from smartshoe.diagnosis._validation import apart
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.extended import ExtendedModel
+
+Progress = Callable[[str], None]
+
+# Resolutions: half and twice of each changed no name in two cases. With four steps one measured sensor, of which no
+# equation fits, is left unnamed.
+ROUNDS = 6
+ROUND_STEPS = 6  # of a fit that is linearised anew anyway
+RIVALS = 2  # that are fitted beside a set that bends
+
+
+def settled(state: State, sessions: Sequence[Session], progress: Progress, known: State | None = None) -> State:
+    """Fit, linearise and search in turn until nothing is worth another fit.
+
+    Where fits lead to one another in a circle, the likeliest of them is the answer; where one comes upon the path of a
+    state that is ``known``, it would go the same way, and that state is. In the end an effect's arm is tried in the
+    place of the baseline's: it may be the unit's only one.
+    """
+    seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
+    visited = [state]
+    # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
+    while state.improved >= state.evidence.odds and _names(state) not in seen and len(visited) <= ROUNDS:
+        seen.add(_names(state))
+        _, chosen = _names(state)
+        progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
+        likelihood = state.likelihood(sessions)
+        found = min(
+            (
+                fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
+                for one in _promising(state)
+            ),
+            key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
+        )
+        if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
+            return known
+        state = state_at(found, sessions, state.thresholds, state.banned)
+        visited.append(state)
+    if state.improved >= state.evidence.odds:
+        state = _likeliest(visited)
+    for name, arm in arms_of(state.fit.model):
+        likelihood = state.likelihood(sessions)
+        found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
+        if _is_simpler(found, state, sessions):
+            state = state_at(found, sessions, state.thresholds, state.banned)
+    return replace(state, path=tuple(one.fit.model for one in visited))
+
+
+def better_from(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
+    """What settles from ``begun``, where that is simpler than ``state``."""
+    other = settled(begun, sessions, progress, state)
+    return state if other is state else replace(simpler(other, state, sessions), path=(*state.path, *other.path))
+
+
+def simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
+    return other if _is_simpler(other.fit, state, sessions) else state
+
+
+def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
+    """Whether ``other`` is likelier than the fit of ``state``, odds against effects counted; or has fewer of them.
+
+    The number decides where the two hardly read differently: what is immaterial counts for nothing, however sure it is.
+    An arm that imitates a lag of a millisecond needs another one in its own place.
+    """
+    thresholds, likelihood = state.thresholds, state.likelihood(sessions)
+    odds = state.evidence.odds
+    new, old = ((score_of(one.model, likelihood, odds), effect_count(one.model)) for one in (other, state.fit))
+    if _read_alike(other.model, state.fit.model, likelihood, thresholds):
+        return (new[1], new[0]) < (old[1], old[0])
+    return new[0] < old[0]
+
+
+def score_of(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
+    """-2 log likelihood of a model, with the ``odds`` against each of its effects; the less, the better."""
+    return with_odds(likelihood.cost(model), model, odds)
+
+
+def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+    return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.material
+
+
+def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+    """Whether two models have the same effects, and hardly read differently."""
+    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
+
+
+def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Effects that are fitted, and those that the search about the fit came to."""
+    return tuple(sorted(state.fit.model.names)), tuple(sorted(one.name for one in state.chosen))
+
+
+def _likeliest(visited: Sequence[State]) -> State:
+    """The one whose own set has most evidence, and that set as its answer: what it leads to is among them.
+
+    A linearisation promises more of a set than a fit of it keeps, so that each may promise most of another.
+    """
+    noise_sd = visited[-1].evidence.noise_sd
+    best = min(visited, key=lambda one: Evidence(one.given, noise_sd).posterior(one.start).score)
+    return replace(best, best=best.evidence.posterior(best.start))
+
+
+def _promising(state: State) -> list[Posterior]:
+    """The best set; beside it others with one more effect, where the best one is too large for one linearisation.
+
+    A large effect bends the model that its rivals were linearised about, so that fits of the best few decide.
+    """
+    start = state.start
+    if not state.bends or len(start) >= MOST_MEMBERS:
+        return [state.best]
+    taken = {state.given.candidates[m].slot for m in start}
+    flexible = [
+        k
+        for k, one in enumerate(state.given.candidates)
+        if one.effect.is_flexible
+        and one.effect.is_memoryless
+        and one.slot not in taken
+        and one.name not in state.banned
+    ]
+    tried = {*additions(state.evidence, start, RIVALS, state.banned), *flexible}
+    return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
+
+
+def _strengths(model: ExtendedModel) -> int:
+    """How many strengths a model's effects have: parameters that are null where the effect is not there."""
+    return sum(parameter.null is not None for part in model.parts for parameter in part.effect.parameters)
