@@ -159,7 +159,8 @@ class Evidence:
                 found = self._between(one.columns, other.columns) - one.half.T @ other.half
                 self._reduced[one.places, other.places] = found
                 self._reduced[other.places, one.places] = found.T
-        return [range(self._reduced.shape[0])[self._departures[member].places] for member in members]
+        there = [self._departures[member].places for member in members]
+        return [range(places.start, places.stop) for places in there]
 
     def _departing(self, member: int) -> _Departures:
         given = self.given
@@ -313,6 +314,8 @@ def _factor(matrix: Array) -> Array:
 
     By LAPACK itself: it is asked for thousands of times, of a few dozen rows.
     """
+    if not matrix.size:
+        return matrix
     factor, failed = dpotrf(matrix, lower=1)
     if failed:
         matrix[np.diag_indices_from(matrix)] *= 1.0 + 1e-9
