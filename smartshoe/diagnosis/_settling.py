@@ -1,4 +1,4 @@
-"""Fits and searches in turn, until a set of effects is likelier than all that fits of it lead to."""
+"""Fits and searches in turn, until a set of effects settles; and which of several ends is simpler."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
-from smartshoe.diagnosis._evidence import Evidence, Posterior
+from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, additions
 from smartshoe.diagnosis._session import Session
@@ -25,16 +25,15 @@ RIVALS = 2  # that are fitted beside a set that bends
 
 
 def settled(state: State, sessions: Sequence[Session], progress: Progress, known: State | None = None) -> State:
-    """Fit, linearise and search in turn until nothing is worth another fit.
+    """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
 
-    Where fits lead to one another in a circle, the likeliest of them is the answer; where one comes upon the path of a
-    state that is ``known``, it would go the same way, and that state is. In the end an effect's arm is tried in the
-    place of the baseline's: it may be the unit's only one.
+    In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one. Where a fit comes
+    upon the path of a state that is ``known``, it would go the same way, and that state is the answer.
     """
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
-    visited = [state]
+    path = [state.fit.model]
     # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
-    while state.improved >= state.evidence.odds and _names(state) not in seen and len(visited) <= ROUNDS:
+    while state.improved >= state.evidence.odds and _names(state) not in seen and len(path) <= ROUNDS:
         seen.add(_names(state))
         _, chosen = _names(state)
         progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
@@ -48,16 +47,14 @@ def settled(state: State, sessions: Sequence[Session], progress: Progress, known
         )
         if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
             return known
+        path.append(found.model)
         state = state_at(found, sessions, state.thresholds, state.banned)
-        visited.append(state)
-    if state.improved >= state.evidence.odds:
-        state = _likeliest(visited)
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood(sessions)
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
         if _is_simpler(found, state, sessions):
             state = state_at(found, sessions, state.thresholds, state.banned)
-    return replace(state, path=tuple(one.fit.model for one in visited))
+    return replace(state, path=tuple(path))
 
 
 def better_from(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
@@ -101,16 +98,6 @@ def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood,
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Effects that are fitted, and those that the search about the fit came to."""
     return tuple(sorted(state.fit.model.names)), tuple(sorted(one.name for one in state.chosen))
-
-
-def _likeliest(visited: Sequence[State]) -> State:
-    """The one whose own set has most evidence, and that set as its answer: what it leads to is among them.
-
-    A linearisation promises more of a set than a fit of it keeps, so that each may promise most of another.
-    """
-    noise_sd = visited[-1].evidence.noise_sd
-    best = min(visited, key=lambda one: Evidence(one.given, noise_sd).posterior(one.start).score)
-    return replace(best, best=best.evidence.posterior(best.start))
 
 
 def _promising(state: State) -> list[Posterior]:

@@ -272,6 +272,13 @@ class TestSensors:
         assert not found.causes
         assert "no cause can be told" in _limit(found, "one load cycle")
 
+    @pytest.mark.bank
+    def test_a_gain_that_drifts_only_with_a_load_that_grows_is_not_named(self, measured: Path) -> None:
+        """In the whole record of the air channel the peaks grow with the clock, so that it follows the curve."""
+        found = diagnose(_files(measured, "air_whole", "pressure_v"))
+        assert found.causes[0].effect.family == "static_curve"
+        assert "gain_drift" not in {cause.name for cause in found.causes}
+
     @pytest.mark.parametrize("name", _few(SENSORS))
     def test_the_baseline_is_as_good_as_a_plain_standard_linear_solid(self, measured: Path, name: str) -> None:
         fit, hold, column = SENSORS[name]

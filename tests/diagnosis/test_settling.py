@@ -25,22 +25,13 @@ class _State:
     found: str
     improved: float
     path: tuple[Any, ...] = ()
-    best: str = ""
 
-    thresholds = None
+    given = thresholds = None
     banned = ()
 
     @property
-    def given(self) -> str:
-        return self.fitted
-
-    @property
-    def start(self) -> str:
-        return self.fitted
-
-    @property
     def evidence(self) -> Any:
-        return SimpleNamespace(odds=ODDS, noise_sd=0.1, posterior=lambda members: f"posterior of {members}")
+        return SimpleNamespace(odds=ODDS)
 
     @property
     def fit(self) -> Any:
@@ -63,18 +54,6 @@ def _model(names: str) -> Any:
     return SimpleNamespace(names=tuple(names), parts=())
 
 
-class _Scored:
-    """The shorter the set that is fitted, the likelier; by how much goes with the noise, which is that of the last."""
-
-    def __init__(self, given: str, noise_sd: float) -> None:
-        assert noise_sd == 0.1
-        self.given = given
-
-    def posterior(self, members: str) -> Any:
-        assert members == self.given
-        return SimpleNamespace(score=float(len(members)))
-
-
 def _ends(
     monkeypatch: pytest.MonkeyPatch, first: _State, then: list[_State], known: _State | None = None, apart: float = 0.0
 ) -> tuple[Any, int]:
@@ -90,7 +69,6 @@ def _ends(
     monkeypatch.setattr(_settling, "with_members", lambda *given: None)
     monkeypatch.setattr(_settling, "fit", fitted)
     monkeypatch.setattr(_settling, "apart", lambda *given: apart)
-    monkeypatch.setattr(_settling, "Evidence", _Scored)
     monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
     return _settling.settled(first, [], lambda said: None, known), len(fits)  # type: ignore[arg-type]
 
@@ -103,27 +81,23 @@ def test_a_set_that_is_found_again_about_another_fit_is_fitted(monkeypatch: pyte
     assert [one.names for one in end.path] == [(), ("c",), ("m",)]
 
 
-def test_of_states_that_lead_to_one_another_the_likeliest_is_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And its own set is the answer: what it leads to has been fitted."""
-    circle = [_State("bb", "c", 30.0), _State("c", "aaa", 31.0), _State("aaa", "bb", 32.0), _State("bb", "c", 33.0)]
-    end, fits = _ends(monkeypatch, _State("aaa", "bb", 30.0), circle)
-    assert (end.itself, end.best, fits) == (("c", "aaa", 31.0), "posterior of c", 3)
+def test_a_state_that_comes_back_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, again = _State("a", "b", 30.0), _State("a", "b", 30.0)
+    end, fits = _ends(monkeypatch, first, [_State("b", "a", 30.0), again, _State("b", "a", 30.0)])
+    assert (end.itself, fits) == (again.itself, 2)
 
 
 @pytest.mark.parametrize(("improved", "fits"), [(ODDS - 0.1, 0), (ODDS + 0.1, 1)])
 def test_nothing_is_fitted_for_less_than_the_odds_against_a_name(
     monkeypatch: pytest.MonkeyPatch, improved: float, fits: int
 ) -> None:
-    end, taken = _ends(monkeypatch, _State("", "a", improved), [_State("a", "a", ODDS - 0.1)])
-    assert (taken, end.best) == (fits, "")  # what is worth less than another fit is still part of the answer
+    assert _ends(monkeypatch, _State("", "a", improved), [_State("a", "a", 0.0)])[1] == fits
 
 
 def test_it_ends_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
     ever = [_State("ab"[k % 2] * (k + 1), "c", 500.0) for k in range(20)]
-    end, fits = _ends(monkeypatch, _State("abc", "c", 500.0), ever)
-    assert (end.fitted, fits) == ("a", _settling.ROUNDS)
-    last = [*ever[: _settling.ROUNDS - 1], _State("c" * 9, "c", 0.0)]
-    assert _ends(monkeypatch, _State("abc", "c", 500.0), last)[0].fitted == "c" * 9
+    end, fits = _ends(monkeypatch, _State("", "c", 500.0), ever)
+    assert (end.itself, fits) == (ever[_settling.ROUNDS - 1].itself, _settling.ROUNDS)
 
 
 @pytest.mark.parametrize(("names", "apart", "joins"), [("ba", 0.9, True), ("ba", 1.1, False), ("ac", 0.0, False)])
