@@ -228,9 +228,10 @@ class Evidence:
         columns = [self.given.candidates[m].columns for m in members]
         each = self._strengths(members, pull)
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
-        beyond = pull[sum(map(len, columns)) :][: len(members) * self._directions]
+        own, beyond = np.split(pull, [sum(map(len, columns))])
+        beyond = beyond[: len(members) * self._directions]  # after them come those towards other laws
         departed = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
-        together = self.visible_rms([c for own in columns for c in own], np.concatenate([*each, ()]))
+        together = self.visible_rms([c for few in columns for c in few], self.thresholds.strength_sd * own)
         score = self._nothing - fall + self.odds_of(members)
         return Posterior(members, score, each, sizes, tuple(departed or [0.0] * len(members)), together)
 

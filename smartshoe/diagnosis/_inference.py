@@ -28,7 +28,7 @@ from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._settling import Progress, better_from, score_of, settled, simpler
+from smartshoe.diagnosis._settling import Progress, better_from, listed, score_of, settled, simpler
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
@@ -80,8 +80,8 @@ def infer(
         state = better_from(with_another_pole(state, sessions), state, sessions, progress)
     if state.fit.model.relaxing_share < 0.0:
         state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
-    if flexible := [one.name.replace("_", " ") for one in state.chosen if one.effect.is_flexible]:
-        progress(f"trying laws in the place of {', '.join(flexible)}")
+    if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
+        progress(f"trying laws in the place of {listed(flexible)}")
     lawful = with_laws(state, plain.model, sessions)
     state = state if lawful is state else settled(lawful, sessions, progress)
     progress("weighing alternatives")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
@@ -33,10 +33,9 @@ def settled(state: State, sessions: Sequence[Session], progress: Progress, known
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
     path = [state.fit.model]
     # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
-    while state.improved >= state.evidence.odds and _names(state) not in seen and len(path) <= ROUNDS:
-        seen.add(_names(state))
-        _, chosen = _names(state)
-        progress(f"fitting {', '.join(chosen).replace('_', ' ') or 'the baseline'}")
+    while state.improved >= state.evidence.odds and (here := _names(state)) not in seen and len(path) <= ROUNDS:
+        seen.add(here)
+        progress(f"fitting {listed(here[1]) or 'the baseline'}")
         likelihood = state.likelihood(sessions)
         found = min(
             (
@@ -93,6 +92,11 @@ def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood
 def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
     """Whether two models have the same effects, and hardly read differently."""
     return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Identifiers as words, one after the other."""
+    return ", ".join(name.replace("_", " ") for name in names)
 
 
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:

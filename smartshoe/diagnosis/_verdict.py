@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
@@ -12,6 +12,7 @@ from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._settling import listed
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
@@ -129,14 +130,10 @@ def refusals_of(found: Inference) -> list[str]:
         ]
     said = []
     if found.undone:
-        said.append(f"undo one another, so that none of them is named: {_listed(found.undone)}")
+        said.append(f"undo one another, so that none of them is named: {listed(found.undone)}")
     if found.refused:
         said.append(
             "fitted well but made recordings left out worse, and so were taken out again:"
-            f" {_listed(dict.fromkeys(found.refused))}"
+            f" {listed(dict.fromkeys(found.refused))}"
         )
     return said
-
-
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(name.replace("_", " ") for name in names)
