@@ -71,7 +71,11 @@ class _Twin:
         return np.concatenate([one[s.fitted] for one, s in zip(signals, self.given.sessions, strict=True)])
 
     def signature(self, column: Array) -> list[Array]:
-        """A column (rows' numbers weighed) less what own columns and each recording's nuisances follow of it."""
+        """All that columns (rows' numbers weighed) add to the reading."""
+        return [rows @ column for rows in self.given.rows]
+
+    def left_of(self, column: Array) -> list[Array]:
+        """The same less what own columns and each recording's nuisances follow of it."""
         given = self.given
         wide = np.zeros((self.y.size, 4))
         first = 0
@@ -105,7 +109,8 @@ class _Twin:
         of_any_law: bool = False,
     ) -> tuple[float, dict[int, Array], dict[int, float]]:
         """-2 log density but for a constant; members' strengths beyond what is immaterial; departures' rms."""
-        variances = np.concatenate([[1.0, 1.0], np.full(5, MATERIAL**2)])
+        # "one" stands at two shapes, in a column each, and "two" in two columns: as much of each effect.
+        variances = np.concatenate([[1.0, 1.0], MATERIAL**2 / np.array([2.0, 2.0, 2.0, 1.0, 2.0])])
         columns, spans = [self.z], {}
         for member in (*members, *exact):
             columns.append(self.rows[:, list(COLUMNS[member])])
@@ -144,7 +149,7 @@ class _Twin:
         weights = np.zeros(8)
         for member in members:
             weights[list(COLUMNS[member])] += strengths[member]
-        return float(np.sqrt(np.mean(self.seen(self.signature(weights)) ** 2)))
+        return float(np.sqrt(np.mean(self.seen(self.left_of(weights)) ** 2)))
 
 
 @pytest.fixture(scope="module")
