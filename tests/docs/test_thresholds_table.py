@@ -9,7 +9,7 @@ from smartshoe.diagnosis import Thresholds, described
 
 
 def test_the_guide_lists_every_threshold_with_its_value_unit_meaning_and_origin(root: Path) -> None:
-    text = (root / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    text = (root / "docs" / "diagnosis_rules.md").read_text(encoding="utf-8")
     section = text.split("## Every number that decides\n")[1].split("\n## ")[0]
     listed = re.findall(r"^\| `(.+?)` \| (.+?) \| (.+?) \| (.+?) \| (.+?) \|$", section, re.MULTILINE)
     wanted = [
