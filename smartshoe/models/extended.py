@@ -188,8 +188,8 @@ class ExtendedModel:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
         The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
-        ``trace``: this model's own under the same conditions, where it is known. ``only``: the effects ("baseline" among
-        them) whose parameters are asked for; the derivatives of all others are left at 0.
+        ``trace``: this model's own under the same conditions, where it is known. ``only``: the effects ("baseline"
+        among them) whose parameters are asked for; the derivatives of all others are left at 0.
         """
         reading, inputs = trace or self.trace(conditions)
         out = np.zeros((reading.size, len(self.parameters)), order="F")

@@ -136,7 +136,8 @@ def test_factors_are_of_load_direction_speed_time_and_what_was_borne() -> None:
     for k in range(7):
         x, e, v = 2.0 * load[k] - 1.0, 2.0 * time_s[k] / 3.0 - 1.0, rate[k]
         expected = [x, 0.5 * (3.0 * x * x - 1.0), v / math.hypot(v, 0.004), math.log10((0.004 + abs(v)) / 0.004) - 1.0,
-                    e, 0.5 * (3.0 * e * e - 1.0), 2.0 * largest[k] - 1.0, 2.0 * math.exp(-way[k] / 8.0) - 1.0]  # fmt: skip
+                    e, 0.5 * (3.0 * e * e - 1.0),
+                    2.0 * largest[k] - 1.0, 2.0 * math.exp(-way[k] / 8.0) - 1.0]  # fmt: skip
         # A load's way is counted from where it has moved by more than a thousandth, the dead zone of noise.
         assert _factors(session, STANDARD)[k] == pytest.approx(expected, abs=1e-3)
     single: Any = SimpleNamespace(conditions=Conditions(np.zeros(1), np.ones(1), 0.5))

@@ -35,7 +35,7 @@ MISSES = 1  # of a group, so at most 3 of 35: 91 %
 # A free offset and initial state of each recording cost parameters that set in at once (a warm-up, heat) certainty that
 # their intervals do not show yet.
 PARAMETERS_OFF = 4
-# Cases of a group with a name that is not there, beside the right one. The bank asks for none in ten: docs/diagnosis_bank.md
+# Cases of a group with a name that is not there, beside the right one. The bank asks for none in ten: diagnosis_bank.md
 # says by how much it is missed where effects are as strong as the strongest drawn here.
 WITH_A_FALSE_NAME = 5
 SURE = 0.75
@@ -184,7 +184,7 @@ OUTSIDE = [name for name in EFFECTS if not EFFECTS[name].inside]
 def test_an_effect_that_the_catalogue_does_not_have_gets_no_name(name):
     case = hide({name: 2.0}, protocol="rates", seed=drawn("outside", 1000).seed, recordings=2)
     diagnosis, one = diagnosed(case)
-    # Jumps and ringing may also be told as spikes, dropouts or hum of the data: docs/diagnosis_bank.md counts how often.
+    # Jumps and ringing may also be told as spikes, dropouts or hum of the data: diagnosis_bank.md counts them.
     # What comes nearest may be named, with a confidence that says that it is another's shadow.
     assert all(named.right or named.confidence < SURE for named in one.named), told(name, diagnosis, one)
     assert diagnosis.verdict in ("unexplained", "partly_explained"), told(name, diagnosis, one)
