@@ -150,7 +150,7 @@ class Linearised:
 
     @cached_property
     def factors(self) -> tuple[Array, ...]:
-        """(n, 8) a session: smooth functions of load, direction, rate, time and loads before, on which a size may hang."""
+        """(n, 8) a session: smooth functions of load, direction, rate, time and loads before; sizes go with them."""
         return tuple(_factors(session, self.thresholds) for session in self.sessions)
 
     def noise_sd(self) -> float:
