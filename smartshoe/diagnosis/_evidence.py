@@ -174,13 +174,14 @@ class Evidence:
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
         signatures = [rows[:, columns] @ weights for rows in given.rows]
-        parts = zip(departures(given, signatures), given.sessions, strict=True)
+        remembers = "memory" in given.candidates[member].effect.departs_with
+        parts = zip(departures(given, signatures, remembers), given.sessions, strict=True)
         seen = [where(one.fitted, part) for part, one in parts]
         past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
         made = _Columns(seen, past)
         cross = self._between(self._all, made)
         half, first = self._taken_out(cross), self._first + member * self._directions
-        places = slice(first, first + self._directions)
+        places = slice(first, first + cross.shape[1])
         self._reduced[: self._first, places] = cross - self._half.T @ half
         self._reduced[places, : self._first] = self._reduced[: self._first, places].T
         self._reduced[places, places] = self._between(made, made) - half.T @ half
@@ -231,8 +232,9 @@ class Evidence:
         each = self._strengths(members, pull)
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
         own, beyond = np.split(pull, [sum(map(len, columns))])
-        beyond = beyond[: len(members) * self._directions]  # after them come those towards other laws
-        departed = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
+        ways = [len(way) for way in self._departures_of(members)] if beyond.size else []
+        parts = np.split(beyond, np.cumsum(ways, dtype=np.intp))[:-1]  # after them come those towards other laws
+        departed = [float(np.sqrt(np.mean(one**2))) for one in parts]
         together = self.visible_rms([c for few in columns for c in few], self.thresholds.strength_sd * own)
         score = self._nothing - fall + self.odds_of(members)
         return Posterior(members, score, each, sizes, tuple(departed or [0.0] * len(members)), together)

@@ -19,6 +19,22 @@ def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
     return {key: _parameter(fit, k, scale) for k, owner, key in _told(fit) if owner == name}
 
 
+def may_be_none(fit: Fit, name: str) -> bool:
+    """Whether the 95 % region of an effect's strengths holds none at all: by Wald's statistic of all of them together.
+
+    Not of a flexible block, whose weights share a prior.
+    """
+    if fit.model.part(name).effect.is_flexible:
+        return False
+    from scipy.special import chdtri
+
+    parameters, theta = fit.model.parameters, fit.model.theta
+    places = [k for k, owner, _ in _told(fit) if owner == name and parameters[k][1].null is not None]
+    away = np.array([theta[k] - (parameters[k][1].null or 0.0) for k in places])
+    covariance = fit.covariance[np.ix_(places, places)]
+    return float(away @ np.linalg.pinv(covariance, hermitian=True) @ away) < float(chdtri(len(places), 0.05))
+
+
 def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tuple[tuple[float, ...], ...]]:
     """Every effect's parameters as ``effect.parameter``, and their covariance in the same units and order."""
     told = _told(fit)

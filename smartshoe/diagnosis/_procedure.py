@@ -17,7 +17,7 @@ from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
-from smartshoe.diagnosis._parameters import joint_parameters, parameters_of
+from smartshoe.diagnosis._parameters import joint_parameters, may_be_none, parameters_of
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace
@@ -26,6 +26,7 @@ from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,
+    none_of,
     other_kind_of,
     parted_clocks,
     past_of,
@@ -183,7 +184,8 @@ def _diagnosed(
     silent = given.is_no_unit or not found.can_validate
     names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
-    names = tuple(one for one in names if one not in [at_an_end for at_an_end, _ in unclear])
+    unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
+    names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))

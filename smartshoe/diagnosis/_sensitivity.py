@@ -26,6 +26,8 @@ from smartshoe.models.extended import ExtendedModel
 
 SETTLING_WAY = 4.0  # full scales up and down over which worked walls settle, a resolution: few and many cycles differ
 
+REMEMBERED = 2  # the last of the factors: of loads that were before
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -241,23 +243,25 @@ def _shape_of(effect: Effect, values: Array) -> dict[str, float]:
 
 
 def directions(thresholds: Thresholds) -> int:
-    """How many `departures` an equation has: eight factors of its size, and a lag for each time constant."""
+    """How many `departures` an equation has at most: eight factors of its size, and a lag for each time constant."""
     return 8 + len(thresholds.memory_s)
 
 
-def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
-    """(n, `directions`) a session: those in which a law departs from an equation of its kind, each of the column's rms.
+def departures(given: Linearised, column: Sequence[Array], remembers: bool) -> list[Array]:
+    """(n, k) a session: how a law departs from an equation of its kind, k directions, each of the column's rms.
 
     ``column`` (n,) is the equation's whole contribution, also what the baseline could follow of it: where a gain that
     settles does so more at high loads, what differs is a curve. A law of the same kind has its size depend otherwise on
-    the load, the direction, the rate, the time, the largest load so far and the way that the load has gone, or follows
-    with other time constants: the contribution times smooth functions of these, and its lags. So a departure is in
-    proportion to the effect (Kennedy and O'Hagan 2001).
+    the load, the direction, the rate and the time, and where it ``remembers`` loads on the largest so far and the way
+    that they have gone, or follows with other time constants: the contribution times smooth functions of these, and its
+    lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
     """
-    out, power, size = [], np.zeros(directions(given.thresholds)), 0.0
-    for session, factors, own in zip(given.sessions, given.factors, column, strict=True):
+    many = directions(given.thresholds) - (0 if remembers else REMEMBERED)
+    out, power, size = [], np.zeros(many), 0.0
+    for session, every, own in zip(given.sessions, given.factors, column, strict=True):
+        factors = every if remembers else every[:, :-REMEMBERED]
         part = np.empty((own.size, power.size), order="F")
-        np.multiply(own[:, None], factors, out=part[:, : -len(given.thresholds.memory_s)])
+        np.multiply(own[:, None], factors, out=part[:, : factors.shape[1]])
         for k, tau_s in enumerate(given.thresholds.memory_s, start=factors.shape[1]):
             np.subtract(lagged(own, session.conditions.step_s, tau_s), own, out=part[:, k])
         seen = where(session.fitted, part)

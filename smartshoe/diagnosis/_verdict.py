@@ -51,6 +51,14 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     return None
 
 
+def none_of(name: Name) -> str:
+    """What is said of an effect whose strength may be none, beside all else that moves with it."""
+    return (
+        f"{name.effect.name.replace('_', ' ')} fits, but the interval of its strength holds none, since others may do"
+        " what it does, so that it is not named"
+    )
+
+
 def known_error(integrity: Integrity, scale: Scale) -> float:
     """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
     return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)

@@ -158,7 +158,7 @@ def test_departures_are_factors_and_lags_of_the_signatures_own_rms() -> None:
         sessions=sessions, thresholds=STANDARD, factors=tuple(_factors(one, STANDARD) for one in sessions)
     )
     own = [np.random.default_rng(k).standard_normal(one.reading.size) for k, one in enumerate(sessions)]
-    found = departures(given, own)
+    found = departures(given, own, True)
     size = sum(float(np.sum(one[s.fitted] ** 2)) for one, s in zip(own, sessions, strict=True))
     for column in range(11):
         parts = []
@@ -172,8 +172,11 @@ def test_departures_are_factors_and_lags_of_the_signatures_own_rms() -> None:
             assert made[:, column] == pytest.approx(part * math.sqrt(size / power))
     assert directions(STANDARD) == 11
     assert directions(replace(STANDARD, memory_s=(1.0,))) == 9
-    nothing = departures(given, [0.0 * one for one in own])
+    nothing = departures(given, [0.0 * one for one in own], True)
     assert all(not part.any() for part in nothing)
+    # What does not remember loads departs with none that were before.
+    for whole, part in zip(found, departures(given, own, False), strict=True):
+        assert part == pytest.approx(np.delete(whole, [6, 7], axis=1))
 
 
 def test_inner_products_are_of_what_the_nuisances_leave() -> None:

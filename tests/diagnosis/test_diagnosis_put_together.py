@@ -100,6 +100,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_procedure, "residual_structure", structure)
     answer("names_of", lambda *_: tuple(made.names))
     answer("other_kind_of", lambda name, *_: "it turned" if name.name == "turned" else None)
+    answer("may_be_none", lambda fit, name: name == "faint")
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
     answer("_cause", cause)
@@ -123,8 +124,8 @@ def _run_diagnosis(parts: Any) -> Any:
 
 
 def _name(name: str, kind_only: bool = False, size: float = 0.1) -> Any:
-    known = effect("delay" if name == "turned" else name)
-    return SimpleNamespace(name=name, kind_only=kind_only, effect=known, member=SimpleNamespace(size=size))
+    known = effect("delay" if name in ("turned", "faint") else name)
+    return SimpleNamespace(name=name, kind_only=kind_only, effect=known, member=SimpleNamespace(size=size, name=name))
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
@@ -157,6 +158,14 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
     assert seen["next_experiment"][1] == {"open_": True}
     assert seen["infer"][0][4] is True
+
+
+def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -> None:
+    parts.names = [_name("linear_leak"), _name("faint")]
+    told = _run_diagnosis(parts)
+    assert [one.name for one in told.causes] == ["linear_leak"]
+    (_, said) = told.limits
+    assert said.startswith("delay fits, but the interval of its strength holds none")
 
 
 def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) -> None:

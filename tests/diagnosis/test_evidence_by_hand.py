@@ -117,6 +117,9 @@ class _Twin:
         (column,) = self.given.candidates[member].columns
         return [rows[:, column] for rows in self.given.rows]
 
+    def remembers(self, member: int) -> bool:
+        return "memory" in self.given.candidates[member].effect.departs_with
+
     def visible(self, member: int) -> Array:
         """What of that neither the baseline nor the nuisances follow, least squares."""
         (column,) = self.given.candidates[member].columns
@@ -126,7 +129,7 @@ class _Twin:
     def posterior(self, members: tuple[int, ...]) -> tuple[float, Array, dict[int, float]]:
         """The density with members whose equations depart in proportion to their sizes, these found in two rounds."""
         found, mean, departed = self.cost(members, {})
-        made = {m: self.seen(departures(self.given, self.signature(m))) for m in members}
+        made = {m: self.seen(departures(self.given, self.signature(m), self.remembers(m))) for m in members}
         for _ in range(2):
             amounts = {m: abs(mean[self.given.candidates[m].columns[0] - 1]) for m in members}
             limits = self.given.thresholds
@@ -171,7 +174,7 @@ def test_an_extension_of_a_set_scores_as_the_set_whose_new_equation_is_exact(
     best = evidence.posterior((right,))
     twin = _Twin(given, SD)
     amount = abs(float(best.strengths[0][0]))
-    made = twin.seen(departures(given, twin.signature(right)))
+    made = twin.seen(departures(given, twin.signature(right), twin.remembers(right)))
     departing = {right: (made, given.thresholds.departure * amount / made.shape[1] ** 0.5)}
     plain, _, _ = twin.cost((right,), departing)
     told = {k: (score, strengths) for score, k, strengths in evidence.extensions((right,))}
@@ -320,7 +323,7 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
 # -- directions of departure --------------------------------------------------------------------------------------
 def test_departures_are_a_signature_times_polynomials_and_its_lags(given: Linearised) -> None:
     ones = [np.ones(session.reading.size) for session in given.sessions]
-    (first, _) = departures(given, ones)
+    (first, _) = departures(given, ones, True)
     at = given.sessions[0].conditions
     legendre = np.polynomial.legendre.Legendre
 
@@ -348,7 +351,7 @@ def test_departures_are_a_signature_times_polynomials_and_its_lags(given: Linear
 def test_departures_are_as_large_as_their_signature(given: Linearised) -> None:
     rng = np.random.default_rng(1)
     signature = [rng.standard_normal(session.reading.size) for session in given.sessions]
-    made = departures(given, signature)
+    made = departures(given, signature, True)
     kept = [session.fitted for session in given.sessions]
     whole = np.concatenate([part[mask] for part, mask in zip(made, kept, strict=True)])
     rms = np.sqrt(np.mean(np.concatenate([s[m] for s, m in zip(signature, kept, strict=True)]) ** 2))

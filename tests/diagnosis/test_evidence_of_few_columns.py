@@ -24,6 +24,7 @@ MATERIAL, STRENGTH, DEPARTURE = STANDARD.material, STANDARD.strength_sd, STANDAR
 COLUMNS = ((3,), (4, 5), (6,), (7,))  # beside the target, of two own columns
 NAMES = ("one", "two", "three", "one")
 FAMILIES = {"one": "kind", "two": "kind", "three": "another"}
+REMEMBERS = {"one": {"memory"}, "two": {"load"}, "three": {"load", "memory"}}
 OTHERS = ([4, 5], [3, 7], [], [4, 5])  # columns of the families' other equations
 
 
@@ -38,7 +39,7 @@ def _given() -> Linearised:
         target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
         rows.append(np.column_stack([target, columns]))
     candidates: Any = tuple(
-        SimpleNamespace(name=n, columns=c, effect=SimpleNamespace(family=FAMILIES[n]))
+        SimpleNamespace(name=n, columns=c, effect=SimpleNamespace(family=FAMILIES[n], departs_with=REMEMBERS[n]))
         for n, c in zip(NAMES, COLUMNS, strict=True)
     )
     return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)
@@ -118,7 +119,11 @@ class _Twin:
             variances = np.append(variances, np.full(len(COLUMNS[member]), STRENGTH**2))
         departed = {}
         for member in members if amounts is not None else ():
-            made = self.seen(departures(self.given, self.signature(self.direction(COLUMNS[member]))))
+            made = self.seen(
+                departures(
+                    self.given, self.signature(self.direction(COLUMNS[member])), "memory" in REMEMBERS[NAMES[member]]
+                )
+            )
             departed[member] = slice(variances.size, variances.size + made.shape[1])
             assert amounts is not None
             sd = max(DEPARTURE * amounts[member] / math.sqrt(made.shape[1]), 1e-7)
