@@ -5,8 +5,7 @@ With the reading's residual y, in standard deviations of what counts as noise, a
     y = X0 b + sum over all candidates x_j s_j + sum over e in S ( x_e a_e + Phi_e w_e ) + noise
 
 * b ~ N(0, 1), the baseline's own changes: anything up to full scale, which is flat;
-* s_j ~ N(0, material^2 / columns): what is immaterial may always be there, of each effect as much at however many of
-  its shapes it stands, and needs no name;
+* s_j ~ N(0, material^2): what is immaterial may always be there, of any kind, and needs no name;
 * a_e ~ N(0, strength_sd^2): the effects in S (spike and slab: George and McCulloch 1993);
 * w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
   directions in which equations of its kind depart (Kennedy and O'Hagan 2001).
@@ -26,7 +25,6 @@ without: there the other equations are tried themselves, and what they took up w
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -104,12 +102,13 @@ class Evidence:
         own = slice(1, 1 + given.own)
         raw = given.gram
         inverse = np.linalg.pinv(raw[own, own], rcond=1e-10, hermitian=True)
-        visible = raw - raw[:, own] @ (inverse @ raw[own])
+        self._absorbed = inverse @ raw[own]
+        visible = raw - raw[:, own] @ self._absorbed
         count = sum(int(s.fitted.sum()) for s in given.sessions)
         self.raw = visible / count
         # What is there without any effect: the baseline's own changes, and what is immaterial.
-        self._sds = np.ones(self.gram.shape[0] - 1)
-        self._sds[given.own :] = self._immaterial()
+        self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.material)
+        self._sds[: given.own] = 1.0
         inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
         inner[np.diag_indices_from(inner)] += 1.0
         self._factor = _factor(inner)
@@ -124,12 +123,6 @@ class Evidence:
         self._known: set[tuple[int, int]] = set()
         effects = {one.name for one in given.candidates}
         self.odds = 2.0 * math.log(len(effects) / self.thresholds.false_name)
-
-    def _immaterial(self) -> Array:
-        """Standard deviations of what may always be there: of each effect as much, at however many shapes it stands."""
-        each = [one.name for one in self.given.candidates for _ in one.columns]
-        many = Counter(each)
-        return np.array([self.thresholds.material / math.sqrt(many[name]) for name in each])
 
     def _taken_out(self, cross: Array) -> Array:
         """(p, k) of inner products (1 + p, k) with target and p columns: its square is what these account for."""
@@ -173,15 +166,19 @@ class Evidence:
         given = self.given
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
-        signatures = [rows[:, columns] @ weights for rows in given.rows]
-        remembers = "memory" in given.candidates[member].effect.departs_with
-        parts = zip(departures(given, signatures, remembers), given.sessions, strict=True)
+        absorbed = self._absorbed[:, columns] @ weights
+        signatures = []
+        for rows, own, products in zip(given.rows, given.nuisances, given.products, strict=True):
+            visible = rows[:, columns] @ weights - rows[:, 1 : 1 + given.own] @ absorbed
+            known = products[-2:, columns] @ weights - products[-2:, 1 : 1 + given.own] @ absorbed
+            signatures.append(visible - own @ np.linalg.solve(ridged(products[-2:, -2:]), known))
+        parts = zip(departures(given, signatures), given.sessions, strict=True)
         seen = [where(one.fitted, part) for part, one in parts]
         past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
         made = _Columns(seen, past)
         cross = self._between(self._all, made)
         half, first = self._taken_out(cross), self._first + member * self._directions
-        places = slice(first, first + cross.shape[1])
+        places = slice(first, first + self._directions)
         self._reduced[: self._first, places] = cross - self._half.T @ half
         self._reduced[places, : self._first] = self._reduced[: self._first, places].T
         self._reduced[places, places] = self._between(made, made) - half.T @ half
@@ -232,9 +229,8 @@ class Evidence:
         each = self._strengths(members, pull)
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
         own, beyond = np.split(pull, [sum(map(len, columns))])
-        ways = [len(way) for way in self._departures_of(members)] if beyond.size else []
-        parts = np.split(beyond, np.cumsum(ways, dtype=np.intp))[:-1]  # after them come those towards other laws
-        departed = [float(np.sqrt(np.mean(one**2))) for one in parts]
+        beyond = beyond[: len(members) * self._directions]  # after them come those towards other laws
+        departed = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
         together = self.visible_rms([c for few in columns for c in few], self.thresholds.strength_sd * own)
         score = self._nothing - fall + self.odds_of(members)
         return Posterior(members, score, each, sizes, tuple(departed or [0.0] * len(members)), together)

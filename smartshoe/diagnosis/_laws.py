@@ -95,8 +95,7 @@ def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
     """
     shapes = law.shapes_with(logged_channels(likelihood.sessions))
     starts = [model.with_part(law, law.begun(shape, sizes)) for shape in shapes for sizes in SIZES]
-    begun = (fit(likelihood, one, 1, only=("baseline", law.name)) for one in starts)
-    return fit(likelihood, min(begun, key=lambda f: f.cost).model, FEW_STEPS)
+    return fit(likelihood, min((fit(likelihood, one, 1) for one in starts), key=lambda f: f.cost).model, FEW_STEPS)
 
 
 def _is_stretched(model: ExtendedModel, law: Effect) -> bool:

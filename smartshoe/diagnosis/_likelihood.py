@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,11 +21,9 @@ SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 
 
-def rows_of(
-    model: ExtendedModel, session: Session, trace: Trace | None = None, only: Collection[str] | None = None
-) -> Array:
-    """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`, 0 but for ``only``."""
-    reading, slopes = model.sensitivities(session.conditions, trace, only)
+def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) -> Array:
+    """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`."""
+    reading, slopes = model.sensitivities(session.conditions, trace)
     return np.column_stack([session.reading - reading, slopes])
 
 
@@ -62,16 +60,11 @@ class Likelihood:
             total += float(self._gram(k, (session.reading - reading)[:, None])[0, 0])
         return total
 
-    def normal(
-        self, model: ExtendedModel, rows: Sequence[Array] | None = None, only: Collection[str] | None = None
-    ) -> tuple[float, Array, Array]:
-        """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p); ``rows`` where they are known.
-
-        ``only``: the effects whose parameters are asked for, all others being 0.
-        """
+    def normal(self, model: ExtendedModel, rows: Sequence[Array] | None = None) -> tuple[float, Array, Array]:
+        """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p); ``rows`` where they are known."""
         if rows is None:
             known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
-            rows = [rows_of(model, *one, only) for one in zip(self.sessions, known, strict=True)]
+            rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
         self._rows = [one.copy(order="K") for one in rows]  # they are brought up to date in place
         return self._products()
 
@@ -128,34 +121,31 @@ def fit(
     start: ExtendedModel,
     steps: int = MOST_STEPS,
     rows: Sequence[Array] | None = None,
-    only: Collection[str] | None = None,
+    only: str | None = None,
 ) -> Fit:
     """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
 
     Shapes have a prior about their start, of one in the logarithm or of their size; weights of flexible blocks have
     theirs about null. ``rows`` are `rows_of` the start within its bounds, a session each, where they are known.
-    ``only``: the effects ("baseline" among them) whose parameters are fitted, all others held; all where it is None.
+    ``only``: the effect whose parameters are fitted, all others held; all of them where it is None.
     """
     owners = start.parameters
     logarithmic = _are_logarithmic(start)
     low, high = np.array([p.lower for _, p in owners]), np.array([p.upper for _, p in owners])
     model = within_bounds(start)
     about, precision = _about(model, logarithmic), _precision(model, logarithmic)
-    free = np.array([only is None or owner in only for owner, _ in owners])
+    free = np.array([only in (None, owner) for owner, _ in owners])
 
     def penalty(theta: Array) -> float:
         return float(np.sum(precision * (_stepped(theta, logarithmic) - about) ** 2))
 
-    cost, right, normal = likelihood.normal(model, rows, only)
+    cost, right, normal = likelihood.normal(model, rows)
     cost += penalty(model.theta)
     damping, exact, came = 1e-4, True, model.theta
     for taken in range(steps):
         theta = model.theta
         if taken:
-            if exact:
-                _, right, normal = likelihood.normal(model, only=only)
-            else:
-                _, right, normal = likelihood.nearly_normal(model, theta - came)
+            _, right, normal = likelihood.normal(model) if exact else likelihood.nearly_normal(model, theta - came)
         came = theta
         scale = np.where(logarithmic, theta, 1.0)
         inner = (normal * np.outer(scale, scale) + np.diag(precision)) * np.outer(free, free)

@@ -21,12 +21,7 @@ from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
-from smartshoe.models.effects.cycle_conditioning import half_way
 from smartshoe.models.extended import ExtendedModel
-
-SETTLING_WAY = 4.0  # full scales up and down over which worked walls settle, a resolution: few and many cycles differ
-
-REMEMBERED = 2  # the last of the factors: of loads that were before
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +147,7 @@ class Linearised:
 
     @cached_property
     def factors(self) -> tuple[Array, ...]:
-        """(n, 8) a session: smooth functions of load, direction, rate, time and loads before; sizes go with them."""
+        """(n, 6) a session: smooth functions of load, direction, rate and time, on which a size may depend."""
         return tuple(_factors(session, self.thresholds) for session in self.sessions)
 
     def noise_sd(self) -> float:
@@ -243,25 +238,21 @@ def _shape_of(effect: Effect, values: Array) -> dict[str, float]:
 
 
 def directions(thresholds: Thresholds) -> int:
-    """How many `departures` an equation has at most: eight factors of its size, and a lag for each time constant."""
-    return 8 + len(thresholds.memory_s)
+    """How many `departures` an equation has: six factors of its size, and a lag for each time constant."""
+    return 6 + len(thresholds.memory_s)
 
 
-def departures(given: Linearised, column: Sequence[Array], remembers: bool) -> list[Array]:
-    """(n, k) a session: how a law departs from an equation of its kind, k directions, each of the column's rms.
+def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
+    """(n, `directions`) a session: those in which a law departs from an equation of its kind, each of the column's rms.
 
-    ``column`` (n,) is the equation's whole contribution, also what the baseline could follow of it: where a gain that
-    settles does so more at high loads, what differs is a curve. A law of the same kind has its size depend otherwise on
-    the load, the direction, the rate and the time, and where it ``remembers`` loads on the largest so far and the way
-    that they have gone, or follows with other time constants: the contribution times smooth functions of these, and its
-    lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
+    ``column`` (n,) is the equation's own signature. A law of the same kind has its size depend otherwise on the load,
+    the direction, the rate and the time, or follows with other time constants: the signature times smooth functions of
+    these, and its lags. So a departure is in proportion to the effect (Kennedy and O'Hagan 2001).
     """
-    many = directions(given.thresholds) - (0 if remembers else REMEMBERED)
-    out, power, size = [], np.zeros(many), 0.0
-    for session, every, own in zip(given.sessions, given.factors, column, strict=True):
-        factors = every if remembers else every[:, :-REMEMBERED]
+    out, power, size = [], np.zeros(directions(given.thresholds)), 0.0
+    for session, factors, own in zip(given.sessions, given.factors, column, strict=True):
         part = np.empty((own.size, power.size), order="F")
-        np.multiply(own[:, None], factors, out=part[:, : factors.shape[1]])
+        np.multiply(own[:, None], factors, out=part[:, : -len(given.thresholds.memory_s)])
         for k, tau_s in enumerate(given.thresholds.memory_s, start=factors.shape[1]):
             np.subtract(lagged(own, session.conditions.step_s, tau_s), own, out=part[:, k])
         seen = where(session.fitted, part)
@@ -282,9 +273,7 @@ def _factors(session: Session, thresholds: Thresholds) -> Array:
     direction = rate / np.sqrt(rate**2 + still**2)
     speed = np.log10(1.0 + np.abs(rate) / still) - 1.0
     elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
-    borne = 2.0 * np.maximum.accumulate(load) - 1.0
-    worked = 2.0 * np.exp(-half_way(session.conditions) / SETTLING_WAY) - 1.0
-    found = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5, borne, worked]
+    found = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5]
     return np.asfortranarray(np.column_stack(found))
 
 

@@ -75,17 +75,17 @@ class Thresholds:
         0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
-        (2.32, -1.04, -0.9, -1.4),
+        (1.92, -1.04, -0.9, -1.0),
         "log odds",
         "of a kind: intercept; per log of what is left over its size; per standard deviation of its departure; where no"
         " law of it follows",
-        "logistic regression on 306 cases of two worlds; without a law on 825; its intercept on 471",
+        "logistic regression on 306 cases of two worlds; without a law on 825",
     )
     least_confidence: float = threshold(
-        0.75,
+        0.667,
         "probability",
         "of the kind; below it no cause is named; of a zero that is never seen",
-        "three to one for being right",
+        "two to one for being right",
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
     memory_s: tuple[float, ...] = threshold(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -165,37 +165,35 @@ class ExtendedModel:
                 load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / share
         return self.core.deformation(load, conditions.step_s)
 
-    def _varied(self, j: int) -> Extension:
-        """A small step of the parameter ``j`` of `theta`, which is not the gain; made once."""
-        if j not in self._steps:
-            (owner, parameter), moved = self.parameters[j], self.theta
-            step = derivative_step(parameter, moved[j])
-            moved[j] += step
-            core = self.chain.index(None)
-            places = {part.name: k for k, part in enumerate(self.chain) if part is not None}
-            first = places.get(owner, core) if owner != "baseline" else 0
-            alike = first != core and owner != "baseline"  # this parameter does not touch the core
-            self._steps[j] = Extension(step, self.at(moved), first, self.core if alike else None)
-        return self._steps[j]
-
     @cached_property
-    def _steps(self) -> dict[int, Extension]:
-        return {}
+    def _varied(self) -> Extensions:
+        """For each parameter but the gain."""
+        theta, made = self.theta, []
+        place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
+        core = self.chain.index(None)
+        for j, (owner, parameter) in enumerate(self.parameters):
+            if j == 0:
+                continue
+            step = derivative_step(parameter, theta[j])
+            moved = theta.copy()
+            moved[j] += step
+            first = place_of.get(owner, core) if owner != "baseline" else 0
+            trial = self.at(moved)
+            alike = first != core and owner != "baseline"  # this parameter does not touch the core
+            made.append(Extension(step, trial, first, self.core if alike else None))
+        return tuple(made)
 
-    def sensitivities(
-        self, conditions: Conditions, trace: Trace | None = None, only: Collection[str] | None = None
-    ) -> tuple[Array, Array]:
+    def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
         The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
-        ``trace``: this model's own under the same conditions, where it is known. ``only``: the effects ("baseline"
-        among them) whose parameters are asked for; the derivatives of all others are left at 0.
+        ``trace``: this model's own under the same conditions, where it is known.
         """
         reading, inputs = trace or self.trace(conditions)
-        out = np.zeros((reading.size, len(self.parameters)), order="F")
-        for j, (owner, _) in enumerate(self.parameters):
-            if only is None or owner in only:
-                out[:, j] = self._varied(j).slope(reading, inputs, conditions) if j else reading / self.gain
+        out = np.empty((reading.size, 1 + len(self._varied)), order="F")
+        out[:, 0] = reading / self.gain
+        for j, by in enumerate(self._varied, start=1):
+            out[:, j] = by.slope(reading, inputs, conditions)
         return reading, out
 
     def trace(self, conditions: Conditions) -> Trace:

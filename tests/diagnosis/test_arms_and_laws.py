@@ -228,17 +228,16 @@ def test_a_law_begins_from_all_its_shapes_small_and_large(monkeypatch: pytest.Mo
     law = effect("second_relaxation")
     begun: list[Any] = []
 
-    def fitted(likelihood: Any, model: ExtendedModel, steps: int, *, only: Any = None) -> Any:
-        begun.append((tuple(model.parts[-1].values), steps, only))
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
+        begun.append((tuple(model.parts[-1].values), steps))
         return SimpleNamespace(model=model, cost=-len(begun))
 
     monkeypatch.setattr(_laws, "fit", fitted)
     unlogged: Any = SimpleNamespace(sessions=[])
     found: Any = _laws._begun(law, MODEL, unlogged)
     starts = [tuple(law.begun(shape, sizes)) for shape in law.shapes for sizes in (0.5, 5.0, 20.0)]
-    # The law and the gain that it moves are fitted, all else is held.
-    assert begun[:-1] == [(start, 1, ("baseline", "second_relaxation")) for start in starts]
-    assert begun[-1] == (starts[-1], 4, None)  # the best of them goes on
+    assert begun[:-1] == [(start, 1) for start in starts]
+    assert begun[-1] == (starts[-1], 4)  # the best of them goes on
     assert found.model.parts[-1].effect is law
 
 

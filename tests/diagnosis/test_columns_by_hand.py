@@ -127,19 +127,16 @@ def test_an_effect_needs_its_channel_in_every_session() -> None:
 
 
 # -- columns ----------------------------------------------------------------------------------------------------------
-def test_factors_are_of_load_direction_speed_time_and_what_was_borne() -> None:
+def test_factors_are_of_load_direction_speed_and_time() -> None:
     load = np.array([0.0, 0.1, 0.4, 0.8, 0.8, 0.8, 0.3])
     time_s = 0.5 * np.arange(7)
     session: Any = SimpleNamespace(conditions=Conditions(time_s, load, 0.5))
     rate = np.gradient(load, 0.5)
-    largest, way = [0.0, 0.1, 0.4, 0.8, 0.8, 0.8, 0.8], [0.0, 0.1, 0.4, 0.8, 0.8, 0.8, 1.3]
     for k in range(7):
         x, e, v = 2.0 * load[k] - 1.0, 2.0 * time_s[k] / 3.0 - 1.0, rate[k]
         expected = [x, 0.5 * (3.0 * x * x - 1.0), v / math.hypot(v, 0.004), math.log10((0.004 + abs(v)) / 0.004) - 1.0,
-                    e, 0.5 * (3.0 * e * e - 1.0),
-                    2.0 * largest[k] - 1.0, 2.0 * math.exp(-way[k] / 8.0) - 1.0]  # fmt: skip
-        # A load's way is counted from where it has moved by more than a thousandth, the dead zone of noise.
-        assert _factors(session, STANDARD)[k] == pytest.approx(expected, abs=1e-3)
+                    e, 0.5 * (3.0 * e * e - 1.0)]  # fmt: skip
+        assert _factors(session, STANDARD)[k] == pytest.approx(expected)
     single: Any = SimpleNamespace(conditions=Conditions(np.zeros(1), np.ones(1), 0.5))
     assert _factors(single, STANDARD)[0, 4] == -1.0
 
@@ -158,25 +155,22 @@ def test_departures_are_factors_and_lags_of_the_signatures_own_rms() -> None:
         sessions=sessions, thresholds=STANDARD, factors=tuple(_factors(one, STANDARD) for one in sessions)
     )
     own = [np.random.default_rng(k).standard_normal(one.reading.size) for k, one in enumerate(sessions)]
-    found = departures(given, own, True)
+    found = departures(given, own)
     size = sum(float(np.sum(one[s.fitted] ** 2)) for one, s in zip(own, sessions, strict=True))
-    for column in range(11):
+    for column in range(9):
         parts = []
         for one, session in zip(own, sessions, strict=True):
-            if column < 8:
+            if column < 6:
                 parts.append(one * _factors(session, STANDARD)[:, column])
             else:
-                parts.append(lagged(one, STEP_S, STANDARD.memory_s[column - 8]) - one)
+                parts.append(lagged(one, STEP_S, STANDARD.memory_s[column - 6]) - one)
         power = sum(float(np.sum(one[s.fitted] ** 2)) for one, s in zip(parts, sessions, strict=True))
         for made, part in zip(found, parts, strict=True):
             assert made[:, column] == pytest.approx(part * math.sqrt(size / power))
-    assert directions(STANDARD) == 11
-    assert directions(replace(STANDARD, memory_s=(1.0,))) == 9
-    nothing = departures(given, [0.0 * one for one in own], True)
+    assert directions(STANDARD) == 9
+    assert directions(replace(STANDARD, memory_s=(1.0,))) == 7
+    nothing = departures(given, [0.0 * one for one in own])
     assert all(not part.any() for part in nothing)
-    # What does not remember loads departs with none that were before.
-    for whole, part in zip(found, departures(given, own, False), strict=True):
-        assert part == pytest.approx(np.delete(whole, [6, 7], axis=1))
 
 
 def test_inner_products_are_of_what_the_nuisances_leave() -> None:

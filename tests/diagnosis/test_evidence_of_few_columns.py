@@ -24,7 +24,6 @@ MATERIAL, STRENGTH, DEPARTURE = STANDARD.material, STANDARD.strength_sd, STANDAR
 COLUMNS = ((3,), (4, 5), (6,), (7,))  # beside the target, of two own columns
 NAMES = ("one", "two", "three", "one")
 FAMILIES = {"one": "kind", "two": "kind", "three": "another"}
-REMEMBERS = {"one": {"memory"}, "two": {"load"}, "three": {"load", "memory"}}
 OTHERS = ([4, 5], [3, 7], [], [4, 5])  # columns of the families' other equations
 
 
@@ -39,7 +38,7 @@ def _given() -> Linearised:
         target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
         rows.append(np.column_stack([target, columns]))
     candidates: Any = tuple(
-        SimpleNamespace(name=n, columns=c, effect=SimpleNamespace(family=FAMILIES[n], departs_with=REMEMBERS[n]))
+        SimpleNamespace(name=n, columns=c, effect=SimpleNamespace(family=FAMILIES[n]))
         for n, c in zip(NAMES, COLUMNS, strict=True)
     )
     return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)
@@ -72,11 +71,7 @@ class _Twin:
         return np.concatenate([one[s.fitted] for one, s in zip(signals, self.given.sessions, strict=True)])
 
     def signature(self, column: Array) -> list[Array]:
-        """All that columns (rows' numbers weighed) add to the reading."""
-        return [rows @ column for rows in self.given.rows]
-
-    def left_of(self, column: Array) -> list[Array]:
-        """The same less what own columns and each recording's nuisances follow of it."""
+        """A column (rows' numbers weighed) less what own columns and each recording's nuisances follow of it."""
         given = self.given
         wide = np.zeros((self.y.size, 4))
         first = 0
@@ -110,8 +105,7 @@ class _Twin:
         of_any_law: bool = False,
     ) -> tuple[float, dict[int, Array], dict[int, float]]:
         """-2 log density but for a constant; members' strengths beyond what is immaterial; departures' rms."""
-        # "one" stands at two shapes, in a column each, and "two" in two columns: as much of each effect.
-        variances = np.concatenate([[1.0, 1.0], MATERIAL**2 / np.array([2.0, 2.0, 2.0, 1.0, 2.0])])
+        variances = np.concatenate([[1.0, 1.0], np.full(5, MATERIAL**2)])
         columns, spans = [self.z], {}
         for member in (*members, *exact):
             columns.append(self.rows[:, list(COLUMNS[member])])
@@ -119,11 +113,7 @@ class _Twin:
             variances = np.append(variances, np.full(len(COLUMNS[member]), STRENGTH**2))
         departed = {}
         for member in members if amounts is not None else ():
-            made = self.seen(
-                departures(
-                    self.given, self.signature(self.direction(COLUMNS[member])), "memory" in REMEMBERS[NAMES[member]]
-                )
-            )
+            made = self.seen(departures(self.given, self.signature(self.direction(COLUMNS[member]))))
             departed[member] = slice(variances.size, variances.size + made.shape[1])
             assert amounts is not None
             sd = max(DEPARTURE * amounts[member] / math.sqrt(made.shape[1]), 1e-7)
@@ -154,7 +144,7 @@ class _Twin:
         weights = np.zeros(8)
         for member in members:
             weights[list(COLUMNS[member])] += strengths[member]
-        return float(np.sqrt(np.mean(self.seen(self.left_of(weights)) ** 2)))
+        return float(np.sqrt(np.mean(self.seen(self.signature(weights)) ** 2)))
 
 
 @pytest.fixture(scope="module")

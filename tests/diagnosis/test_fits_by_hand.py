@@ -259,7 +259,7 @@ class _Told:
     def cost(self, model: _Slope) -> float:
         return self.scale * float((1.0 - model.theta[0]) ** 2)
 
-    def normal(self, model: _Slope, rows: object = None, only: object = None) -> tuple[float, Array, Array]:
+    def normal(self, model: _Slope, rows: object = None) -> tuple[float, Array, Array]:
         self.asked.append(("anew", float(model.theta[0])))
         return self._products(model)
 

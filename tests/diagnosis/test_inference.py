@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from told_evidence import immaterial
 
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds, described
@@ -75,8 +74,8 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         own = nuisances(session, given.model.relaxation_rate_per_s)
         precision = nuisance_precision(session, given.model, limits)
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
-        prior = np.ones(rows.shape[1] - 1)
-        prior[given.own :] = immaterial(given)
+        prior = np.full(rows.shape[1] - 1, limits.material)
+        prior[: given.own] = 1.0
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
         kept = session.fitted

@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Posterior
-from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._session import Quiet, Session
 from smartshoe.models.effects import Conditions
 
 Array = NDArray[np.float64]
 
 STANDARD = Thresholds()
-
-
-def immaterial(given: Linearised) -> Array:
-    """(k,) standard deviations of what may always be there: as much of each effect, shared among its columns."""
-    names = [one.name for one in given.candidates for _ in one.columns]
-    return np.array([given.thresholds.material / names.count(name) ** 0.5 for name in names])
 
 
 def candidate(name: str, slot: str = "", sign: float = 1.0, **of: Any) -> Any:
