@@ -22,7 +22,8 @@ def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
 def may_be_none(fit: Fit, name: str) -> bool:
     """Whether the 95 % region of an effect's strengths holds none at all: by Wald's statistic of all of them together.
 
-    Not of a flexible block, whose weights share a prior.
+    Not of a flexible block, whose weights share a prior, nor where a strength is held by a bound, as far from none as
+    it may be: the curvature there is no interval's.
     """
     if fit.model.part(name).effect.is_flexible:
         return False
@@ -30,6 +31,9 @@ def may_be_none(fit: Fit, name: str) -> bool:
 
     parameters, theta = fit.model.parameters, fit.model.theta
     places = [k for k, owner, _ in _told(fit) if owner == name and parameters[k][1].null is not None]
+    if any(theta[k] != parameters[k][1].null and theta[k] in (parameters[k][1].lower, parameters[k][1].upper)
+           for k in places):  # fmt: skip
+        return False
     away = np.array([theta[k] - (parameters[k][1].null or 0.0) for k in places])
     covariance = fit.covariance[np.ix_(places, places)]
     return float(away @ np.linalg.pinv(covariance, hermitian=True) @ away) < float(chdtri(len(places), 0.05))

@@ -107,6 +107,9 @@ def test_strengths_may_be_none_where_their_joint_region_holds_it() -> None:
         covariance[leak, leak] = sd**2
         assert may_be_none(fit, "linear_leak") is none
     assert not may_be_none(fit, "sensor_nonlinearity")
+    full = MODEL.with_part("linear_leak", np.array([effect("linear_leak").parameters[0].upper]))
+    held: Any = SimpleNamespace(model=full, covariance=1e6 * np.eye(full.theta.size), likelihood=fit.likelihood)
+    assert not may_be_none(held, "linear_leak")  # as strong as it may be
     # Each is half its standard deviation from none, and only their weighed sum is sure.
     one, other = places[:2]
     covariance[one, one], covariance[other, other] = 0.02**2, 0.04**2
