@@ -34,12 +34,23 @@ CHANNELS = {
 
 
 def next_experiment(
-    found: Inference, causes: Sequence[Cause], sessions: Sequence[Session], excitation: Excitation, *, open_: bool
+    found: Inference,
+    causes: Sequence[Cause],
+    sessions: Sequence[Session],
+    excitation: Excitation,
+    *,
+    open_: bool,
+    worse: bool = False,
 ) -> NextExperiment | None:
     """For the most doubtful cause: the protocol with the largest expected margin, or the channel to log.
 
+    Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
     Where no cause is in doubt and something is left (``open_``), what this data never showed; else None.
     """
+    if worse:
+        held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
+        says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
+        return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.name in found.fit.model.names]
     if not doubtful:
         return _unseen(found, causes, excitation) if open_ or any(c.equivalents for c in causes) else None

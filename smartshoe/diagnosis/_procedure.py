@@ -18,13 +18,14 @@ from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import joint_parameters, may_be_none, parameters_of
-from smartshoe.diagnosis._ranges import ranges_of
+from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
+    is_worse,
     known_error,
     none_of,
     other_kind_of,
@@ -34,6 +35,7 @@ from smartshoe.diagnosis._verdict import (
     sentence_of,
     unexplained_of,
     verdict_of,
+    worse_of,
 )
 from smartshoe.diagnosis._zero import Zero, creeping, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
@@ -202,7 +204,10 @@ def _diagnosed(
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
     known = known_error(integrity, scale)
-    verdict = "unexplained" if given.is_no_unit else verdict_of(causes, before, after, thresholds, follows, known)
+    won = gain(baseline, best, scale)
+    worse = is_worse(won)
+    verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=worse)
+    verdict = "unexplained" if given.is_no_unit else verdict
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
@@ -213,7 +218,7 @@ def _diagnosed(
     force = force_rmse_n(fine, extended)
     return Diagnosis(
         verdict,
-        sentence_of(verdict, causes, baseline, best, rest, thresholds),
+        sentence_of(verdict, causes, baseline, best, rest, thresholds, worse=worse),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
@@ -222,15 +227,16 @@ def _diagnosed(
         data_faults=(*integrity.faults, *noise),
         baseline=_goodness(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
         extended=_goodness(best, force, after, scale),
-        gain=gain(baseline, best, scale),
+        gain=won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material)
+            found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material), worse=worse
         ),
         limits=(
             *given.limits,
+            *([worse_of(won, beyond(fine, scale, thresholds))] if worse else []),
             *parted,
             *(said for _, said in unclear),
             *past,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 
@@ -62,6 +62,35 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 " files are not of one unit"
             )
     return Ranges(tuple(said), trap)
+
+
+def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> str | None:
+    """How the loads that are held out go beyond what was fitted: faster, higher or longer; None where they do not.
+
+    ``same`` apart, as rates and peaks of one kind may be.
+    """
+    fitted = [(one, one.fitted) for one in sessions if one.fitted.any()]
+    judged = [(one, one.judged) for one in sessions if one.judged.any()]
+    ways: list[tuple[str, str, float, Callable[[Session, Mask], float]]] = [
+        (
+            "change by up to",
+            "N/s",
+            scale.load_n,
+            lambda one, seen: float(np.quantile(np.abs(one.conditions.rate_per_s[seen]), 0.99)),
+        ),
+        ("reach", "N", scale.load_n, lambda one, seen: float(one.conditions.load[seen].max())),
+        ("go on for", "s", 1.0, lambda one, seen: float(np.ptp(one.conditions.time_s[seen]))),
+    ]
+    said = []
+    for does, unit, factor, of in ways:
+        known, asked = (max((of(*one) for one in some), default=0.0) for some in (fitted, judged))
+        if asked > (1.0 + thresholds.same) * known:
+            said.append(f"{does} {_told(asked * factor)} {unit} ({_told(known * factor)} in what was fitted)")
+    return "its loads " + ", ".join(said) if said else None
+
+
+def _told(value: float) -> str:
+    return f"{float(f'{value:.3g}'):,g}"
 
 
 def _gain(load: Array, reading: Array, follows: float) -> float | None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
-from smartshoe.diagnosis._held_out import Errors
+from smartshoe.diagnosis._held_out import Errors, Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._residual_structure import ResidualStructure
@@ -76,8 +76,12 @@ def verdict_of(
     thresholds: Thresholds,
     follows: bool = True,
     known: float = 0.0,
+    *,
+    worse: bool = False,
 ) -> Verdict:
     """What is left, against what was wrong ``before`` and what is tolerable.
+
+    ``worse``: that the extension is so, for certain, on what is held out: whatever it follows, it explains a part.
 
     ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
 
@@ -87,7 +91,7 @@ def verdict_of(
     least = max(thresholds.material, thresholds.tolerable, known)
     if causes:
         least = max(least, thresholds.departure * before.rms if follows else 0.0)
-        return "partly_explained" if left > least else "explained"
+        return "partly_explained" if left > least or worse else "explained"
     return "unexplained" if left > least else "adequate"
 
 
@@ -98,6 +102,8 @@ def sentence_of(
     best: Errors,
     rest: ResidualStructure,
     thresholds: Thresholds,
+    *,
+    worse: bool = False,
 ) -> str:
     """The answer in a sentence: size before judgement; ``rest`` is what no cause accounts for."""
     names = [cause.name.replace("_", " ") for cause in causes]
@@ -108,8 +114,25 @@ def sentence_of(
         return good if rest.rms <= thresholds.material else f"{good}; {not_explained}"
     if verdict == "unexplained":
         return f"{good}; {not_explained}, and no effect of the catalogue accounts for it"
-    said = f"{good}, with {named} to {100 * best.rmse:.2g} %"
+    by_all = f"{100 * best.rmse:.2g} %"
+    said = f"{good}; with {named} it is worse there, good to {by_all}" if worse else f"{good}, with {named} to {by_all}"
     return said if verdict == "explained" else f"{said}; {not_explained}"
+
+
+def is_worse(won: Gain) -> bool:
+    """Whether an extension follows what is held out less well than the plain model, beyond chance."""
+    return won.ci95[1] < 0.0
+
+
+def worse_of(won: Gain, beyond: str | None) -> str:
+    """What is said of an extension that `is_worse`; ``beyond``: how the loads there go beyond the fitted ones."""
+    low, high = won.ci95
+    why = beyond or "its loads are as those that were fitted, so that what is wrong is the session's or the model's"
+    return (
+        f"on what was held out the extended model is worse than the plain one ({won.rmse_before:.3g} to"
+        f" {won.rmse_after:.3g} {won.unit}, by {-high:.2g} to {-low:.2g} %): {why}; do not correct such recordings by"
+        " it before one of them is among those that are fitted"
+    )
 
 
 def past_of(zero: Zero, scale: Scale) -> str:
