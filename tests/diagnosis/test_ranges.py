@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._ranges import Ranges, ranges_of
+from smartshoe.diagnosis._ranges import Ranges, beyond, ranges_of
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.recording import Recording
 
@@ -65,3 +65,29 @@ def test_gains_within_files_that_differ_from_the_gain_between_them_are_a_trap() 
 @pytest.mark.parametrize("factor", [0.5, 1.0])
 def test_files_over_different_ranges_of_one_unit_are_no_trap(factor: float) -> None:
     assert not _ranges(_proportional(0.0, 800.0), _proportional(0.0, 800.0 * factor)).is_trap
+
+
+@pytest.mark.parametrize(
+    ("higher", "faster", "longer", "said"),
+    [
+        (1.2, 1.0, 1.0, None),
+        (1.3, 1.0, 1.0, "its loads change by up to 416 N/s (320 in what was fitted), reach 1,040 N (800 in what was"),
+        (1.0, 2.0, 1.0, "its loads change by up to 640 N/s (320 in what was fitted)"),
+        (1.0, 1.0, 2.0, "its loads go on for 80 s (40 in what was fitted)"),
+    ],
+)
+def test_loads_held_out_go_beyond_those_fitted_by_a_quarter(
+    higher: float, faster: float, longer: float, said: str | None
+) -> None:
+    time_s = np.arange(0.0, 40.0 * longer, 0.02)
+    fitted, held_out = (
+        Recording.from_arrays(time_s=t, force_n=load, pressure_mbar=GAIN_MBAR_PER_N * load)
+        for t, load in (
+            (TIME_S, 800.0 * TRIANGLE),
+            (time_s, 800.0 * higher * np.abs(2.0 * (faster * time_s / 5.0 % 1.0) - 1.0)),
+        )
+    )
+    usable = [np.ones(one.time_s.size, dtype=bool) for one in (fitted, held_out)]
+    scale = full_scale([fitted], usable[:1], Thresholds())
+    told = beyond(prepare([fitted, held_out], usable, [False, True], scale, 1, Thresholds()), scale, Thresholds())
+    assert (told is None) if said is None else (told is not None and told.startswith(said))

@@ -13,12 +13,22 @@ from told_evidence import STANDARD, ToldEvidence, candidate, worth
 
 from smartshoe.diagnosis import _inference, _zero
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
+from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
 from smartshoe.diagnosis._parameters import may_be_none
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
-from smartshoe.diagnosis._verdict import crept_of, known_error, other_kind_of, parted_clocks, past_of, verdict_of
+from smartshoe.diagnosis._verdict import (
+    crept_of,
+    is_worse,
+    known_error,
+    other_kind_of,
+    parted_clocks,
+    past_of,
+    verdict_of,
+    worse_of,
+)
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
@@ -138,6 +148,26 @@ def test_what_is_known_to_be_wrong_with_the_data_is_not_seen_below() -> None:
     for given, verdicts in ((causes, ("explained", "partly_explained")), ([], ("adequate", "unexplained"))):
         told = [verdict_of(given, left(0.01), left(by * 0.02), STANDARD, True, 0.02) for by in (1.0, 1.001)]
         assert tuple(told) == verdicts
+
+
+def test_what_is_worse_on_held_out_data_explains_a_part_at_most() -> None:
+    left: Any = SimpleNamespace(rms=1e-6, significant=True)
+    causes: Any = [SimpleNamespace(name="delay")]
+    for given, verdicts in ((causes, ("explained", "partly_explained")), ([], ("adequate", "adequate"))):
+        assert tuple(verdict_of(given, left, left, STANDARD, worse=worse) for worse in (False, True)) == verdicts
+
+
+@pytest.mark.parametrize(("high", "worse"), [(-1.0, True), (0.0, False), (1.0, False)])
+def test_an_extension_is_worse_where_all_of_its_gains_interval_is_a_loss(high: float, worse: bool) -> None:
+    assert is_worse(Gain(0.7, 1.1, "mbar", -40.0, (-80.0, high))) is worse
+
+
+def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
+    won = Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0))
+    assert "worse than the plain one (0.7 to 1.1 mbar, by 40 to 80 %): its loads reach 900 N;" in worse_of(
+        won, "its loads reach 900 N"
+    )
+    assert "as those that were fitted" in worse_of(won, None)
 
 
 def test_a_past_is_said_in_the_readings_unit() -> None:
