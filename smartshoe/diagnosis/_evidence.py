@@ -18,8 +18,10 @@ R = U' C0^-1 U and q = U' C0^-1 y. Both are taken once for all columns, so that 
 few.
 
 Once a set is chosen, each of its effects is weighed against nothing in its place, also with wider equations: they may
-depart towards any other of their family, its columns among Phi_e. A companion may be no more than that. The search goes
-without: there the other equations are tried themselves, and what they took up would hide an effect of another family.
+depart towards any other of their family, its columns among Phi_e; or Phi_e is made of the whole effect, not of what the
+baseline leaves of it: a gain that settles more at high loads leaves a curve, of which the rest has nothing. A companion
+may be no more than either. The search goes without: there the other equations are tried themselves, and what they took
+up would hide an effect of another family.
 """
 
 from __future__ import annotations
@@ -84,10 +86,14 @@ class _Departures:
 
 
 class Evidence:
-    """The evidence for sets of candidates of ``given`` under white noise of ``noise_sd``, a share of full scale."""
+    """The evidence for sets of candidates of ``given`` under white noise of ``noise_sd``, a share of full scale.
 
-    def __init__(self, given: Linearised, noise_sd: float) -> None:
+    ``of_all``: equations depart in the whole effect, not in what the baseline cannot follow of it.
+    """
+
+    def __init__(self, given: Linearised, noise_sd: float, *, of_all: bool = False) -> None:
         self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
+        self._of_all = of_all
         self._seen: dict[tuple[Members, bool], Posterior] = {}
         self._inverse = [
             np.linalg.inv(
@@ -166,12 +172,8 @@ class Evidence:
         given = self.given
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
-        absorbed = self._absorbed[:, columns] @ weights
-        signatures = []
-        for rows, own, products in zip(given.rows, given.nuisances, given.products, strict=True):
-            visible = rows[:, columns] @ weights - rows[:, 1 : 1 + given.own] @ absorbed
-            known = products[-2:, columns] @ weights - products[-2:, 1 : 1 + given.own] @ absorbed
-            signatures.append(visible - own @ np.linalg.solve(ridged(products[-2:, -2:]), known))
+        whole = [rows[:, columns] @ weights for rows in given.rows]
+        signatures = whole if self._of_all else self._visible(whole, columns, weights)
         parts = zip(departures(given, signatures), given.sessions, strict=True)
         seen = [where(one.fitted, part) for part, one in parts]
         past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
@@ -183,6 +185,16 @@ class Evidence:
         self._reduced[places, : self._first] = self._reduced[: self._first, places].T
         self._reduced[places, places] = self._between(made, made) - half.T @ half
         return _Departures(made, places, half)
+
+    def _visible(self, whole: Sequence[Array], columns: Sequence[int], weights: Array) -> list[Array]:
+        """Of ``whole`` contributions (n,) a session what the baseline and the nuisances cannot follow."""
+        given, absorbed = self.given, self._absorbed[:, columns] @ weights
+        found = []
+        for every, rows, own, products in zip(whole, given.rows, given.nuisances, given.products, strict=True):
+            known = products[-2:, columns] @ weights - products[-2:, 1 : 1 + given.own] @ absorbed
+            followed = own @ np.linalg.solve(ridged(products[-2:, -2:]), known)
+            found.append(every - rows[:, 1 : 1 + given.own] @ absorbed - followed)
+        return found
 
     def _direction(self, columns: Sequence[int]) -> Array:
         """Of several strengths the direction that the data asks for, of unit length."""
@@ -207,6 +219,11 @@ class Evidence:
                 pull, fall = self._solved(members, self._strengths(members, pull), of_any_law=of_any_law)
             self._seen[asked] = self._described(members, pull, fall)
         return self._seen[asked]
+
+    @cached_property
+    def of_whole_effects(self) -> Evidence:
+        """The same where equations depart in all that their effects add."""
+        return Evidence(self.given, self.noise_sd, of_all=True)
 
     def exact(self, members: Members) -> Posterior:
         """The evidence of a set whose equations are taken for exact."""

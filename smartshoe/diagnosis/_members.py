@@ -84,12 +84,13 @@ def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
 def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:
     """What could stand in a member's place: every other effect at its best shape, and nothing.
 
-    Nothing, whether the others' equations depart as their own do or towards any of their families.
+    Nothing, whether the others' equations depart as their own do, towards any of their families, or in all that their
+    effects add.
     """
     less = tuple(m for m in best.members if m != member)
     margins = [
-        evidence.posterior(less, of_any_law=wider).score - evidence.posterior(best.members, of_any_law=wider).score
-        for wider in (False, True)
+        given.posterior(less, of_any_law=wider).score - given.posterior(best.members, of_any_law=wider).score
+        for given, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))
     ]
     found = [Alternative(None, min(margins))]
     for k in additions(evidence, less, 2 * BREADTH, refused):

@@ -156,7 +156,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
-    assert seen["next_experiment"][1] == {"open_": True}
+    assert seen["next_experiment"][1] == {"open_": True, "worse": False}
     assert seen["infer"][0][4] is True
 
 
@@ -185,13 +185,13 @@ def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
     parts.kinds[1].significant, parts.kinds[1].rms = False, 0.0
     told = _run_diagnosis(parts)  # what effects without a name did away with is not explained
     assert (told.verdict, told.leftover) == ("unexplained", "here")
-    assert parts.seen["next_experiment"][1] == {"open_": True}
+    assert parts.seen["next_experiment"][1] == {"open_": True, "worse": False}
     parts.seen.clear()
     parts.kinds[0].significant, parts.kinds[0].rms = False, 0.0
     told = _run_diagnosis(parts)
     assert (told.verdict, told.leftover) == ("adequate", None)
     assert told.explainable_percent == pytest.approx(75.0)
-    assert parts.seen["next_experiment"][1] == {"open_": False}
+    assert parts.seen["next_experiment"][1] == {"open_": False, "worse": False}
     assert parts.seen["noise_kinds"][0][3] is True
 
 

@@ -85,6 +85,10 @@ class _Twin:
             for k, (rows, past) in enumerate(zip(given.rows, self.pasts, strict=True))
         ]
 
+    def departing(self, column: Array) -> list[Array]:
+        """What equations depart in: what can be seen of the effect."""
+        return self.signature(column)
+
     def direction(self, columns: tuple[int, ...]) -> Array:
         weights = np.zeros(8)
         if len(columns) == 1:
@@ -113,7 +117,7 @@ class _Twin:
             variances = np.append(variances, np.full(len(COLUMNS[member]), STRENGTH**2))
         departed = {}
         for member in members if amounts is not None else ():
-            made = self.seen(departures(self.given, self.signature(self.direction(COLUMNS[member]))))
+            made = self.seen(departures(self.given, self.departing(self.direction(COLUMNS[member]))))
             departed[member] = slice(variances.size, variances.size + made.shape[1])
             assert amounts is not None
             sd = max(DEPARTURE * amounts[member] / math.sqrt(made.shape[1]), 1e-7)
@@ -145,6 +149,13 @@ class _Twin:
         for member in members:
             weights[list(COLUMNS[member])] += strengths[member]
         return float(np.sqrt(np.mean(self.seen(self.signature(weights)) ** 2)))
+
+
+class _TwinOfWholeEffects(_Twin):
+    """All that an effect adds is what its equation departs in."""
+
+    def departing(self, column: Array) -> list[Array]:
+        return [rows @ column for rows in self.given.rows]
 
 
 @pytest.fixture(scope="module")
@@ -184,6 +195,35 @@ def test_a_sets_evidence_is_that_of_its_density_to_the_digit(
     if members:
         assert found.together == pytest.approx(twin.visible(members, slow[1]), rel=1e-4)
         assert exact.departed == (0.0,) * len(members)
+
+
+@pytest.mark.parametrize("members", [(), (0,), (1,), (0, 2), (0, 1, 2)])
+def test_of_whole_effects_the_evidence_is_that_of_its_density_too(given: Linearised, members: tuple[int, ...]) -> None:
+    found = Evidence(given, SD).of_whole_effects.posterior(members)
+    score, strengths, departed = _TwinOfWholeEffects(given).posterior(members)
+    assert found.score - sum(ODDS + SHAPES[m] for m in members) == pytest.approx(score, rel=1e-6)
+    for k, member in enumerate(members):
+        assert found.strengths[k] == pytest.approx(strengths[member], rel=1e-4)
+        assert found.departed[k] == pytest.approx(departed[member], rel=1e-4)
+
+
+def test_a_curve_that_a_gain_leaves_where_it_grows_more_at_high_loads_is_no_evidence(given: Linearised) -> None:
+    """The gain is the baseline's, and with it went what a curve departs from."""
+    rng = np.random.default_rng(6)
+    rows = [one.copy() for one in given.rows]
+    for one, session in zip(rows, given.sessions, strict=True):
+        load, time_s = session.conditions.load, session.conditions.time_s
+        grown = load * (1.0 + 0.3 * time_s / time_s[-1])
+        one[:, 1], one[:, 3], one[:, 6] = load, grown, load**2
+        one[:, 0] = 0.06 * grown * (1.0 + 0.1 * (2.0 * load - 1.0)) + 0.0002 * rng.standard_normal(load.size)
+    evidence = Evidence(replace(given, rows=tuple(rows)), 0.0002)
+
+    def margin(of: Evidence) -> float:
+        alone, beside = (of.posterior(members).score for members in ((0,), (0, 2)))
+        return alone - beside
+
+    assert margin(evidence) > 50.0
+    assert margin(evidence.of_whole_effects) < 0.0
 
 
 def test_a_companion_that_another_law_of_its_neighbours_kind_would_be_is_no_evidence(given: Linearised) -> None:

@@ -173,6 +173,9 @@ def test_members_are_weighed_against_what_could_stand_in_their_place(monkeypatch
     # Nor is it needed where they need it only if they may.
     evidence.of_any_law = worth(90.0, 45.0, 0.0, 0.0, 0.0, 0.0)
     assert [(one.effect, one.margin) for one in alternatives(evidence, best, 0, ())] == [("d", 40.0), (None, 50.0)]
+    # Nor what they could do by departing in all that they add.
+    evidence.of_whole_effects = ToldEvidence(candidates, worth(7.0, 20.0, 0.0, 0.0, 0.0, 0.0))
+    assert [(one.effect, one.margin) for one in alternatives(evidence, best, 0, ())] == [(None, 7.0), ("d", 40.0)]
 
 
 def test_ten_are_weighed_against_a_member() -> None:

@@ -39,6 +39,7 @@ class ToldEvidence:
         self.thresholds, self.odds, self._score = STANDARD, 10.0, score
         self.strengths: dict[int, Array] = {}
         self.of_any_law = score  # where equations may depart towards their families' others
+        self.of_whole_effects = self  # where they may depart in all that their effects add
 
     def posterior(self, members: tuple[int, ...], *, of_any_law: bool = False) -> Posterior:
         members = tuple(sorted(members))
