@@ -101,6 +101,11 @@ class Gain:
     gain_percent: float
     ci95: tuple[float, float]
 
+    @property
+    def is_loss(self) -> bool:
+        """Whether the error grows, beyond chance."""
+        return self.ci95[1] < 0.0
+
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
         return {

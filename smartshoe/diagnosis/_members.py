@@ -89,8 +89,8 @@ def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequ
     """
     less = tuple(m for m in best.members if m != member)
     margins = [
-        given.posterior(less, of_any_law=wider).score - given.posterior(best.members, of_any_law=wider).score
-        for given, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))
+        weighed.posterior(less, of_any_law=wider).score - weighed.posterior(best.members, of_any_law=wider).score
+        for weighed, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))
     ]
     found = [Alternative(None, min(margins))]
     for k in additions(evidence, less, 2 * BREADTH, refused):

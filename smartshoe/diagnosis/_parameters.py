@@ -31,10 +31,13 @@ def may_be_none(fit: Fit, name: str) -> bool:
 
     parameters, theta = fit.model.parameters, fit.model.theta
     places = [k for k, owner, _ in _told(fit) if owner == name and parameters[k][1].null is not None]
-    if any(theta[k] != parameters[k][1].null and theta[k] in (parameters[k][1].lower, parameters[k][1].upper)
-           for k in places):  # fmt: skip
+    strengths = [parameters[k][1] for k in places]
+    if any(
+        value != one.null and value in (one.lower, one.upper)
+        for value, one in zip(theta[places], strengths, strict=True)
+    ):
         return False
-    away = np.array([theta[k] - (parameters[k][1].null or 0.0) for k in places])
+    away = theta[places] - np.array([one.null for one in strengths], dtype=np.float64)
     covariance = fit.covariance[np.ix_(places, places)]
     return float(away @ np.linalg.pinv(covariance, hermitian=True) @ away) < float(chdtri(len(places), 0.05))
 

@@ -20,12 +20,11 @@ from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import joint_parameters, may_be_none, parameters_of
 from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
-from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace
+from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
-    is_worse,
     known_error,
     none_of,
     other_kind_of,
@@ -205,9 +204,9 @@ def _diagnosed(
     follows = not any(name.kind_only for name in names)
     known = known_error(integrity, scale)
     won = gain(baseline, best, scale)
-    worse = is_worse(won)
-    verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=worse)
-    verdict = "unexplained" if given.is_no_unit else verdict
+    verdict: Verdict = "unexplained"
+    if not given.is_no_unit:
+        verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
@@ -218,7 +217,7 @@ def _diagnosed(
     force = force_rmse_n(fine, extended)
     return Diagnosis(
         verdict,
-        sentence_of(verdict, causes, baseline, best, rest, thresholds, worse=worse),
+        sentence_of(verdict, causes, baseline, best, rest, thresholds, worse=won.is_loss),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
@@ -232,11 +231,11 @@ def _diagnosed(
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material), worse=worse
+            found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material), worse=won.is_loss
         ),
         limits=(
             *given.limits,
-            *([worse_of(won, beyond(fine, scale, thresholds))] if worse else []),
+            *([worse_of(won, beyond(fine, scale, thresholds))] if won.is_loss else []),
             *parted,
             *(said for _, said in unclear),
             *past,

@@ -119,13 +119,8 @@ def sentence_of(
     return said if verdict == "explained" else f"{said}; {not_explained}"
 
 
-def is_worse(won: Gain) -> bool:
-    """Whether an extension follows what is held out less well than the plain model, beyond chance."""
-    return won.ci95[1] < 0.0
-
-
 def worse_of(won: Gain, beyond: str | None) -> str:
-    """What is said of an extension that `is_worse`; ``beyond``: how the loads there go beyond the fitted ones."""
+    """What is said of an extension whose gain `is_loss`; ``beyond``: how the loads there go beyond the fitted ones."""
     low, high = won.ci95
     why = beyond or "its loads are as those that were fitted, so that what is wrong is the session's or the model's"
     return (

@@ -21,7 +21,6 @@ from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
 from smartshoe.diagnosis._verdict import (
     crept_of,
-    is_worse,
     known_error,
     other_kind_of,
     parted_clocks,
@@ -159,7 +158,7 @@ def test_what_is_worse_on_held_out_data_explains_a_part_at_most() -> None:
 
 @pytest.mark.parametrize(("high", "worse"), [(-1.0, True), (0.0, False), (1.0, False)])
 def test_an_extension_is_worse_where_all_of_its_gains_interval_is_a_loss(high: float, worse: bool) -> None:
-    assert is_worse(Gain(0.7, 1.1, "mbar", -40.0, (-80.0, high))) is worse
+    assert Gain(0.7, 1.1, "mbar", -40.0, (-80.0, high)).is_loss is worse
 
 
 def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
