@@ -33,7 +33,7 @@ from smartshoe.protocol import Protocol
 from smartshoe.recording import Channel, Recording
 
 LAW_STEP_S = 2e-3
-MOST_ITERATIONS = 200
+MOST_ITERATIONS = 2000
 SETTLED = 1e-6  # of full scale
 
 

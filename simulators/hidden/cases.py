@@ -15,7 +15,7 @@ from simulators.hidden._baseline import lagged, left_over
 from simulators.hidden._machine import Chain, Departed, Given, lawful_machine, logged, recorded
 from simulators.hidden._scaling import SILENT, HiddenEffect, clipped_at_an_end, search
 from simulators.hidden.effects import SHARE_OF_RANGE, Hideable, Options, Subject, Warp, merged
-from simulators.hidden.plans import ALL, Plan, plan, seeded
+from simulators.hidden.plans import ALL, MOST_DEPARTURE, Plan, plan, seeded
 from simulators.hidden.recordings import drawn_subject, noise_options, small_effects
 from smartshoe.arrays import Array
 from smartshoe.protocol import Protocol
@@ -282,10 +282,15 @@ def _hide(
         )
     )  # fmt: skip
     amount, reached, note = search(strength, asked, bounded)
-    options, chain = placed(amount, size)
     departs = None
     if can_depart and not ranged:
         departs = _departure(p, effect, placed, amount, size, subject, protocol, logger) if size else 0.0
+        # A law that is not linear in its amount may depart by more at the one that was found.
+        while departs > MOST_DEPARTURE:
+            size *= departure / departs
+            amount, reached, note = search(strength, asked, bounded)
+            departs = _departure(p, effect, placed, amount, size, subject, protocol, logger)
+    options, chain = placed(amount, size)
     return HiddenLaw(effect, name, asked, reached, departs, options, chain, note)
 
 

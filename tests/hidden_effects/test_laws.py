@@ -212,6 +212,14 @@ def test_the_bank_plans_the_same_for_ever_and_within_its_bounds(kind):
         assert any(set(p.fitted) == {"single_rate"} for p in plans)
 
 
+@pytest.mark.parametrize("index", [816, 900])
+def test_a_departure_stays_within_its_bound_at_the_amount_that_was_found(index):
+    """A second arm near the unit's own is mostly absorbed: forty times the usual amount is found, which bends more."""
+    for one in case("two", index).hidden:
+        assert one.departure is not None
+        assert 0.0 < one.departure <= MOST_DEPARTURE, one.effect.name
+
+
 def test_three_worlds_share_everything_but_the_law():
     one, other = plan("worlds", 9), plan("worlds", 10)
     assert one.laws != other.laws
