@@ -10,7 +10,7 @@ from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, additions
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._state import State, state_at, with_members
+from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
@@ -37,13 +37,11 @@ def settled(state: State, sessions: Sequence[Session], progress: Progress, known
         seen.add(here)
         progress(f"fitting {listed(here[1]) or 'the baseline'}")
         likelihood = state.likelihood(sessions)
-        found = min(
-            (
-                fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
-                for one in _promising(state)
-            ),
-            key=lambda one: one.cost + state.evidence.odds * _strengths(one.model),
-        )
+        fits = [
+            fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
+            for one in _promising(state)
+        ]
+        found = _best_of(fits, state, sessions)
         if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
             return known
         path.append(found.model)
@@ -123,6 +121,20 @@ def _promising(state: State) -> list[Posterior]:
     ]
     tried = {*additions(state.evidence, start, RIVALS, state.banned), *flexible}
     return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
+
+
+def _best_of(fits: Sequence[Fit], state: State, sessions: Sequence[Session]) -> Fit:
+    """Of fits with equally many strengths the likeliest; of these, for each number one, that with most evidence.
+
+    One strength more always fits better. Whether it is worth it where no equation is exact is for the evidence to say.
+    """
+    likeliest: dict[int, Fit] = {}
+    for one in sorted(fits, key=lambda one: one.cost):
+        likeliest.setdefault(_strengths(one.model), one)
+    few = list(likeliest.values())
+    if len(few) == 1:
+        return few[0]
+    return min(few, key=lambda one: evidence_about(one.model, sessions, state.evidence)[1].score)
 
 
 def _strengths(model: ExtendedModel) -> int:

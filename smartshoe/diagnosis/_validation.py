@@ -89,7 +89,7 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class _Fold:
-    """``rest`` is fitted, and ``left_out`` (n,) predicted of the recording of which no more than ``seen`` is known."""
+    """``rest`` is fitted, and ``left_out`` (n,) of ``seen`` predicted, whose offset and past are its own in any case."""
 
     rest: list[Session]
     seen: Session
@@ -106,7 +106,7 @@ def _folds(sessions: Sequence[Session]) -> list[_Fold]:
         mask = np.isin(session.cycle, cycles) & session.fitted
         rest = replace(session, held_out=session.held_out | mask)
         if mask.any() and rest.fitted.any():
-            folds.append(_Fold([rest], rest, mask))
+            folds.append(_Fold([rest], session, mask))
     return folds
 
 

@@ -41,12 +41,14 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
-        independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={}
-    )
+        independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={},
+        names={}, refused={}, errors={}, stepped=(),
+    )  # fmt: skip
     plain = told_fit(100.0)
 
     def state(name: str) -> Any:
-        fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name))
+        names = tuple(told.names.get(name, ()))
+        fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name, names=names))
         return SimpleNamespace(
             name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0),
             likelihood=lambda sessions: "likelihood",
@@ -66,11 +68,13 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
             members=lambda: (),
             fit=SimpleNamespace(model=one.name),
             likelihood="likelihood",
-            refused=(),
+            refused=told.refused.get(one.name, ()),
             undone=(),
-            is_stepped_down=False,
-        )  # fmt: skip
+            is_stepped_down=one.name in told.stepped,
+            with_nothing_but=lambda plain: judged(one, plain, ()),
+        )
 
+    monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
     monkeypatch.setattr(
         _inference, "searched", lambda *given: ("given", SimpleNamespace(noise_sd=0.1), SimpleNamespace())
@@ -93,6 +97,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
     monkeypatch.setattr(_inference, "score_of", lambda model, likelihood, odds: told.scores.get(model, -len(model)))
+    told.state = state
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
     return told
 
@@ -123,7 +128,7 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     assert flow.infer().fit.model == "(settled creeping settled first or settled first)"
     flow.share = 0.0
     assert flow.infer().fit.model == "settled first"
-    flow.lawful = SimpleNamespace(name="lawful", banned=())
+    flow.lawful = flow.state("lawful")
     assert flow.infer().fit.model == "settled lawful"
     flow.lawful, flow.laws = None, [{"a": "b"}, {"c": "d"}]
     assert flow.infer().fit.model == "law law settled first"
@@ -136,6 +141,24 @@ def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(
         flow.scores["law law law settled first"] = 0.0
         assert flow.infer().fit.model == kept
         assert len(flow.laws) == left  # nothing is tried beyond it
+
+
+@pytest.mark.parametrize(
+    ("refused", "stepped", "error", "kept"),
+    [
+        ("law", (), 0.9, "settled first"),
+        ("law", (), 1.1, "settled lawful"),  # the block follows no better
+        ("law", ("settled first",), 0.9, "settled lawful"),  # nor does it stand
+        ("other", (), 0.9, "settled lawful"),
+    ],
+)
+def test_where_a_law_is_not_the_same_in_each_recording_its_block_stays(
+    flow: Any, refused: str, stepped: tuple[str, ...], error: float, kept: str
+) -> None:
+    flow.names = {"settled first": ("block", "other"), "lawful": ("law", "other")}
+    flow.lawful, flow.refused, flow.stepped = flow.state("lawful"), {"settled lawful": (refused,)}, stepped
+    flow.errors = {"settled first": error}
+    assert flow.infer().fit.model == kept
 
 
 class _Judge:

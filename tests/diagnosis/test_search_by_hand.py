@@ -247,7 +247,7 @@ def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blo
     assert left == [[0, 1], [2, 3], [4, 5], [6, 7], [8], [9]]
     for fold in folds:
         (rest,) = fold.rest
-        assert rest is fold.seen
+        assert fold.seen is single  # whose offset is its own, as that of a recording that is left out
         assert not (rest.fitted & fold.left_out).any()
         assert (rest.fitted | fold.left_out).sum() == 200
     assert len(_folds([session_of(WAVE, None, np.repeat(np.arange(3), 80))])) == 3

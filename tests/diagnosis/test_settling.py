@@ -180,26 +180,36 @@ def test_strengths_are_parameters_that_are_null_where_the_effect_is_not_there() 
     assert _settling._strengths(MODEL) == 0
 
 
-@pytest.mark.parametrize(("odds", "chosen"), [(10.0, "plain"), (1.0, "curved")])
-def test_of_what_promises_that_is_taken_which_is_likeliest_by_the_odds_against_its_strengths(
-    monkeypatch: pytest.MonkeyPatch, odds: float, chosen: str
+@pytest.mark.parametrize(
+    ("evidence", "chosen"),
+    [
+        ({"plain": 50.0, "curved": 40.0}, "curved"),
+        ({"plain": 40.0, "curved": 50.0}, "plain"),
+        ({"plain": 50.0, "curved": 40.0, "bent": 0.0}, "curved"),  # of as many strengths fits alone decide
+    ],
+)
+def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_evidence_is_for_it(
+    monkeypatch: pytest.MonkeyPatch, evidence: dict[str, float], chosen: str
 ) -> None:
-    """Of fits of six steps: each strength of an effect must be worth the odds."""
-    counts = {"plain": 1, "curved": 3}
-    costs = {"plain": 100.0, "curved": 95.0}
+    """Of fits of six steps: one strength more always fits better."""
+    counts = {"plain": 1, "curved": 3, "bent": 3}
+    costs = {"plain": 100.0, "curved": 95.0, "bent": 96.0}
 
     def state(name: str, improved: float) -> Any:
         return SimpleNamespace(
             name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
             chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), improved=improved,
-            evidence=SimpleNamespace(odds=odds), thresholds=STANDARD, banned=("z",), likelihood=lambda _: "likelihood",
+            evidence=SimpleNamespace(odds=10.0), thresholds=STANDARD, banned=("z",), likelihood=lambda _: "likelihood",
         )  # fmt: skip
 
-    monkeypatch.setattr(_settling, "_promising", lambda state: ["curved", "plain"])
+    monkeypatch.setattr(_settling, "_promising", lambda state: sorted(evidence))
     monkeypatch.setattr(_settling, "with_members", lambda given, one, model, likelihood: one)
     monkeypatch.setattr(_settling, "_strengths", lambda model: counts[model])
     monkeypatch.setattr(
         _settling, "fit", lambda _, model, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
+    )
+    monkeypatch.setattr(
+        _settling, "evidence_about", lambda model, *rest: (None, SimpleNamespace(score=evidence[model]))
     )
     taken: list[Any] = []
 
