@@ -89,7 +89,7 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class _Fold:
-    """``rest`` is fitted, and ``left_out`` (n,) of ``seen`` predicted, whose offset and past are its own in any case."""
+    """``rest`` is fitted, and ``left_out`` (n,) of ``seen`` predicted, whose offset and past are its own always."""
 
     rest: list[Session]
     seen: Session
