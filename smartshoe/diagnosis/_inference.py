@@ -82,15 +82,15 @@ def infer(
         state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
-    lawful = with_laws(state, plain.model, sessions)
-    blocks, state = state, state if lawful is state else settled(lawful, sessions, progress)
+    with_blocks, lawful = state, with_laws(state, plain.model, sessions)
+    state = state if lawful is state else settled(lawful, sessions, progress)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
-    if {*found.refused} & ({*lawful.fit.model.names} - {*blocks.fit.model.names}):
-        # A law that is not the same in each recording is not that law, in whose place the block stays.
-        other = _judged(blocks, plain, sessions)
+    if {*found.refused} & ({*lawful.fit.model.names} - {*with_blocks.fit.model.names}):
+        # A law that is not the same in each recording is not that law: the block stays.
+        other = _judged(with_blocks, plain, sessions)
         if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
-            state, found = blocks, other
+            state, found = with_blocks, other
     members = found.members()
     while laws := likelier_laws(members, state.banned):
         state = with_likelier_laws(state, found.fit.model, laws, sessions)
