@@ -242,7 +242,13 @@ def _hide(
     draw = effect.draw if law is None else law.draw
     rng = np.random.default_rng([p.law_seed, zlib.crc32(effect.name.encode())])
     draws, unit_warp, seed = draw(rng, subject), Warp.drawn(rng), int(rng.integers(2**31))
-    can_depart = (effect.bends if law is None else law.bends) is not None
+    ranged = effect.name == "gas_compression" and law is None  # its size is the range itself
+    can_depart = (effect.bends if law is None else law.bends) is not None and not ranged
+    bounded = (
+        effect if law is None else replace(
+            effect, parameter=law.name, unit="1", typical=law.typical, largest=law.largest
+        )
+    )  # fmt: skip
 
     def placed(amount: float, size: float) -> tuple[Options, Chain]:
         warp = replace(unit_warp, size=size)
@@ -255,43 +261,32 @@ def _hide(
             return law.options(amount, draws, subject), Chain()
         return {}, Chain((Given(law, amount, draws, warp, seed),))
 
-    size = 0.0
-    ranged = effect.name == "gas_compression" and law is None  # its size is the range itself
-    if can_depart and departure > 0 and not ranged:
-        bounds = effect if law is None else replace(effect, typical=law.typical, largest=law.largest)
-        amount = min(bounds.typical * asked, 0.5 * bounds.largest)
-        full = _departure(p, effect, placed, amount, 1.0, subject, protocol, logger)
-        size = min(1.0, departure / max(full, 1e-6))
+    def departs_by(amount: float, size: float) -> float:
+        return _departure(p, effect, placed, amount, size, subject, protocol, logger)
 
-    readings: dict[float, Recording] = {}
+    size = 0.0
+    if can_depart and departure > 0:
+        full = departs_by(min(bounded.typical * asked, 0.5 * bounded.largest), 1.0)
+        size = min(1.0, departure / max(full, 1e-6))
 
     def strength(amount: float) -> tuple[float, bool]:
         options, chain = placed(amount, size)
         given = merged(subject.options(), logger, options, SILENT)
         recording, clipped = _pressed(p, given, chain, subject, protocol)
-        readings[amount] = recording
         full_scale = SHARE_OF_RANGE * float(given["sensor"]["range_mbar"])
         left = left_over(
             recording.force_n, recording["pressure"].with_nan(), recording.sample_time_s, constant=not effect.needs_zero
         )
         return 100.0 * left / full_scale, clipped
 
-    bounded = (
-        effect if law is None else replace(
-            effect, parameter=law.name, unit="1", typical=law.typical, largest=law.largest
-        )
-    )  # fmt: skip
-    amount, reached, note = search(strength, asked, bounded)
-    departs = None
-    if can_depart and not ranged:
-        departs = _departure(p, effect, placed, amount, size, subject, protocol, logger) if size else 0.0
-        # A law that is not linear in its amount may depart by more at the one that was found.
-        while departs > MOST_DEPARTURE:
-            size *= departure / departs
-            amount, reached, note = search(strength, asked, bounded)
-            departs = _departure(p, effect, placed, amount, size, subject, protocol, logger)
+    while True:
+        amount, reached, note = search(strength, asked, bounded)
+        departs = departs_by(amount, size) if size else 0.0
+        if departs <= MOST_DEPARTURE:
+            break
+        size *= departure / departs  # a law that is not linear in its amount departs by more at the one that was found
     options, chain = placed(amount, size)
-    return HiddenLaw(effect, name, asked, reached, departs, options, chain, note)
+    return HiddenLaw(effect, name, asked, reached, departs if can_depart else None, options, chain, note)
 
 
 def _pressed(p: Plan, options: Options, chain: Chain, subject: Subject, protocol: Protocol) -> tuple[Recording, bool]:

@@ -9,6 +9,7 @@ from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
 from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, additions
+from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart
@@ -41,11 +42,11 @@ def settled(state: State, sessions: Sequence[Session], progress: Progress, known
             fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
             for one in _promising(state)
         ]
-        found = _best_of(fits, state, sessions)
+        found, given = _best_of(fits, state, sessions)
         if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
             return known
         path.append(found.model)
-        state = state_at(found, sessions, state.thresholds, state.banned)
+        state = state_at(found, sessions, state.thresholds, state.banned, given)
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood(sessions)
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
@@ -123,18 +124,21 @@ def _promising(state: State) -> list[Posterior]:
     return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
 
 
-def _best_of(fits: Sequence[Fit], state: State, sessions: Sequence[Session]) -> Fit:
+def _best_of(fits: Sequence[Fit], state: State, sessions: Sequence[Session]) -> tuple[Fit, Linearised | None]:
     """Of fits with equally many strengths the likeliest; of these, for each number one, that with most evidence.
 
     One strength more always fits better. Whether it is worth it where no equation is exact is for the evidence to say.
+    The linearisation that it was taken of comes along.
     """
     likeliest: dict[int, Fit] = {}
     for one in sorted(fits, key=lambda one: one.cost):
         likeliest.setdefault(_strengths(one.model), one)
     few = list(likeliest.values())
     if len(few) == 1:
-        return few[0]
-    return min(few, key=lambda one: evidence_about(one.model, sessions, state.evidence)[1].score)
+        return few[0], None
+    weighed = [(one, *evidence_about(one.model, sessions, state.evidence)) for one in few]
+    found, evidence, _ = min(weighed, key=lambda one: one[2].score)
+    return found, evidence.given
 
 
 def _strengths(model: ExtendedModel) -> int:

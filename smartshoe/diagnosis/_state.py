@@ -60,16 +60,26 @@ class State:
         return Likelihood(sessions, self.evidence.noise_sd, self.fit.model, self.thresholds)
 
 
-def state_at(found: Fit, sessions: Sequence[Session], thresholds: Thresholds, banned: tuple[str, ...] = ()) -> State:
-    """The linearisation about a fit, and the best set in it without what is ``banned``."""
-    return State(*searched(found.model, sessions, thresholds, banned), found, banned)
+def state_at(
+    found: Fit,
+    sessions: Sequence[Session],
+    thresholds: Thresholds,
+    banned: tuple[str, ...] = (),
+    given: Linearised | None = None,
+) -> State:
+    """The linearisation about a fit, ``given`` where it is known, and the best set in it without what is ``banned``."""
+    return State(*searched(found.model, sessions, thresholds, banned, given), found, banned)
 
 
 def searched(
-    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, banned: Sequence[str] = ()
+    model: ExtendedModel,
+    sessions: Sequence[Session],
+    thresholds: Thresholds,
+    banned: Sequence[str] = (),
+    given: Linearised | None = None,
 ) -> tuple[Linearised, Evidence, Posterior]:
     """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
-    given = linearised(model, sessions, thresholds)
+    given = linearised(model, sessions, thresholds) if given is None else given
     evidence = Evidence(given, given.noise_sd())
     start = _set_of(model, given)
     first = step(evidence, start, banned)

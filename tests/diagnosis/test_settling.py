@@ -209,16 +209,18 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
         _settling, "fit", lambda _, model, steps: SimpleNamespace(model=model, cost=costs[model], steps=steps)
     )
     monkeypatch.setattr(
-        _settling, "evidence_about", lambda model, *rest: (None, SimpleNamespace(score=evidence[model]))
+        _settling,
+        "evidence_about",
+        lambda model, *rest: (SimpleNamespace(given=f"about {model}"), SimpleNamespace(score=evidence[model])),
     )
     taken: list[Any] = []
 
-    def stated(found: Any, sessions: Any, thresholds: Any, banned: Any) -> Any:
-        taken.append((found.model, found.steps, banned))
+    def stated(found: Any, sessions: Any, thresholds: Any, banned: Any, given: Any) -> Any:
+        taken.append((found.model, found.steps, banned, given))
         return state("next", 0.0)
 
     monkeypatch.setattr(_settling, "state_at", stated)
     monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
     said: list[str] = []
     assert _settling.settled(state("first", 50.0), [], said.append).name == "next"  # type: ignore[attr-defined]
-    assert (taken, said) == ([(chosen, 6, ("z",))], ["fitting a, b c"])
+    assert (taken, said) == ([(chosen, 6, ("z",), f"about {chosen}")], ["fitting a, b c"])
