@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+import numpy as np
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
 from smartshoe.diagnosis._members import Member, begun_with
 from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
 from smartshoe.diagnosis._session import Session
@@ -94,8 +97,19 @@ def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
     A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
     """
     shapes = law.shapes_with(logged_channels(likelihood.sessions))
-    starts = [model.with_part(law, law.begun(shape, sizes)) for shape in shapes for sizes in SIZES]
-    return fit(likelihood, min((fit(likelihood, one, 1) for one in starts), key=lambda f: f.cost).model, FEW_STEPS)
+    slopes = [rows_of(model, session)[:, 1:] for session in likelihood.sessions]
+    tried = []
+    for start in (model.with_part(law, law.begun(shape, sizes)) for shape in shapes for sizes in SIZES):
+        rows = [_with_own(start, law.name, one, known) for one, known in zip(likelihood.sessions, slopes, strict=True)]
+        tried.append(fit(likelihood, start, 1, rows))
+    return fit(likelihood, min(tried, key=lambda f: f.cost).model, FEW_STEPS)
+
+
+def _with_own(model: ExtendedModel, name: str, session: Session, slopes: Array) -> Array:
+    """`rows_of` a model whose last effect is ``name``: the ``slopes`` of all else are as they are without it."""
+    trace = model.trace(session.conditions)
+    own = model.own_sensitivities(name, session.conditions, trace)
+    return np.column_stack([session.reading - trace[0], slopes, own])
 
 
 def _is_stretched(model: ExtendedModel, law: Effect) -> bool:

@@ -18,6 +18,7 @@ from smartshoe.models.extended import ExtendedModel, Trace
 MOST_STEPS = 25
 FEW_STEPS = 4  # of a fit that only has to be compared with others
 SETTLED = 0.1  # fall of -2 log likelihood that ends a fit
+KNOWN_TO = 0.01  # of what a fit costs more than one that it is compared with: less ends it
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 
 
@@ -122,12 +123,14 @@ def fit(
     steps: int = MOST_STEPS,
     rows: Sequence[Array] | None = None,
     only: str | None = None,
+    beside: float | None = None,
 ) -> Fit:
     """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
 
     Shapes have a prior about their start, of one in the logarithm or of their size; weights of flexible blocks have
     theirs about null. ``rows`` are `rows_of` the start within its bounds, a session each, where they are known.
-    ``only``: the effect whose parameters are fitted, all others held; all of them where it is None.
+    ``only``: the effect whose parameters are fitted, all others held; all of them where it is None. ``beside``: the
+    cost of a better fit, where this one only has to tell how much better that is.
     """
     owners = start.parameters
     logarithmic = _are_logarithmic(start)
@@ -161,7 +164,8 @@ def fit(
                 damping = max(damping * 0.1, 1e-7)
                 break
             damping = max(damping * 10.0, 1e-4)
-        settled = best is None or cost - best[0] < SETTLED
+        least = SETTLED if beside is None else max(SETTLED, KNOWN_TO * (cost - beside))
+        settled = best is None or cost - best[0] < least
         if best is not None:
             cost, model = best
         if settled and exact:

@@ -54,7 +54,7 @@ class LeftOut:
             rows, gains, less = self._rows_of(start), {}, {}
             for name in failing:
                 own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in self._rest]
-                less[name] = fit(found.likelihood, start.without(name))
+                less[name] = fit(found.likelihood, start.without(name), beside=found.cost)
                 gains[name] = self._squares([less[name].model] * len(own)) - self._squares(own)
             failing = [name for name in failing if _in_standard_errors(gains[name]) < self.thresholds.validated]
             if failing:

@@ -80,10 +80,12 @@ def softened(load, strength, width, raised, largest, dead_zone, share, decay, no
     u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
     if share < 0.0:  # an arm that pushes leaves a tenth of the wall's own stiffness, at least
         raised = min(raised, max(-0.9 / share - 1.0, 0.0))
+    most, more = 0.0, 1.0
     for k in range(load.size):
         last, f = u, load[k] + held
-        most = max(largest - dead_zone, 0.0)
-        more = rise(most, raised, width)
+        if most != max(largest - dead_zone, 0.0):
+            most = max(largest - dead_zone, 0.0)
+            more = rise(most, raised, width)
         if f >= most * (1.0 + arm * more):
             phi, slope = first_loading(f, raised, width, 1.0, arm, phi)
             u = phi * rise(phi, raised, width)

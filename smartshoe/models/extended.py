@@ -129,8 +129,7 @@ class ExtendedModel:
         core: Core | None = None,
     ) -> Array:
         """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
-        # Blocks that bend a spring beside the relaxing arm solve the balance of both.
-        conditions = conditions.within(self.relaxing_share, self.relaxation_rate_per_s)
+        conditions = self._around(conditions)
         for part in self.chain[first:]:
             if inputs is not None:
                 inputs.append(signal)
@@ -139,6 +138,11 @@ class ExtendedModel:
             else:
                 signal = part.effect.apply(signal, conditions, part.values)
         return self.gain * signal
+
+    def _around(self, conditions: Conditions) -> Conditions:
+        """``conditions`` with the relaxing arm: blocks that bend a spring beside it solve the balance of both."""
+        relaxing = self.relaxing_share, self.relaxation_rate_per_s
+        return conditions if conditions.relaxing == relaxing else conditions.within(*relaxing)
 
     def simulate(self, conditions: Conditions) -> Array:
         """The reading (n,) as a share of ``full_scale_reading`` under ``conditions``."""
@@ -189,12 +193,19 @@ class ExtendedModel:
         The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
         ``trace``: this model's own under the same conditions, where it is known.
         """
+        conditions = self._around(conditions)  # once for all that do not move the arm
         reading, inputs = trace or self.trace(conditions)
         out = np.empty((reading.size, 1 + len(self._varied)), order="F")
         out[:, 0] = reading / self.gain
         for j, by in enumerate(self._varied, start=1):
             out[:, j] = by.slope(reading, inputs, conditions)
         return reading, out
+
+    def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
+        """Of these derivatives those (n, k) with respect to the parameters of the effect ``name``."""
+        conditions = self._around(conditions)
+        own = [by for by, (owner, _) in zip(self._varied, self.parameters[1:], strict=True) if owner == name]
+        return self.column_of(own, conditions, trace)
 
     def trace(self, conditions: Conditions) -> Trace:
         """The reading (n,), and what goes into each block of the chain, the chain's end last."""
@@ -217,7 +228,7 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, None if in_core else self.core))
         return tuple(made)
 
-    def column_of(self, by: Extensions, conditions: Conditions, trace: Trace) -> Array:
+    def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
         """Derivatives (n, k) of the reading with respect to the k strengths of ``by``; ``trace`` is the model's own."""
         reading, inputs = trace
         out = np.empty((reading.size, len(by)), order="F")

@@ -228,7 +228,7 @@ def test_a_law_begins_from_all_its_shapes_small_and_large(monkeypatch: pytest.Mo
     law = effect("second_relaxation")
     begun: list[Any] = []
 
-    def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int, rows: Any = None) -> Any:
         begun.append((tuple(model.parts[-1].values), steps))
         return SimpleNamespace(model=model, cost=-len(begun))
 

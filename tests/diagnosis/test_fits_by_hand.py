@@ -183,6 +183,25 @@ def test_costs_slopes_and_those_brought_up_to_date_are_of_written_out_matrices()
     ]))  # fmt: skip
 
 
+def test_a_fit_that_only_tells_how_much_better_another_is_ends_when_that_is_known_to_a_hundredth() -> None:
+    sessions = _sessions()
+    likelihood = Likelihood(sessions, 0.03, MODEL, STANDARD)
+    far = MODEL.at(MODEL.theta * np.array([2.0, 0.1, 10.0]))
+    taken: list[float] = []
+    cost = likelihood.cost
+    likelihood.cost = lambda model: taken.append(cost(model)) or taken[-1]  # type: ignore[method-assign, func-returns-value]
+    best = fit(likelihood, far)
+    exactly = len(taken)
+    taken.clear()
+    much_better = best.cost - 1e4 * (cost(far) - best.cost)
+    assert fit(likelihood, far, beside=much_better).cost > best.cost
+    assert len(taken) == 1 < exactly  # nothing that it could gain would matter
+    taken.clear()
+    near = fit(likelihood, far, beside=best.cost)
+    assert len(taken) <= exactly
+    assert near.cost - best.cost < 0.02 * (cost(far) - best.cost) + 0.1
+
+
 def test_a_fit_of_no_steps_is_where_it_begins_within_its_bounds() -> None:
     likelihood = Likelihood(_sessions(), 0.03, MODEL, STANDARD)
     start = MODEL.with_part("linear_leak", np.array([-0.5]))

@@ -153,10 +153,10 @@ def test_of_two_that_fail_that_one_goes_first_that_gains_least(monkeypatch: pyte
     impossible = _left_out(sessions, replace(STANDARD, validated=1e9))
     fitted: list[tuple[str, ...]] = []
 
-    def kept(likelihood: Likelihood, start: ExtendedModel, steps: int = 25, *known: Any) -> Fit:
+    def kept(likelihood: Likelihood, start: ExtendedModel, steps: int = 25, *known: Any, **beside: Any) -> Fit:
         if steps > FEW_STEPS:
             fitted.append(start.names)
-        return fit(likelihood, start, steps, *known)
+        return fit(likelihood, start, steps, *known, **beside)
 
     monkeypatch.setattr(_validation, "fit", kept)
     assert impossible.following(fit(Likelihood(sessions, SD, MODEL, STANDARD), model)).model.names == ()

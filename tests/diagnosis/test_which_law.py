@@ -112,7 +112,7 @@ def test_a_curve_is_begun_from_every_shape_at_every_size(monkeypatch: pytest.Mon
     """So that a corner below the least load, or a bend beyond the largest, is come upon."""
     begun: list[tuple[float, float]] = []
 
-    def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int, rows: Any = None) -> Any:
         begun.append((float(model.parts[-1].values[0]), float(model.parts[-1].values[1])))
         return SimpleNamespace(model=model, cost=abs(model.parts[-1].values[0] - 0.05), steps=steps)
 

@@ -75,6 +75,8 @@ def test_sensitivities_are_those_of_the_whole_chain(name: str) -> None:
         step = derivative_step(parameter, moved[j])
         moved[j] += step
         assert_allclose(slopes[:, j], (model.at(moved).simulate(at) - reading) / step, atol=1e-6)
+    of_it = [j for j, (owner, _) in enumerate(model.parameters) if owner == name]
+    assert_array_equal(model.own_sensitivities(name, at, model.trace(at)), slopes[:, of_it])
 
 
 @given(st.lists(st.sampled_from(NAMES), min_size=2, max_size=4, unique=True))
