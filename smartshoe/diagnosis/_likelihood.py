@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -123,7 +124,7 @@ def fit(
     steps: int = MOST_STEPS,
     rows: Sequence[Array] | None = None,
     only: str | None = None,
-    beside: float | None = None,
+    beside: float = math.inf,
 ) -> Fit:
     """Levenberg-Marquardt within the parameters' bounds, from ``start``; parameters of shape in their logarithm.
 
@@ -164,8 +165,7 @@ def fit(
                 damping = max(damping * 0.1, 1e-7)
                 break
             damping = max(damping * 10.0, 1e-4)
-        least = SETTLED if beside is None else max(SETTLED, KNOWN_TO * (cost - beside))
-        settled = best is None or cost - best[0] < least
+        settled = best is None or cost - best[0] < max(SETTLED, KNOWN_TO * (cost - beside))
         if best is not None:
             cost, model = best
         if settled and exact:

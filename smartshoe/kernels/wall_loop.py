@@ -83,9 +83,9 @@ def softened(load, strength, width, raised, largest, dead_zone, share, decay, no
     most, more = 0.0, 1.0
     for k in range(load.size):
         last, f = u, load[k] + held
-        if most != max(largest - dead_zone, 0.0):
-            most = max(largest - dead_zone, 0.0)
-            more = rise(most, raised, width)
+        reached = max(largest - dead_zone, 0.0)
+        if reached != most:
+            most, more = reached, rise(reached, raised, width)
         if f >= most * (1.0 + arm * more):
             phi, slope = first_loading(f, raised, width, 1.0, arm, phi)
             u = phi * rise(phi, raised, width)

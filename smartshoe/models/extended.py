@@ -193,17 +193,14 @@ class ExtendedModel:
         The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
         ``trace``: this model's own under the same conditions, where it is known.
         """
-        conditions = self._around(conditions)  # once for all that do not move the arm
-        reading, inputs = trace or self.trace(conditions)
-        out = np.empty((reading.size, 1 + len(self._varied)), order="F")
-        out[:, 0] = reading / self.gain
-        for j, by in enumerate(self._varied, start=1):
-            out[:, j] = by.slope(reading, inputs, conditions)
-        return reading, out
+        trace = trace or self.trace(conditions)
+        out = np.empty((trace[0].size, 1 + len(self._varied)), order="F")
+        out[:, 0] = trace[0] / self.gain
+        out[:, 1:] = self.column_of(self._varied, conditions, trace)
+        return trace[0], out
 
     def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
         """Of these derivatives those (n, k) with respect to the parameters of the effect ``name``."""
-        conditions = self._around(conditions)
         own = [by for by, (owner, _) in zip(self._varied, self.parameters[1:], strict=True) if owner == name]
         return self.column_of(own, conditions, trace)
 
@@ -229,8 +226,9 @@ class ExtendedModel:
         return tuple(made)
 
     def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
-        """Derivatives (n, k) of the reading with respect to the k strengths of ``by``; ``trace`` is the model's own."""
+        """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
         reading, inputs = trace
+        conditions = self._around(conditions)  # once for all that do not move the arm
         out = np.empty((reading.size, len(by)), order="F")
         for column, one in enumerate(by):
             out[:, column] = one.slope(reading, inputs, conditions)
