@@ -26,7 +26,7 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     The initial state is bounded by what an arm can hold: its share of the whole load.
     """
     mask = session.fitted if session.fitted.any() else session.usable
-    columns = nuisances(session, model.relaxation_rate_per_s)
+    columns = nuisances(session, model.pole_per_s)
     seen = columns[mask]
     held = max(abs(model.relaxing_share * model.gain), 1e-6)
     variance = float(np.var(residual[mask])) if mask.any() else 0.0

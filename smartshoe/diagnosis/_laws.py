@@ -11,7 +11,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, row
 from smartshoe.diagnosis._members import Member, begun_with
 from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._state import State, state_at
+from smartshoe.diagnosis._state import State, state_at, with_members
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
 
@@ -27,13 +27,17 @@ def with_laws(given: State, plain: ExtendedModel, sessions: Sequence[Session]) -
     is, so that only fits of the whole model compare them fairly. Nothing in its place leaves no more than the ``plain``
     model does.
     """
-    state = given
-    for block in (one for one in given.chosen if one.effect.is_flexible):
-        found = _law_of(block, state, plain, state.likelihood(sessions))
+    state, about = given, given.fit.model
+    flexible = [one for one in given.chosen if one.effect.is_flexible]
+    if not {one.name for one in flexible} <= {*about.names}:  # the last search asked for one that is not fitted yet
+        likelihood = given.likelihood(sessions)
+        about = fit(likelihood, with_members(given.given, given.best, about, likelihood), FEW_STEPS).model
+    for block in flexible:
+        found = _law_of(block, state, about, plain, state.likelihood(sessions))
         if found is not None:
             missed, law = found
             banned = _replaced_with(block.effect) if missed < state.thresholds.departure**2 else ()
-            state = state_at(law, sessions, state.thresholds, (*state.banned, *banned))
+            state, about = state_at(law, sessions, state.thresholds, (*state.banned, *banned)), law.model
     return state
 
 
@@ -66,16 +70,18 @@ def with_likelier_laws(
     return state_at(fit(likelihood, model), sessions, state.thresholds, (*state.banned, *laws))
 
 
-def _law_of(block: Candidate, state: State, plain: ExtendedModel, likelihood: Likelihood) -> tuple[float, Fit] | None:
-    """The law that follows nearly as well as a flexible block, and the share of what that explains which it misses."""
+def _law_of(
+    block: Candidate, state: State, about: ExtendedModel, plain: ExtendedModel, likelihood: Likelihood
+) -> tuple[float, Fit] | None:
+    """The law that follows nearly as well as a flexible block of ``about``, and what share of it that law misses."""
     thresholds, is_curve = state.thresholds, block.effect.is_memoryless
-    bare = state.fit.model.without(block.name)
+    bare = about.without(block.name)
     for part in bare.parts:
         if is_curve and part.effect.is_memoryless:
             bare = bare.without(part.name)
     nothing = fit(likelihood, bare, FEW_STEPS)
-    flexible = likelihood.cost(state.fit.model)
-    explained = min(nothing.cost, likelihood.cost(plain)) - flexible
+    flexible = likelihood.cost(about)
+    explained = min(likelihood.cost(nothing.model), likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
     for law in available(likelihood.sessions):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
@@ -85,7 +91,7 @@ def _law_of(block: Candidate, state: State, plain: ExtendedModel, likelihood: Li
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
         most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
-        missed = (one.cost + other - flexible) / max(explained, other, 1e-9)
+        missed = (likelihood.cost(one.model) + other - flexible) / max(explained, other, 1e-9)
         if missed < most**2:
             misses.append((missed, one))
     return min(misses, key=lambda pair: pair[0]) if misses else None

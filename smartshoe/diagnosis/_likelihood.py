@@ -40,13 +40,20 @@ class Likelihood:
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._rows: list[Array] = []  # what is left and its slopes, a session, where they were last asked for
         self._scales = np.zeros(0)
+        self._precision = [nuisance_precision(session, like, thresholds) for session in self.sessions]
+        self._pole_per_s = math.nan
         self._past: list[Array] = []
         self._inverse: list[Array] = []
-        for session in self.sessions:
-            past = nuisances(session, like.relaxation_rate_per_s)[session.fitted] / noise_sd
-            inner = ridged(past.T @ past + nuisance_precision(session, like, thresholds))
-            self._past.append(past)
-            self._inverse.append(np.asarray(np.linalg.inv(inner), dtype=np.float64))
+        self._about(like)
+
+    def _about(self, model: ExtendedModel) -> None:
+        """The sessions' nuisances, whose memory fades with the pole of ``model``."""
+        if model.pole_per_s == self._pole_per_s:
+            return
+        self._pole_per_s = model.pole_per_s
+        pasts = [nuisances(one, model.pole_per_s)[one.fitted] / self.noise_sd for one in self.sessions]
+        inner = [ridged(past.T @ past + precision) for past, precision in zip(pasts, self._precision, strict=True)]
+        self._past, self._inverse = pasts, [np.asarray(np.linalg.inv(one), dtype=np.float64) for one in inner]
 
     def _gram(self, k: int, rows: Array) -> Array:
         seen = where(self.sessions[k].fitted, rows)
@@ -55,6 +62,7 @@ class Likelihood:
 
     def cost(self, model: ExtendedModel) -> float:
         """Sum of squares over what is fitted, in units of the noise's variance."""
+        self._about(model)
         traces = [model.trace(session.conditions) for session in self.sessions]
         self._last = model, traces  # the slopes of a step that is taken begin with them
         total = 0.0
@@ -68,7 +76,7 @@ class Likelihood:
             known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
             rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
         self._rows = [one.copy(order="K") for one in rows]  # they are brought up to date in place
-        return self._products()
+        return self._products(model)
 
     def nearly_normal(self, model: ExtendedModel, step: Array) -> tuple[float, Array, Array]:
         """The same after a ``step`` (p,) from where slopes were last known, these brought up to date by it.
@@ -83,15 +91,31 @@ class Likelihood:
             missed = rows[:, 0] - left - rows[:, 1:] @ step
             rows[:, 1:] += np.outer(missed, weighed / max(float(weighed @ step), 1e-300))
             rows[:, 0] = left
-        return self._products()
+        return self._products(model)
 
     def _known(self, model: ExtendedModel) -> list[Trace] | None:
         return self._last[1] if self._last is not None and self._last[0] is model else None
 
-    def _products(self) -> tuple[float, Array, Array]:
-        total = np.sum([self._gram(k, rows) for k, rows in enumerate(self._rows)], axis=0)
+    def _products(self, model: ExtendedModel) -> tuple[float, Array, Array]:
+        self._about(model)
+        total = np.sum([self._with_memory(k, rows, model) for k, rows in enumerate(self._rows)], axis=0)
         self._scales = np.diag(total)[1:]
         return float(total[0, 0]), total[1:, 0], total[1:, 1:]
+
+    def _with_memory(self, k: int, rows: Array, model: ExtendedModel) -> Array:
+        """`_gram` of ``rows``, whose slopes over the arm's share and rate take along how what it remembers fades.
+
+        What a session brought along, c exp(-p t), moves with the pole p = a/(1 + kappa) by -c t exp(-p t).
+        """
+        session = self.sessions[k]
+        seen = self._past[k].T @ rows[session.fitted, 0] / self.noise_sd
+        brought = float(self._inverse[k][1] @ seen)
+        time_s = session.conditions.time_s - session.conditions.time_s[0]
+        moved = -brought * time_s * np.exp(-self._pole_per_s * time_s)
+        by = np.zeros(rows.shape[1])
+        by[2:4] = np.array([-model.pole_per_s, 1.0]) / (1.0 + model.relaxing_share)
+        turn = np.vstack([np.eye(by.size), by])
+        return np.asarray(turn.T @ self._gram(k, np.column_stack([rows, moved])) @ turn)
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,10 +80,10 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
     return {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
 
 
-def nuisances(session: Session, rate_per_s: float) -> Array:
-    """(n, 2): one, and exp(-a t), the memory that the unit brings along from before the recording."""
+def nuisances(session: Session, pole_per_s: float) -> Array:
+    """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording."""
     time_s = session.conditions.time_s
-    return np.column_stack([np.ones(time_s.size), np.exp(-rate_per_s * (time_s - time_s[0]))])
+    return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0]))])
 
 
 def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
@@ -123,7 +123,7 @@ class Linearised:
     @cached_property
     def nuisances(self) -> tuple[Array, ...]:
         """(n, 2) a session: what is its own."""
-        return tuple(nuisances(session, self.model.relaxation_rate_per_s) for session in self.sessions)
+        return tuple(nuisances(session, self.model.pole_per_s) for session in self.sessions)
 
     @cached_property
     def past(self) -> tuple[Array, ...]:
@@ -165,9 +165,9 @@ class Linearised:
         return correlated_sd(left, masks)
 
 
-def marginal(rows: Array, session: Session, rate_per_s: float) -> Array:
+def marginal(rows: Array, session: Session, pole_per_s: float) -> Array:
     """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
-    return _without_last(_products(rows[session.fitted], nuisances(session, rate_per_s)[session.fitted]))
+    return _without_last(_products(rows[session.fitted], nuisances(session, pole_per_s)[session.fitted]))
 
 
 def where(mask: Mask, columns: Array) -> Array:

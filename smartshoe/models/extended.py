@@ -63,6 +63,11 @@ class ExtendedModel:
         return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
 
     @property
+    def pole_per_s(self) -> float:
+        """a/(1 + kappa): the rate at which what an earlier load left in the relaxing arm fades from the reading."""
+        return self.relaxation_rate_per_s / (1.0 + self.relaxing_share)
+
+    @property
     def theta(self) -> Array:
         """Every parameter's value (p,)."""
         baseline = [self.gain, self.relaxing_share, self.relaxation_rate_per_s]

@@ -188,17 +188,22 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
     curves = {one.name for family in blocks().values() for one in family if one.is_memoryless}
     assert set(_replaced_with(curve)) == curves
     assert _replaced_with(other) == (other.name,)
-    chosen = (SimpleNamespace(effect=curve), SimpleNamespace(effect=effect("dead_band")), SimpleNamespace(effect=other))
-    state: Any = SimpleNamespace(chosen=chosen, thresholds=STANDARD, banned=("z",), likelihood=lambda sessions: None)
+    chosen = tuple(SimpleNamespace(effect=one, name=one.name) for one in (curve, effect("dead_band"), other))
+    about: Any = SimpleNamespace(model=MODEL.with_part(curve).with_part(other))
+    state: Any = SimpleNamespace(
+        chosen=chosen, fit=about, thresholds=STANDARD, banned=("z",), likelihood=lambda sessions: None
+    )
+    lawful: Any = SimpleNamespace(model=MODEL)
     asked: list[Any] = []
     bound = STANDARD.departure**2
     for missed, banned in ((0.999 * bound, _replaced_with(curve)), (bound, ())):
         asked.clear()
 
-        def law_of(block: Any, one: Any, plain: Any, likelihood: Any, missed: float = missed) -> Any:
+        def law_of(block: Any, one: Any, at: Any, plain: Any, likelihood: Any, missed: float = missed) -> Any:
             asked.append(block.effect)
             assert plain is MODEL
-            return (missed, "law") if block.effect is curve else None
+            assert at is (about.model if block.effect is curve else lawful.model)
+            return (missed, lawful) if block.effect is curve else None
 
         monkeypatch.setattr(_laws, "_law_of", law_of)
         monkeypatch.setattr(
@@ -208,7 +213,7 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
             ),
         )  # fmt: skip
         found: Any = with_laws(state, MODEL, [])
-        assert (found.law, found.banned) == ("law", ("z", *banned))
+        assert (found.law, found.banned) == (lawful, ("z", *banned))
         assert asked == [curve, other]
     monkeypatch.setattr(_laws, "_law_of", lambda *given: None)
     assert with_laws(state, MODEL, []) is state

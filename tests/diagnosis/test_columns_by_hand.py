@@ -195,16 +195,16 @@ def test_what_no_column_reaches_is_the_noise() -> None:
     wide = []
     for k, (one, row) in enumerate(zip(sessions, rows, strict=True)):
         own = np.zeros((row.shape[0], 4))
-        own[:, 2 * k : 2 * k + 2] = _past(one, 0.3)
+        own[:, 2 * k : 2 * k + 2] = _past(one, MODEL.pole_per_s)
         wide.append(np.column_stack([row, own])[one.fitted])
     whole = np.concatenate(wide)
     found = np.linalg.lstsq(whole[:, 1:], whole[:, 0], rcond=None)[0]
     left = []
     for k, (one, row) in enumerate(zip(sessions, rows, strict=True)):
-        left.append(row[:, 0] - row[:, 1:] @ found[:2] - _past(one, 0.3) @ found[2 + 2 * k : 4 + 2 * k])
+        left.append(row[:, 0] - row[:, 1:] @ found[:2] - _past(one, MODEL.pole_per_s) @ found[2 + 2 * k : 4 + 2 * k])
     expected = correlated_sd(left, [one.fitted for one in sessions])
     assert given.noise_sd() == pytest.approx(expected, rel=1e-6)
-    parts = [marginal(r, one, MODEL.relaxation_rate_per_s) for r, one in zip(rows, sessions, strict=True)]
+    parts = [marginal(r, one, MODEL.pole_per_s) for r, one in zip(rows, sessions, strict=True)]
     assert given.gram[0, 0] == pytest.approx(sum(part[0, 0] for part in parts))
 
 
@@ -343,7 +343,7 @@ def test_an_offset_and_a_past_are_ridge_estimates_of_what_was_fitted(share: floa
         one = _session(_load(220, 3), np.zeros(220), 3, held=held)
         residual = 0.3 + 0.1 * np.random.default_rng(6).standard_normal(220)
         mask = one.fitted if one.fitted.any() else one.usable
-        past = _past(one, 0.3)
+        past = _past(one, 0.3 / (1.0 + share))
         holds = max(abs(share) * 1.1, 1e-6)
         spread = np.std(residual[mask])
         wide = np.concatenate([past[mask], [[0.0, spread / holds]]])

@@ -77,7 +77,7 @@ class _Twin:
         self.kept = [session.fitted for session in given.sessions]
         pasts = []
         for k, session in enumerate(given.sessions):
-            own = nuisances(session, given.model.relaxation_rate_per_s)[self.kept[k]]
+            own = nuisances(session, given.model.pole_per_s)[self.kept[k]]
             rest = nuisance_precision(session, given.model, given.thresholds)[1, 1] ** -0.5
             wide = np.zeros((own.shape[0], 2 * len(given.sessions)))
             wide[:, 2 * k : 2 * k + 2] = own * np.array([1e3, rest])
@@ -116,7 +116,7 @@ class _Twin:
         given = self.given
         (column,) = given.candidates[member].columns
         own = [rows[:, 1 : 1 + given.own] for rows in given.rows]
-        pasts = [nuisances(s, given.model.relaxation_rate_per_s) for s in given.sessions]
+        pasts = [nuisances(s, given.model.pole_per_s) for s in given.sessions]
         wide = np.zeros((self.rows.shape[0], 2 * len(pasts)))
         first = 0
         for k, (past, kept) in enumerate(zip(pasts, self.kept, strict=True)):
@@ -364,7 +364,7 @@ def _slow_cost(likelihood: Likelihood, model: ExtendedModel, like: ExtendedModel
     for session in likelihood.sessions:
         kept = session.fitted
         residual = (session.reading - model.simulate(session.conditions))[kept]
-        past = nuisances(session, like.relaxation_rate_per_s)[kept]
+        past = nuisances(session, model.pole_per_s)[kept]
         rest = nuisance_precision(session, like, STANDARD)[1, 1] ** -0.5
         wide = past * np.array([10.0, rest])
         covariance = likelihood.noise_sd**2 * np.eye(residual.size) + wide @ wide.T

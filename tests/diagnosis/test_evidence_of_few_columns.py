@@ -52,7 +52,7 @@ class _Twin:
         blocks, pasts = [], []
         for session in given.sessions:
             kept = session.fitted
-            past = np.array([[1.0, math.exp(-0.3 * at)] for at in session.conditions.time_s])
+            past = np.array([[1.0, math.exp(-MODEL.pole_per_s * at)] for at in session.conditions.time_s])
             seen = past[kept]
             inner = seen.T @ seen / SD**2 + nuisance_precision(session, MODEL, STANDARD)
             blocks.append(np.eye(kept.sum()) / SD**2 - seen @ np.linalg.solve(inner, seen.T) / SD**4)

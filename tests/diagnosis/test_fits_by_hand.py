@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -131,12 +132,13 @@ def _sessions() -> list[Any]:
     return [made[0], session_of(np.ones(30), np.zeros(30, dtype=bool)), made[1]]
 
 
-def _weight(session: Any, sd: float) -> Array:
-    """Precision of a session's samples, its offset and past unknown."""
+def _weight(session: Any, sd: float, pole_per_s: float) -> tuple[Array, Array]:
+    """Precision of a session's samples, its offset and past unknown; and what these are per residual, (2, n)."""
     kept = session.fitted
-    past = np.array([[1.0, math.exp(-0.3 * at)] for at in session.conditions.time_s])[kept]
+    past = np.array([[1.0, math.exp(-pole_per_s * at)] for at in session.conditions.time_s])[kept]
     inner = past.T @ past / sd**2 + nuisance_precision(session, MODEL, STANDARD)
-    return np.eye(kept.sum()) / sd**2 - past @ np.linalg.solve(inner, past.T) / sd**4
+    found = np.linalg.solve(inner, past.T) / sd**2
+    return np.eye(kept.sum()) / sd**2 - past @ found / sd**2, found
 
 
 def test_costs_slopes_and_those_brought_up_to_date_are_of_written_out_matrices() -> None:
@@ -148,10 +150,18 @@ def test_costs_slopes_and_those_brought_up_to_date_are_of_written_out_matrices()
     def left(model: ExtendedModel) -> list[Array]:
         return [one.reading - model.simulate(one.conditions) for one in fitted]
 
-    def products(rows: list[Array]) -> tuple[float, Array, Array]:
-        total = sum(
-            row[one.fitted].T @ _weight(one, sd) @ row[one.fitted] for row, one in zip(rows, fitted, strict=True)
-        )
+    def products(rows: list[Array], model: ExtendedModel) -> tuple[float, Array, Array]:
+        total = np.zeros((4, 4))
+        rate, share = model.relaxation_rate_per_s, model.relaxing_share
+        pole_per_s = rate / (1.0 + share)
+        for row, one in zip(rows, fitted, strict=True):
+            weight, found = _weight(one, sd, pole_per_s)
+            brought = (found @ row[one.fitted, 0])[1]
+            by_pole = np.array([-brought * at * math.exp(-pole_per_s * at) for at in one.conditions.time_s])
+            whole = row.copy()
+            whole[:, 2] -= by_pole * rate / (1.0 + share) ** 2
+            whole[:, 3] += by_pole / (1.0 + share)
+            total += whole[one.fitted].T @ weight @ whole[one.fitted]
         return float(total[0, 0]), total[1:, 0], total[1:, 1:]
 
     def alike(found: Any, expected: Any) -> None:
@@ -161,7 +171,7 @@ def test_costs_slopes_and_those_brought_up_to_date_are_of_written_out_matrices()
 
     rows = [np.column_stack([off, MODEL.sensitivities(one.conditions)[1]]) for off, one in
             zip(left(MODEL), fitted, strict=True)]  # fmt: skip
-    expected = products(rows)
+    expected = products(rows, MODEL)
     alike(likelihood.normal(MODEL), expected)
     assert likelihood.cost(MODEL) == pytest.approx(expected[0], rel=1e-6)
     theta = MODEL.theta + np.array([-0.05, 0.02, 0.04])
@@ -174,13 +184,25 @@ def test_costs_slopes_and_those_brought_up_to_date_are_of_written_out_matrices()
         slopes = row[:, 1:] + np.outer(row[:, 0] - off - row[:, 1:] @ by, weighed) / float(weighed @ by)
         assert slopes @ by == pytest.approx(row[:, 0] - off)  # what the step did
         renewed.append(np.column_stack([off, slopes]))
-    alike(likelihood.nearly_normal(moved, by), products(renewed))
+    alike(likelihood.nearly_normal(moved, by), products(renewed, moved))
     # Slopes of a model that was judged begin with its own readings.
     likelihood.cost(moved)
     alike(likelihood.normal(moved), products([
         np.column_stack([off, moved.sensitivities(one.conditions)[1]]) for off, one in
         zip(left(moved), fitted, strict=True)
-    ]))  # fmt: skip
+    ], moved))  # fmt: skip
+
+
+def test_the_slopes_are_those_of_the_cost_with_what_each_recording_brought_along() -> None:
+    fitted = [one for one in _sessions() if one.fitted.any()]
+    sessions = [replace(one, reading=one.reading + 0.2 * np.exp(-0.25 * one.conditions.time_s)) for one in fitted]
+    likelihood = Likelihood(sessions, 0.03, MODEL, STANDARD)
+    _, pull, _ = likelihood.normal(MODEL)
+    for k, value in enumerate(MODEL.theta):
+        step = np.zeros(3)
+        step[k] = 1e-4 * value
+        higher, lower = (likelihood.cost(MODEL.at(MODEL.theta + way * step)) for way in (1.0, -1.0))
+        assert pull[k] == pytest.approx(-0.25 * (higher - lower) / step[k], rel=5e-3)
 
 
 def test_a_fit_that_only_tells_how_much_better_another_is_ends_when_that_is_known_to_a_hundredth() -> None:
@@ -212,12 +234,12 @@ def test_a_fit_of_no_steps_is_where_it_begins_within_its_bounds() -> None:
     assert one.cost < likelihood.cost(MODEL)
     last = fit(likelihood, MODEL)
     assert last.cost < likelihood.cost(MODEL.at(MODEL.theta * np.array([0.9, 1.0, 1.0])))
-    # At its end no step is better; the covariance is that of the slopes there.
+    # At its end no step is better by one of -2 log likelihood; the covariance is that of the slopes there.
     cost, pull, normal = likelihood.normal(last.model)
     assert last.cost == pytest.approx(cost)
     scale = np.where([True, False, True], last.model.theta, 1.0)
     inner = np.linalg.inv(normal * np.outer(scale, scale))
-    assert float(pull * scale @ inner @ (pull * scale)) < 0.5
+    assert float(pull * scale @ inner @ (pull * scale)) < 1.0
     assert last.covariance == pytest.approx(inner * np.outer(scale, scale), rel=1e-4)
 
 

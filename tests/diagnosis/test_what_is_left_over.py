@@ -46,7 +46,7 @@ def one(sessions: list[Session]) -> Session:
 
 # -- held-out errors ----------------------------------------------------------------------------------------------
 def test_a_recordings_own_offset_and_initial_state_are_taken_out(one: Session) -> None:
-    past = np.exp(-MODEL.relaxation_rate_per_s * (one.conditions.time_s - one.conditions.time_s[0]))
+    past = np.exp(-MODEL.pole_per_s * (one.conditions.time_s - one.conditions.time_s[0]))
     own = 0.03 - 0.02 * past
     noise = 1e-4 * np.random.default_rng(1).standard_normal(past.size)
     off = replace(one, reading=one.reading + own + noise)
@@ -58,7 +58,7 @@ def test_a_recordings_own_offset_and_initial_state_are_taken_out(one: Session) -
 
 def test_an_initial_state_is_no_larger_than_what_the_arm_can_hold(one: Session) -> None:
     """Where noise hides it, it is half way to nothing at the share of the load that relaxes: a Gaussian prior."""
-    past = np.exp(-MODEL.relaxation_rate_per_s * one.conditions.time_s)
+    past = np.exp(-MODEL.pole_per_s * one.conditions.time_s)
     centred = past - past.mean()
     share = abs(MODEL.relaxing_share * MODEL.gain)
     loud = share * np.sqrt(float(centred @ centred)) * np.random.default_rng(2).choice([-1.0, 1.0], past.size)

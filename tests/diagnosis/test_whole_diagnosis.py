@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lsim
 
 from smartshoe import Recording, compensate, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
@@ -304,3 +305,30 @@ def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list
     assert both["load_cell_tare"] == -0.02
     with_tare = model.with_part(shift_of("load"), np.array([-0.02]))
     assert both["zero_offset"] * model.gain == pytest.approx(float(np.mean(offsets(sessions, with_tare))))
+
+
+def _after_a_hold(period_s: float, share: float, seed: int) -> Recording:
+    """Triangles of a standard linear solid that had stood under 600 N for minutes, and begins with all of it."""
+    before_s, after_s, rate_per_s = 120.0, 60.0, 0.22
+    time_s = np.arange(-before_s, after_s, STEP_S)
+    triangles_n = 300.0 + 500.0 * (1.0 - np.abs(2.0 * np.mod(time_s, period_s) / period_s - 1.0))
+    load_n = np.where(time_s < 0.0, 600.0, triangles_n)
+    solid = ([1.0, rate_per_s], [1.0 + share, rate_per_s])  # the paper's, equation 2
+    _, reading_mbar, _ = lsim(solid, load_n / FULL_N * FULL_MBAR, time_s + before_s)
+    logged = time_s >= 0.0
+    noise_mbar = 0.02 * np.random.default_rng(seed).standard_normal(int(logged.sum()))
+    return Recording.from_arrays(
+        time_s=time_s[logged], force_n=load_n[logged], pressure_mbar=reading_mbar[logged] + noise_mbar, name=f"r{seed}"
+    )
+
+
+@pytest.mark.parametrize("share", [0.15, 0.5])
+def test_what_a_loaded_unit_brings_along_fades_with_its_pole_and_is_no_effect(share: float) -> None:
+    fitted = [_after_a_hold(8.0, share, 1), _after_a_hold(3.0, share, 2)]
+    found = diagnose(fitted, hold_out=[_after_a_hold(5.0, share, 3)])
+    assert found.verdict == "adequate"
+    assert found.model is not None
+    assert found.model.relaxing_share == pytest.approx(share, rel=0.02)
+    assert found.model.relaxation_rate_per_s == pytest.approx(0.22, rel=0.02)
+    assert found.baseline is not None
+    assert found.baseline.rmse == pytest.approx(0.02, rel=0.1)
