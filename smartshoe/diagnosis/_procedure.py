@@ -17,7 +17,7 @@ from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
-from smartshoe.diagnosis._parameters import joint_parameters, may_be_none, parameters_of
+from smartshoe.diagnosis._parameters import in_unit, joint_parameters, may_be_none, parameters_of
 from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
@@ -46,7 +46,6 @@ from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95
 
@@ -325,10 +324,9 @@ def _zero_cause(
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
     won = gain(worse, best, scale)
     parameter = zero.effect.parameters[0]
-    factor = scale.load_n if "FS_load" in parameter.unit else abs(scale.reading)
-    unit = "N" if "FS_load" in parameter.unit else scale.unit.symbol
-    low, high = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
-    values = {parameter.name: Parameter(zero.value * factor, zero.sd * factor, (low * factor, high * factor), unit)}
+    factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
+    interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
+    values = {parameter.name: in_unit(zero.value, zero.sd, interval, factor, unit)}
     deviations = abs(zero.value) / zero.sd
     seen = Statement(
         "deviations from nothing",

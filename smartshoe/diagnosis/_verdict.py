@@ -132,7 +132,7 @@ def worse_of(won: Gain, beyond: str | None) -> str:
 
 def past_of(zero: Zero, scale: Scale) -> str:
     """What is said of a zero that may have drifted to where it stands."""
-    value = zero.value * abs(scale.reading)
+    value = zero.value * scale.reading
     return (
         f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
         " may have begun before, or there is an offset beside (record from where the unit is switched on)"

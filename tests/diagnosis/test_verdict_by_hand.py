@@ -171,7 +171,8 @@ def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
 
 def test_a_past_is_said_in_the_readings_unit() -> None:
     zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
-    assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, SCALE)
+    assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, replace(SCALE, reading=140.0))
+    assert "the zero stands at 7 mbar where" in past_of(zero, SCALE)  # it falls as the load grows
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
