@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,25 +90,44 @@ def diagnose(
     decided = thresholds or Thresholds()
     if material is not None:
         decided = replace(decided, material=material)
-    everything = [*fitted, *kept_out]
+    everything, count = [*fitted, *kept_out], len(fitted)
     integrity = examine(everything, decided)
-    refusals = integrity.refusals or _outside(everything, decided)
-    if refusals:
-        return _refused(everything, integrity, refusals, decided)
-    return _diagnosed(everything, len(fitted), integrity, decided, progress)
+    useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
+    left_out = dict(zip(useless, integrity.refusals, strict=True))
+    pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
+    if any(k < count for k in pulled):
+        return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
+    left_out |= pulled
+    if all(k in left_out for k in range(count)):
+        return _refused(everything, integrity, list(left_out.values()), decided)
+    usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
+    found = _diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
+    return replace(found, limits=(*_without(everything, count, left_out), *found.limits))
 
 
-def _outside(recordings: Sequence[Recording], thresholds: Thresholds) -> tuple[str, ...]:
-    """Why the recordings are none of a unit that is pressed."""
-    for recording in recordings:
-        low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
-        if min(abs(low), abs(high)) > thresholds.same * max(abs(low), abs(high)) and low < 0 < high:
-            return (
-                f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is"
-                " pressed, which bears compression only (turn the sign of the load, or take its mean out, if that is"
-                " what was meant)",
-            )
-    return ()
+def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
+    """Why a recording is none of a unit that is pressed, or None."""
+    low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
+    if not (low < 0 < high and min(-low, high) > thresholds.same * max(-low, high)):
+        return None
+    return (
+        f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
+        " which bears compression only (turn the sign of the load, or take its mean out, if that is what was meant)"
+    )
+
+
+def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
+    """What is said of recordings that are left out, by place, of which the first ``count`` were to be fitted."""
+    said = [f"left out: {why}" for why in left_out.values()]
+    names = {recordings[k].name for k in left_out}
+    said += [
+        f"{one.label} continues {one.metadata['continues']}, which is left out: it is taken as a session of its own"
+        for k, one in enumerate(recordings)
+        if k not in left_out and one.metadata.get("continues") in names
+    ]
+    if count < len(recordings) and all(k in left_out for k in range(count, len(recordings))):
+        said.append("no recording to judge on is left: load cycles of those that are fitted are held out instead")
+    return said
 
 
 def _refused(
@@ -148,10 +167,15 @@ class _Prepared:
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
     clocks = aligned(recordings, integrity, thresholds)
+    held_out = [place >= count for place in clocks.places]
+    count = held_out.count(False)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
-    held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
+    held = held_out if any(held_out) else None
     factor = thinning(clocks.recordings, scale)
-    sessions = prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
+    sessions = [
+        replace(one, index=clocks.places[one.index])
+        for one in prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
+    ]
     start = baseline_of(sessions, scale)
     if clocks.parts:  # against a load of another clock no relaxation is found
         start = with_usual_arm(start)
@@ -388,6 +412,7 @@ def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, s
         session.usable,
         session.held_out,
         session.cycle,
+        session.index,
     )
 
 

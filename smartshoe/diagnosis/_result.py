@@ -143,7 +143,10 @@ class NextExperiment:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One recording at its full rate, for figures: all (n,), reading in ``Diagnosis.unit``, load in N."""
+    """One recording at its full rate, for figures: all (n,), reading in ``Diagnosis.unit``, load in N.
+
+    ``recording`` is its index among all that were given, as that of a `DataFault`.
+    """
 
     name: str
     time_s: Array
@@ -154,6 +157,7 @@ class Trace:
     usable: Mask
     held_out: Mask
     cycle: Index
+    recording: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
