@@ -225,7 +225,7 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
-    known = known_error(integrity, scale)
+    known = known_error(integrity.faults, sessions, scale)
     won = gain(baseline, best, scale)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:

@@ -11,10 +11,10 @@ from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._result import Cause, Verdict
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import listed
 from smartshoe.diagnosis._zero import Zero
-from smartshoe.integrity import Integrity
+from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
@@ -59,9 +59,11 @@ def none_of(name: Name) -> str:
     )
 
 
-def known_error(integrity: Integrity, scale: Scale) -> float:
-    """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
-    return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
+def known_error(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
+    """Rms, shares of full scale, that faults of all samples add to a recording that is fitted, the most of all."""
+    units = {one.index: one.recording.sensor.unit for one in sessions if one.fitted.any()}
+    errors = (fault.error * units[fault.recording].scale for fault in faults if fault.recording in units)
+    return max(errors, default=0.0) / (abs(scale.reading) * scale.unit.scale)
 
 
 def unexplained_of(causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure) -> ResidualStructure:

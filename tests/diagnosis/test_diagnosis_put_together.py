@@ -18,7 +18,7 @@ from smartshoe.models.effects import effect
 
 Array = NDArray[np.float64]
 
-FAULT: Any = SimpleNamespace(kind="gaps", error=0.0)
+FAULT: Any = SimpleNamespace(kind="gaps", recording=0, error=0.0)
 
 
 def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
@@ -61,8 +61,9 @@ def replace_reading(one: Recording, reading: Array) -> Recording:
 @pytest.fixture
 def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Every step of a diagnosis by what it is told to answer."""
-    fitted = SimpleNamespace(fitted=np.ones(3, dtype=bool), name="fitted")
-    held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held")
+    recording = SimpleNamespace(sensor=SimpleNamespace(unit=SCALE.unit))
+    fitted = SimpleNamespace(fitted=np.ones(3, dtype=bool), name="fitted", index=0, recording=recording)
+    held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held", index=1, recording=recording)
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
         is_no_unit=False, clocks=(),
