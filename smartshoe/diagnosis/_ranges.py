@@ -37,7 +37,8 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
         load, reading = kept[0]
         through_zero = float(reading.mean() / load.mean())
         low, high = np.quantile(load, [0.01, 0.99]) * scale.load_n
-        trap = not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
+        is_gauge = scale.unit.quantity == "pressure"  # the zero of others is a convention, through which no line goes
+        trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
             f" {fitted[0].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"

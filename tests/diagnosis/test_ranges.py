@@ -55,6 +55,13 @@ def test_a_line_that_misses_zero_by_far_is_a_trap() -> None:
     assert "none to calibrate by" in found.says[0]
 
 
+def test_no_line_goes_through_the_zero_of_a_sensor_whose_zero_is_a_convention() -> None:
+    load = 600.0 + 200.0 * TRIANGLE
+    found = _ranges((load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)), unit="mv")
+    assert not found.is_trap
+    assert "what lies below is extrapolated" in found.says[0]
+
+
 def test_what_is_held_out_decides_over_no_range() -> None:
     load = 600.0 + 200.0 * TRIANGLE
     trap = load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)
