@@ -17,6 +17,7 @@ from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
+from smartshoe.errors import InputError
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -189,6 +190,12 @@ def test_an_effective_area_tells_how_much_of_the_load_the_wall_bears() -> None:
     for impossible in (1.0, 1e-4, None):  # the wall would pull, or bear nearly all
         assert _ratio(impossible) == USUAL_WALL_RATIO
     assert _ratio(0.02, "v") == USUAL_WALL_RATIO
+
+
+@pytest.mark.parametrize("declared", ["40 cm2", "nan", "0", "-0.004"])
+def test_an_effective_area_that_is_no_positive_number_is_an_error_that_names_it(declared: str) -> None:
+    with pytest.raises(InputError, match=f"run_0: effective_area_m2 is '{declared}': give a positive number in m2"):
+        baseline_of(*_sessions(_run(effective_area_m2=declared)))
 
 
 def test_a_lag_comes_to_a_step_by_its_time_constant() -> None:
