@@ -235,7 +235,7 @@ def _diagnosed(
     noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
-    named = {cause.name for cause in causes}
+    named = {cause.name for cause in causes} | {name.member.name for name in names}
     parameters, covariance = joint_parameters(found.fit, scale)
     force = force_rmse_n(fine, extended)
     return Diagnosis(

@@ -166,7 +166,7 @@ class Diagnosis(Summarised):
 
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
-    ``minor``: effects that are significant but immaterial; they stay in the model and are no causes.
+    ``minor``: effects that stay in the model and are no causes: immaterial, unsure, undone by others, at a bound.
     ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
     ``effect.parameter``, with their ``covariance``.
     """

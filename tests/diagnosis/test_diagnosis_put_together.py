@@ -169,6 +169,14 @@ def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -
     assert said.startswith("delay fits, but the interval of its strength holds none")
 
 
+def test_a_block_whose_kind_is_a_cause_is_not_listed_beside_it(parts: Any) -> None:
+    parts.sizes["orifice_leak"] = 0.1
+    parts.names = [_name("orifice_leak", kind_only=True)]
+    parts.names[0].member.name = "linear_leak"
+    told = _run_diagnosis(parts)
+    assert ([one.name for one in told.causes], told.minor) == (["orifice_leak"], ("delay",))
+
+
 def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) -> None:
     told = _run_diagnosis(parts)
     assert (told.verdict, told.leftover, told.causes) == ("unexplained", "here", ())

@@ -293,7 +293,7 @@ def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be()
     assert "This data cannot tell it from bouc wen hysteresis" in text
     assert effect("bouc_wen_hysteresis").says in text
     assert "the nearest, zero drift, fits worse by 88" in text
-    assert "too small to be named as causes: sensor lag" in text
+    assert "not named, too small, unsure, undone by others or at a bound: sensor lag" in text
 
 
 def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
