@@ -202,8 +202,9 @@ def _diagnosed(
     residuals = [residual_of(one, extended) for one in sessions]
     after = residual_structure(sessions, residuals, thresholds)
     # What is held out decides over no name; it may be of loads that nothing was learnt of.
-    learnt = [k for k, one in enumerate(sessions) if one.fitted.any()]
-    within = residual_structure([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
+    learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
+    learnt = [(one, left) for one, left in learnt if one.usable.any()]
+    within = residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
     everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
     names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)

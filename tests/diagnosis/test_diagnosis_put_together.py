@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -58,12 +59,24 @@ def replace_reading(one: Recording, reading: Array) -> Recording:
     return Recording.from_arrays(time_s=one.time_s, force_n=one.force_n, pressure_mbar=reading, name=one.name)
 
 
+@dataclass(frozen=True)
+class _Session:
+    """Three samples, of which some may be fitted."""
+
+    name: str
+    index: int
+    fitted: NDArray[np.bool_]
+    usable: NDArray[np.bool_] = field(default_factory=lambda: np.ones(3, dtype=bool))
+
+    @property
+    def recording(self) -> Any:
+        return SimpleNamespace(sensor=SimpleNamespace(unit=SCALE.unit))
+
+
 @pytest.fixture
 def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Every step of a diagnosis by what it is told to answer."""
-    recording = SimpleNamespace(sensor=SimpleNamespace(unit=SCALE.unit))
-    fitted = SimpleNamespace(fitted=np.ones(3, dtype=bool), name="fitted", index=0, recording=recording)
-    held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held", index=1, recording=recording)
+    fitted, held = _Session("fitted", 0, np.array([True, True, False])), _Session("held", 1, np.zeros(3, dtype=bool))
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
         is_no_unit=False, clocks=(),
@@ -152,7 +165,10 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert [residuals for _, residuals in seen["structure"]] == [
         ["held 0", "fitted 0"], ["held 2", "fitted 2"], ["fitted 2"],
     ]  # fmt: skip
-    assert [one.name for one in seen["structure"][2][0]] == ["fitted"]
+    assert [[(one.name, list(one.usable)) for one in structure] for structure, _ in seen["structure"]] == [
+        [("held", [True] * 3), ("fitted", [True] * 3)], [("held", [True] * 3), ("fitted", [True] * 3)],
+        [("fitted", [True, True, False])],  # a cycle that is held out decides over no name
+    ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
