@@ -22,7 +22,8 @@ from smartshoe.recording import Recording
 class Aligned:
     """Recordings, usable samples, effects of timing with values that the model starts with, sentences.
 
-    ``places`` of the recordings among those that were given: what has no usable sample is left out.
+    ``places`` of the recordings among those that were given: what has no usable sample is left out. ``moved`` are the
+    places of those whose reading was moved by a lag of their own.
     """
 
     recordings: list[Recording]
@@ -30,6 +31,7 @@ class Aligned:
     parts: tuple[tuple[Effect, Array], ...]
     says: tuple[str, ...]
     places: list[int]
+    moved: frozenset[int] = frozenset()
 
 
 def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: Thresholds) -> Aligned:
@@ -48,9 +50,10 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     if shared is not None and abs(shared[0]) < delay.parameters[0].upper:
         before_s, rate = shared
         return replace(plain, parts=((effect("clock_drift"), np.array([rate])), (delay, np.array([before_s]))))
-    made, usable, says = [], [], []
-    for recording, mask, offset_s, rate in zip(recordings, masks, lags, rates, strict=True):
+    made, usable, says, moved = [], [], [], []
+    for place, recording, mask, offset_s, rate in zip(places, recordings, masks, lags, rates, strict=True):
         if offset_s or rate:
+            moved.append(place)
             recording, mask = _on_one_clock(recording, mask, float(offset_s), float(rate))
             way = "earlier" if offset_s > 0 else "later"
             says.append(
@@ -59,7 +62,7 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
             )
         made.append(recording)
         usable.append(mask)
-    return Aligned(made, usable, (), tuple(says), places)
+    return Aligned(made, usable, (), tuple(says), places, frozenset(moved))
 
 
 def _one_pair(lags_s: Array, rates: Array, duration_s: Array, thresholds: Thresholds) -> tuple[float, float] | None:

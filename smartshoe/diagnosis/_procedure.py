@@ -26,6 +26,7 @@ from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,
+    moved_of,
     none_of,
     other_kind_of,
     parted_clocks,
@@ -163,6 +164,7 @@ class _Prepared:
     excitation: Excitation
     is_no_unit: bool
     clocks: Sequence[tuple[Effect, Array]]
+    is_moved: bool
 
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
@@ -186,7 +188,8 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts)
+    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
+    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved)
 
 
 @on_one_thread
@@ -210,6 +213,7 @@ def _diagnosed(
     names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
+    unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])

@@ -51,6 +51,14 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     return None
 
 
+def moved_of(name: Name) -> str:
+    """What is said of a latency that is left where readings were moved to the load's clock before."""
+    return (
+        f"{name.effect.name.replace('_', ' ')} fits, but readings were moved to the load's clock before, each by its"
+        " own lag, of which it may be a rest, so that it is not named"
+    )
+
+
 def none_of(name: Name) -> str:
     """What is said of an effect whose strength may be none, beside all else that moves with it."""
     return (

@@ -46,6 +46,11 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     ((name, value),) = [(one.name, one.values) for one in late.start.parts]
     assert (name, value) == ("delay", pytest.approx([0.3]))
     assert (late.start.relaxing_share, late.start.relaxation_rate_per_s) == (0.08, 0.22)
+    assert not late.is_moved
+    # A reading that is moved by itself matters where it is fitted.
+    for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
+        apart = SimpleNamespace(clock_offset_s=lags, clock_rate=(0.0,) * 3, usable=usable)
+        assert _prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
     # Friction in each recording is no unit's; in one of them it is said.
     rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
     assert _prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
@@ -79,7 +84,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     fitted, held = _Session("fitted", 0, np.array([True, True, False])), _Session("held", 1, np.zeros(3, dtype=bool))
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
-        is_no_unit=False, clocks=(),
+        is_no_unit=False, clocks=(), is_moved=False,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
@@ -183,6 +188,15 @@ def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -
     assert [one.name for one in told.causes] == ["linear_leak"]
     (_, said) = told.limits
     assert said.startswith("delay fits, but the interval of its strength holds none")
+
+
+def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:
+    parts.names = [_name("linear_leak"), _name("delay")]
+    parts.given.is_moved = True
+    told = _run_diagnosis(parts)
+    assert ([one.name for one in told.causes], told.minor) == (["linear_leak"], ("delay",))
+    (_, said) = told.limits
+    assert said.startswith("delay fits, but readings were moved to the load's clock before")
 
 
 def test_a_block_whose_kind_is_a_cause_is_not_listed_beside_it(parts: Any) -> None:
