@@ -20,19 +20,27 @@ from smartshoe.recording import Recording
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """Recordings, usable samples, effects of timing with values that the model starts with, sentences."""
+    """Recordings, usable samples, effects of timing with values that the model starts with, sentences.
+
+    ``places`` of the recordings among those that were given: what has no usable sample is left out. ``moved`` are the
+    places of those whose reading was moved by a lag of their own.
+    """
 
     recordings: list[Recording]
     usable: list[Mask]
     parts: tuple[tuple[Effect, Array], ...]
     says: tuple[str, ...]
+    places: list[int]
+    moved: frozenset[int] = frozenset()
 
 
 def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: Thresholds) -> Aligned:
     """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own."""
-    lags, rates = np.array(integrity.clock_offset_s), np.array(integrity.clock_rate)
+    places = [k for k, mask in enumerate(integrity.usable) if mask.any()]
+    recordings, masks = [recordings[k] for k in places], [integrity.usable[k] for k in places]
+    lags, rates = (np.array(one)[places] for one in (integrity.clock_offset_s, integrity.clock_rate))
     largest = float(np.max(np.abs(lags), initial=0.0))
-    plain = Aligned(list(recordings), list(integrity.usable), (), ())
+    plain = Aligned(recordings, masks, (), (), places)
     if not lags.any() and not rates.any():
         return plain
     delay = effect("delay")
@@ -42,9 +50,10 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     if shared is not None and abs(shared[0]) < delay.parameters[0].upper:
         before_s, rate = shared
         return replace(plain, parts=((effect("clock_drift"), np.array([rate])), (delay, np.array([before_s]))))
-    made, usable, says = [], [], []
-    for recording, mask, offset_s, rate in zip(recordings, integrity.usable, lags, rates, strict=True):
+    made, usable, says, moved = [], [], [], []
+    for place, recording, mask, offset_s, rate in zip(places, recordings, masks, lags, rates, strict=True):
         if offset_s or rate:
+            moved.append(place)
             recording, mask = _on_one_clock(recording, mask, float(offset_s), float(rate))
             way = "earlier" if offset_s > 0 else "later"
             says.append(
@@ -53,7 +62,7 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
             )
         made.append(recording)
         usable.append(mask)
-    return Aligned(made, usable, (), tuple(says))
+    return Aligned(made, usable, (), tuple(says), places, frozenset(moved))
 
 
 def _one_pair(lags_s: Array, rates: Array, duration_s: Array, thresholds: Thresholds) -> tuple[float, float] | None:

@@ -81,7 +81,7 @@ def _law_of(
             bare = bare.without(part.name)
     nothing = fit(likelihood, bare, FEW_STEPS)
     flexible = likelihood.cost(about)
-    explained = min(likelihood.cost(nothing.model), likelihood.cost(plain)) - flexible
+    explained = min(nothing.cost, likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
     for law in available(likelihood.sessions):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
@@ -91,7 +91,7 @@ def _law_of(
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
         most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
-        missed = (likelihood.cost(one.model) + other - flexible) / max(explained, other, 1e-9)
+        missed = (one.cost + other - flexible) / max(explained, other, 1e-9)
         if missed < most**2:
             misses.append((missed, one))
     return min(misses, key=lambda pair: pair[0]) if misses else None

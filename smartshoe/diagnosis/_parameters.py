@@ -7,6 +7,7 @@ import numpy as np
 from smartshoe.diagnosis._likelihood import Fit
 from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Scale
+from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.parameter import Parameter
 from smartshoe.signals.noise import NORMAL_95
 
@@ -47,7 +48,7 @@ def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tupl
     told = _told(fit)
     found = {f"{owner}.{key}": _parameter(fit, k, scale) for k, owner, key in told}
     places = [k for k, _, _ in told]
-    factors = [_scaled(fit.model.parameters[k][1].unit, scale, fit.model.gain)[0] for k in places]
+    factors = [_scaled(fit.model.parameters[k][1], scale, fit.model.gain)[0] for k in places]
     part = fit.covariance[np.ix_(places, places)] * np.outer(factors, factors)
     return found, tuple(tuple(float(value) for value in row) for row in part)
 
@@ -65,17 +66,27 @@ def _told(fit: Fit) -> list[tuple[int, str, str]]:
 def _parameter(fit: Fit, k: int, scale: Scale) -> Parameter:
     """The parameter at ``k`` in theta, in units; its interval within its bounds."""
     parameter, value = fit.model.parameters[k][1], fit.model.theta[k]
-    factor, unit = _scaled(parameter.unit, scale, fit.model.gain)
+    factor, unit = _scaled(parameter, scale, fit.model.gain)
     sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
     low, high = max(value - NORMAL_95 * sd, parameter.lower), min(value + NORMAL_95 * sd, parameter.upper)
-    return Parameter(float(value * factor), float(sd * factor), (float(low * factor), float(high * factor)), unit)
+    return in_unit(float(value), sd, (float(low), float(high)), factor, unit)
 
 
-def _scaled(unit: str, scale: Scale, gain: float) -> tuple[float, str]:
-    """Factor and unit in which a share of full scale is given; the chain's shares come out ``gain`` times as large."""
-    factor = 1.0
+def in_unit(value: float, sd: float, ci95: tuple[float, float], factor: float, unit: str) -> Parameter:
+    """A share of full scale in ``unit``; ``factor`` is negative where the reading falls as the load grows."""
+    low, high = sorted(bound * factor for bound in ci95)
+    return Parameter(value * factor, sd * abs(factor), (low, high), unit)
+
+
+def _scaled(parameter: EffectParameter, scale: Scale, gain: float) -> tuple[float, str]:
+    """Factor and unit in which a share of full scale is given; the chain's shares come out ``gain`` times as large.
+
+    What moves the reading has the reading's sign; a level or a width of the equation's shape is a size.
+    """
+    factor, unit = 1.0, parameter.unit
     if "FS_reading" in unit:
-        factor, unit = factor * gain * abs(scale.reading), unit.replace("FS_reading", scale.unit.symbol)
+        span = abs(scale.reading) if parameter.null is None else scale.reading
+        factor, unit = factor * gain * span, unit.replace("FS_reading", scale.unit.symbol)
     if "FS_load" in unit:
         inverse = "/FS_load" in unit
         factor = factor / scale.load_n if inverse else factor * scale.load_n

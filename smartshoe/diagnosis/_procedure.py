@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
-from smartshoe.diagnosis._parameters import joint_parameters, may_be_none, parameters_of
+from smartshoe.diagnosis._parameters import in_unit, joint_parameters, may_be_none, parameters_of
 from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
@@ -26,6 +26,7 @@ from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,
+    moved_of,
     none_of,
     other_kind_of,
     parted_clocks,
@@ -46,7 +47,6 @@ from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.models.parameter import Parameter
 from smartshoe.recording import Recording
 from smartshoe.signals.noise import NORMAL_95
 
@@ -91,25 +91,44 @@ def diagnose(
     decided = thresholds or Thresholds()
     if material is not None:
         decided = replace(decided, material=material)
-    everything = [*fitted, *kept_out]
+    everything, count = [*fitted, *kept_out], len(fitted)
     integrity = examine(everything, decided)
-    refusals = integrity.refusals or _outside(everything, decided)
-    if refusals:
-        return _refused(everything, integrity, refusals, decided)
-    return _diagnosed(everything, len(fitted), integrity, decided, progress)
+    useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
+    left_out = dict(zip(useless, integrity.refusals, strict=True))
+    pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
+    if any(k < count for k in pulled):
+        return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
+    left_out |= pulled
+    if all(k in left_out for k in range(count)):
+        return _refused(everything, integrity, list(left_out.values()), decided)
+    usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
+    found = _diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
+    return replace(found, limits=(*_without(everything, count, left_out), *found.limits))
 
 
-def _outside(recordings: Sequence[Recording], thresholds: Thresholds) -> tuple[str, ...]:
-    """Why the recordings are none of a unit that is pressed."""
-    for recording in recordings:
-        low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
-        if min(abs(low), abs(high)) > thresholds.same * max(abs(low), abs(high)) and low < 0 < high:
-            return (
-                f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is"
-                " pressed, which bears compression only (turn the sign of the load, or take its mean out, if that is"
-                " what was meant)",
-            )
-    return ()
+def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
+    """Why a recording is none of a unit that is pressed, or None."""
+    low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
+    if not (low < 0 < high and min(-low, high) > thresholds.same * max(-low, high)):
+        return None
+    return (
+        f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
+        " which bears compression only (turn the sign of the load, or take its mean out, if that is what was meant)"
+    )
+
+
+def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
+    """What is said of recordings that are left out, by place, of which the first ``count`` were to be fitted."""
+    said = [f"left out: {why}" for why in left_out.values()]
+    names = {recordings[k].name for k in left_out}
+    said += [
+        f"{one.label} continues {one.metadata['continues']}, which is left out: it is taken as a session of its own"
+        for k, one in enumerate(recordings)
+        if k not in left_out and one.metadata.get("continues") in names
+    ]
+    if count < len(recordings) and all(k in left_out for k in range(count, len(recordings))):
+        said.append("no recording to judge on is left: load cycles of those that are fitted are held out instead")
+    return said
 
 
 def _refused(
@@ -145,14 +164,20 @@ class _Prepared:
     excitation: Excitation
     is_no_unit: bool
     clocks: Sequence[tuple[Effect, Array]]
+    is_moved: bool
 
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
     clocks = aligned(recordings, integrity, thresholds)
+    held_out = [place >= count for place in clocks.places]
+    count = held_out.count(False)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
-    held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
+    held = held_out if any(held_out) else None
     factor = thinning(clocks.recordings, scale)
-    sessions = prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
+    sessions = [
+        replace(one, index=clocks.places[one.index])
+        for one in prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
+    ]
     start = baseline_of(sessions, scale)
     if clocks.parts:  # against a load of another clock no relaxation is found
         start = with_usual_arm(start)
@@ -163,7 +188,8 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts)
+    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
+    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved)
 
 
 @on_one_thread
@@ -179,13 +205,15 @@ def _diagnosed(
     residuals = [residual_of(one, extended) for one in sessions]
     after = residual_structure(sessions, residuals, thresholds)
     # What is held out decides over no name; it may be of loads that nothing was learnt of.
-    learnt = [k for k, one in enumerate(sessions) if one.fitted.any()]
-    within = residual_structure([sessions[k] for k in learnt], [residuals[k] for k in learnt], thresholds)
+    learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
+    learnt = [(one, left) for one, left in learnt if one.usable.any()]
+    within = residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
     everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
     names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
+    unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
@@ -202,7 +230,7 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
-    known = known_error(integrity, scale)
+    known = known_error(integrity.faults, sessions, scale)
     won = gain(baseline, best, scale)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:
@@ -212,7 +240,7 @@ def _diagnosed(
     noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
-    named = {cause.name for cause in causes}
+    named = {cause.name for cause in causes} | {name.member.name for name in names}
     parameters, covariance = joint_parameters(found.fit, scale)
     force = force_rmse_n(fine, extended)
     return Diagnosis(
@@ -325,10 +353,9 @@ def _zero_cause(
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
     won = gain(worse, best, scale)
     parameter = zero.effect.parameters[0]
-    factor = scale.load_n if "FS_load" in parameter.unit else abs(scale.reading)
-    unit = "N" if "FS_load" in parameter.unit else scale.unit.symbol
-    low, high = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
-    values = {parameter.name: Parameter(zero.value * factor, zero.sd * factor, (low * factor, high * factor), unit)}
+    factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
+    interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
+    values = {parameter.name: in_unit(zero.value, zero.sd, interval, factor, unit)}
     deviations = abs(zero.value) / zero.sd
     seen = Statement(
         "deviations from nothing",
@@ -390,6 +417,7 @@ def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, s
         session.usable,
         session.held_out,
         session.cycle,
+        session.index,
     )
 
 

@@ -21,27 +21,27 @@ class Ranges:
 
 
 def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> Ranges:
-    """A sentence for each thing that the loads' range does not allow to be said."""
+    """A sentence for each thing that the range of the fitted loads does not allow to be said."""
     said: list[str] = []
-    kept = [(s.conditions.load[s.usable], s.reading[s.usable]) for s in sessions if s.usable.sum() > 10]
-    if not kept:
+    fitted = [one for one in sessions if one.fitted.sum() > 10]
+    if not fitted:
         return Ranges()
+    kept = [(one.conditions.load[one.fitted], one.reading[one.fitted]) for one in fitted]
     trap = False
     unit = scale.unit.symbol
     to_physical = scale.reading / scale.load_n
     within = [_gain(load, reading, thresholds.follows) for load, reading in kept]
-    narrow = [
-        k for k, (load, _) in enumerate(kept) if thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max())
-    ]
-    if len(narrow) == len(kept) and all(gain is not None for gain in within):
+    is_narrow = all(thresholds.clear * float(np.quantile(load, 0.01)) > float(load.max()) for load, _ in kept)
+    if is_narrow and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
-        load, reading = kept[narrow[0]]
+        load, reading = kept[0]
         through_zero = float(reading.mean() / load.mean())
         low, high = np.quantile(load, [0.01, 0.99]) * scale.load_n
-        trap = not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
+        is_gauge = scale.unit.quantity == "pressure"  # the zero of others is a convention, through which no line goes
+        trap = is_gauge and not 1.0 / thresholds.clear < gain / through_zero < thresholds.clear
         said.append(
             f"each file's load stays within a narrow range ({low:.4g} to {high:.4g} N in"
-            f" {sessions[narrow[0]].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
+            f" {fitted[0].recording.name}), in which the reading moves by {gain * to_physical:.3g} {unit}/N"
             f" ({1.0 / (gain * to_physical):.4g} N/{unit})"
             + (
                 f", where reading over load is {through_zero * to_physical:.3g} {unit}/N"
@@ -55,7 +55,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
     if between is not None and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
         if not 1.0 < abs(gain / between) * (1.0 + thresholds.same) < (1.0 + thresholds.same) ** 2:
-            trap = trap or len(narrow) == len(kept)
+            trap = trap or is_narrow
             said.append(
                 f"within a file the reading moves by {gain * to_physical:.3g} {unit}/N, between the files by"
                 f" {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, or the"

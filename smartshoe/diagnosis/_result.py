@@ -143,7 +143,10 @@ class NextExperiment:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One recording at its full rate, for figures: all (n,), reading in ``Diagnosis.unit``, load in N."""
+    """One recording at its full rate, for figures: all (n,), reading in ``Diagnosis.unit``, load in N.
+
+    ``recording`` is its index among all that were given, as that of a `DataFault`.
+    """
 
     name: str
     time_s: Array
@@ -154,6 +157,7 @@ class Trace:
     usable: Mask
     held_out: Mask
     cycle: Index
+    recording: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,7 +166,7 @@ class Diagnosis(Summarised):
 
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
-    ``minor``: effects that are significant but immaterial; they stay in the model and are no causes.
+    ``minor``: effects that stay in the model and are no causes: immaterial, unsure, undone by others, at a bound.
     ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
     ``effect.parameter``, with their ``covariance``.
     """

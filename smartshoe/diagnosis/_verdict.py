@@ -11,10 +11,10 @@ from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._result import Cause, Verdict
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import listed
 from smartshoe.diagnosis._zero import Zero
-from smartshoe.integrity import Integrity
+from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
@@ -51,6 +51,14 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     return None
 
 
+def moved_of(name: Name) -> str:
+    """What is said of a latency that is left where readings were moved to the load's clock before."""
+    return (
+        f"{name.effect.name.replace('_', ' ')} fits, but readings were moved to the load's clock before, each by its"
+        " own lag, of which it may be a rest, so that it is not named"
+    )
+
+
 def none_of(name: Name) -> str:
     """What is said of an effect whose strength may be none, beside all else that moves with it."""
     return (
@@ -59,9 +67,11 @@ def none_of(name: Name) -> str:
     )
 
 
-def known_error(integrity: Integrity, scale: Scale) -> float:
-    """Rms, shares of full scale, that faults of all samples add to a recording, the most of all."""
-    return max((fault.error for fault in integrity.faults), default=0.0) / abs(scale.reading)
+def known_error(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
+    """Rms, shares of full scale, that faults of all samples add to a recording that is fitted, the most of all."""
+    units = {one.index: one.recording.sensor.unit for one in sessions if one.fitted.any()}
+    errors = (fault.error * units[fault.recording].scale for fault in faults if fault.recording in units)
+    return max(errors, default=0.0) / (abs(scale.reading) * scale.unit.scale)
 
 
 def unexplained_of(causes: Sequence[Cause], before: ResidualStructure, after: ResidualStructure) -> ResidualStructure:
@@ -132,7 +142,7 @@ def worse_of(won: Gain, beyond: str | None) -> str:
 
 def past_of(zero: Zero, scale: Scale) -> str:
     """What is said of a zero that may have drifted to where it stands."""
-    value = zero.value * abs(scale.reading)
+    value = zero.value * scale.reading
     return (
         f"the zero stands at {value:.3g} {scale.unit.symbol} where the recordings begin: it drifts that way, so that it"
         " may have begun before, or there is an offset beside (record from where the unit is switched on)"

@@ -48,8 +48,8 @@ NONE: Array = np.zeros(0)
 def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
     """What is wrong with the data of ``recordings``, before any model; deterministic.
 
-    Each recording has one reference load and one reading; where it has not, that is its refusal. Raises `InputError`
-    where there is no recording at all.
+    Each recording has one reference load and one reading; where it has not, that is its refusal, whatever the others
+    are. Raises `InputError` where there is no recording at all.
     """
     if not recordings:
         raise InputError("there is no recording to examine: give at least one file")
@@ -74,8 +74,6 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         usable.append(np.zeros_like(mask) if refused else mask)
         offsets.append(clock)
         refusals += refused[:1]
-    if len(refusals) < len(recordings):
-        refusals = []
     return Integrity(
         tuple(faults), tuple(usable), tuple(c[0] for c in offsets), tuple(c[1] for c in offsets), tuple(refusals)
     )

@@ -66,7 +66,7 @@ class Integrity:
     ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
     held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
     recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``refusals`` says in a sentence
-    each why no diagnosis is possible; it is empty as long as one recording is of use.
+    each, in their order, why the recordings without a usable sample are of no use.
     """
 
     faults: tuple[DataFault, ...]

@@ -195,10 +195,10 @@ def test_what_follows_neither_load_nor_direction_has_no_course(monkeypatch: pyte
 SCALE = Scale(800.0, 160.0, MILLIBAR)  # 0.2 mbar/N
 
 
-def _file(load: Array, reading: Array, usable: Any = None, name: str = "file") -> Any:
-    kept = np.ones(load.size, dtype=bool) if usable is None else usable
+def _file(load: Array, reading: Array, fitted: Any = None, name: str = "file") -> Any:
+    kept = np.ones(load.size, dtype=bool) if fitted is None else fitted
     return SimpleNamespace(
-        conditions=SimpleNamespace(load=load), reading=reading, usable=kept, recording=SimpleNamespace(name=name)
+        conditions=SimpleNamespace(load=load), reading=reading, fitted=kept, recording=SimpleNamespace(name=name)
     )
 
 
@@ -259,13 +259,13 @@ def test_a_trap_stays_one_whatever_the_files_say() -> None:
     assert found.is_trap
 
 
-def test_of_ten_usable_samples_nothing_is_said() -> None:
+def test_of_ten_fitted_samples_nothing_is_said() -> None:
     one = _line(0.9, 1.0, 0.1)
     for count, is_told in ((10, False), (11, True)):
-        usable = np.arange(101) % (101 // count) == 0
-        usable[np.flatnonzero(usable)[count:]] = False
-        assert usable.sum() == count
-        assert bool(_told(_file(one.conditions.load, one.reading, usable)).says) is is_told
+        fitted = np.arange(101) % (101 // count) == 0
+        fitted[np.flatnonzero(fitted)[count:]] = False
+        assert fitted.sum() == count
+        assert bool(_told(_file(one.conditions.load, one.reading, fitted)).says) is is_told
     assert _told() == Ranges()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,7 +19,7 @@ from smartshoe.models.effects import effect
 
 Array = NDArray[np.float64]
 
-FAULT: Any = SimpleNamespace(kind="gaps", error=0.0)
+FAULT: Any = SimpleNamespace(kind="gaps", recording=0, error=0.0)
 
 
 def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
@@ -45,6 +46,11 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     ((name, value),) = [(one.name, one.values) for one in late.start.parts]
     assert (name, value) == ("delay", pytest.approx([0.3]))
     assert (late.start.relaxing_share, late.start.relaxation_rate_per_s) == (0.08, 0.22)
+    assert not late.is_moved
+    # A reading that is moved by itself matters where it is fitted.
+    for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
+        apart = SimpleNamespace(clock_offset_s=lags, clock_rate=(0.0,) * 3, usable=usable)
+        assert _prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
     # Friction in each recording is no unit's; in one of them it is said.
     rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
     assert _prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
@@ -58,14 +64,27 @@ def replace_reading(one: Recording, reading: Array) -> Recording:
     return Recording.from_arrays(time_s=one.time_s, force_n=one.force_n, pressure_mbar=reading, name=one.name)
 
 
+@dataclass(frozen=True)
+class _Session:
+    """Three samples, of which some may be fitted."""
+
+    name: str
+    index: int
+    fitted: NDArray[np.bool_]
+    usable: NDArray[np.bool_] = field(default_factory=lambda: np.ones(3, dtype=bool))
+
+    @property
+    def recording(self) -> Any:
+        return SimpleNamespace(sensor=SimpleNamespace(unit=SCALE.unit))
+
+
 @pytest.fixture
 def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Every step of a diagnosis by what it is told to answer."""
-    fitted = SimpleNamespace(fitted=np.ones(3, dtype=bool), name="fitted")
-    held = SimpleNamespace(fitted=np.zeros(3, dtype=bool), name="held")
+    fitted, held = _Session("fitted", 0, np.array([True, True, False])), _Session("held", 1, np.zeros(3, dtype=bool))
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
-        is_no_unit=False, clocks=(),
+        is_no_unit=False, clocks=(), is_moved=False,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
@@ -151,7 +170,10 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert [residuals for _, residuals in seen["structure"]] == [
         ["held 0", "fitted 0"], ["held 2", "fitted 2"], ["fitted 2"],
     ]  # fmt: skip
-    assert [one.name for one in seen["structure"][2][0]] == ["fitted"]
+    assert [[(one.name, list(one.usable)) for one in structure] for structure, _ in seen["structure"]] == [
+        [("held", [True] * 3), ("fitted", [True] * 3)], [("held", [True] * 3), ("fitted", [True] * 3)],
+        [("fitted", [True, True, False])],  # a cycle that is held out decides over no name
+    ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
@@ -166,6 +188,23 @@ def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -
     assert [one.name for one in told.causes] == ["linear_leak"]
     (_, said) = told.limits
     assert said.startswith("delay fits, but the interval of its strength holds none")
+
+
+def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:
+    parts.names = [_name("linear_leak"), _name("delay")]
+    parts.given.is_moved = True
+    told = _run_diagnosis(parts)
+    assert ([one.name for one in told.causes], told.minor) == (["linear_leak"], ("delay",))
+    (_, said) = told.limits
+    assert said.startswith("delay fits, but readings were moved to the load's clock before")
+
+
+def test_a_block_whose_kind_is_a_cause_is_not_listed_beside_it(parts: Any) -> None:
+    parts.sizes["orifice_leak"] = 0.1
+    parts.names = [_name("orifice_leak", kind_only=True)]
+    parts.names[0].member.name = "linear_leak"
+    told = _run_diagnosis(parts)
+    assert ([one.name for one in told.causes], told.minor) == (["orifice_leak"], ("delay",))
 
 
 def test_what_nothing_names_is_unexplained_and_says_where_it_lies(parts: Any) -> None:

@@ -417,16 +417,16 @@ def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None
     ("name", "values", "parameter", "expected", "unit"),
     [
         ("dead_band", (0.05, 0.2, 0.0), "lost_load", 0.05 * 600.0, "N"),
-        ("sensor_nonlinearity", (0.02, 0.0, 0.0), "bow", 0.02 * 1.5 * 200.0, "mbar"),
-        ("zero_drift", (1e-4, 0.0, 60.0), "drift_rate", 1e-4 * 1.5 * 200.0, "mbar/s"),
-        ("zero_drift", (1e-4, 2e-3, 60.0), "temperature_coefficient", 2e-3 * 1.5 * 200.0, "mbar/K"),
+        ("sensor_nonlinearity", (0.02, 0.0, 0.0), "bow", 0.02 * 1.5 * -200.0, "mbar"),
+        ("zero_drift", (1e-4, 0.0, 60.0), "drift_rate", 1e-4 * 1.5 * -200.0, "mbar/s"),
+        ("zero_drift", (1e-4, 2e-3, 60.0), "temperature_coefficient", 2e-3 * 1.5 * -200.0, "mbar/K"),
         ("delay", (0.03,), "delay", 0.03, "s"),
     ],
 )
 def test_shares_of_full_scale_become_newtons_and_the_readings_unit(
     name: str, values: tuple[float, ...], parameter: str, expected: float, unit: str
 ) -> None:
-    """What stands before the chain's gain comes out as many times as large."""
+    """What stands before the chain's gain comes out as many times as large, here of a reading that falls."""
     sessions, _ = _prepared(_pressed(_triangles()))
     conditions = [replace(one.conditions, temperature_k=one.conditions.time_s % 7.0) for one in sessions]
     sessions = [replace(one, conditions=logged) for one, logged in zip(sessions, conditions, strict=True)]

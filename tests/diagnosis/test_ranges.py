@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -19,14 +21,15 @@ GAIN_MBAR_PER_N = 0.25
 NOISE_MBAR = 0.02
 
 
-def _ranges(*pairs: tuple[Array, Array]) -> Ranges:
+def _ranges(*pairs: tuple[Array, Array], unit: str = "mbar", held_out: Sequence[bool] | None = None) -> Ranges:
     noise = np.random.default_rng(0).normal(0.0, NOISE_MBAR, TIME_S.size)
     recordings = [
-        Recording.from_arrays(time_s=TIME_S, force_n=load, pressure_mbar=reading + noise) for load, reading in pairs
+        Recording.from_arrays(time_s=TIME_S, force_n=load, name=f"run_{k}", **{f"pressure_{unit}": reading + noise})
+        for k, (load, reading) in enumerate(pairs)
     ]
     usable = [np.ones(TIME_S.size, dtype=bool) for _ in recordings]
     scale = full_scale(recordings, usable, Thresholds())
-    return ranges_of(prepare(recordings, usable, None, scale, 1, Thresholds()), scale, Thresholds())
+    return ranges_of(prepare(recordings, usable, held_out, scale, 1, Thresholds()), scale, Thresholds())
 
 
 def _proportional(low_n: float, high_n: float) -> tuple[Array, Array]:
@@ -50,6 +53,22 @@ def test_a_line_that_misses_zero_by_far_is_a_trap() -> None:
     assert found.is_trap
     assert "0.05 mbar/N" in found.says[0]
     assert "none to calibrate by" in found.says[0]
+
+
+def test_no_line_goes_through_the_zero_of_a_sensor_whose_zero_is_a_convention() -> None:
+    load = 600.0 + 200.0 * TRIANGLE
+    found = _ranges((load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)), unit="mv")
+    assert not found.is_trap
+    assert "what lies below is extrapolated" in found.says[0]
+
+
+def test_what_is_held_out_decides_over_no_range() -> None:
+    load = 600.0 + 200.0 * TRIANGLE
+    trap = load, 150.0 + 0.2 * GAIN_MBAR_PER_N * (load - 600.0)
+    found = _ranges(_proportional(0.0, 800.0), trap, held_out=[True, False])
+    assert found.is_trap
+    assert "(601.9 to 798.1 N in run_1)" in found.says[0]  # but for one in a hundred at either end
+    assert _ranges(_proportional(0.0, 800.0), trap, held_out=[False, True]) == Ranges()
 
 
 def test_gains_within_files_that_differ_from_the_gain_between_them_are_a_trap() -> None:

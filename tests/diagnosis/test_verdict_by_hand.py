@@ -31,7 +31,7 @@ from smartshoe.diagnosis._verdict import (
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.units import MILLIBAR
+from smartshoe.units import MILLIBAR, Unit, unit
 
 MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 SCALE = Scale(800.0, -140.0, MILLIBAR)
@@ -130,12 +130,22 @@ def test_strengths_may_be_none_where_their_joint_region_holds_it() -> None:
     assert not may_be_none(block, "flexible_curve")
 
 
-def test_what_faults_add_is_the_most_of_them_in_shares_of_the_reading() -> None:
-    def told(*errors: float) -> float:
-        faults = tuple(SimpleNamespace(error=one) for one in errors)
-        return known_error(SimpleNamespace(faults=faults), SCALE)  # type: ignore[arg-type]
+def test_what_faults_add_is_the_most_of_those_fitted_in_shares_of_the_reading() -> None:
+    """Each in its own recording's unit: of 140 mbar, 1400 Pa are a tenth."""
 
-    assert told(7.0, 14.0, 1.4) == pytest.approx(0.1)
+    def session(index: int, unit: Unit, fitted: bool = True) -> Any:
+        recording = SimpleNamespace(sensor=SimpleNamespace(unit=unit))
+        return SimpleNamespace(index=index, recording=recording, fitted=np.full(3, fitted))
+
+    sessions = [session(0, MILLIBAR), session(2, unit("Pa")), session(3, MILLIBAR, fitted=False)]
+
+    def told(*errors: tuple[int, float]) -> float:
+        faults: Any = [SimpleNamespace(recording=index, error=error) for index, error in errors]
+        return known_error(faults, sessions, SCALE)
+
+    assert told((0, 7.0), (2, 1400.0), (0, 1.4)) == pytest.approx(0.1)
+    assert told((0, 7.0), (2, 140.0)) == pytest.approx(0.05)
+    assert told((1, 7.0), (3, 7.0)) == 0.0  # left out, and held out
     assert told() == 0.0
 
 
@@ -171,7 +181,8 @@ def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
 
 def test_a_past_is_said_in_the_readings_unit() -> None:
     zero = Zero(shift_of("reading"), -0.05, 0.01, 0.05)
-    assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, SCALE)
+    assert "the zero stands at -7 mbar where the recordings begin" in past_of(zero, replace(SCALE, reading=140.0))
+    assert "the zero stands at 7 mbar where" in past_of(zero, SCALE)  # it falls as the load grows
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -29,7 +29,7 @@ CAUSE = Cause(
 TIME_S = 0.1 * np.arange(5, dtype=np.float64)
 TRACE = Trace(
     "run_1", TIME_S, 100.0 * TIME_S, 10.0 + TIME_S, np.full(5, 9.0), np.full(5, 10.0),
-    np.array([True, True, False, True, True]), np.zeros(5, dtype=bool), np.zeros(5, dtype=np.intp),
+    np.array([True, True, False, True, True]), np.zeros(5, dtype=bool), np.zeros(5, dtype=np.intp), 0,
 )  # fmt: skip
 FOUND = Diagnosis(
     "explained",

@@ -45,7 +45,7 @@ def _law_of(odds: float = 10.0, plain_cost: float = NOTHING_COST) -> tuple[float
     )
     likelihood: Any = SimpleNamespace(cost=lambda model: FLEXIBLE_COST if model.parts else plain_cost, sessions=())
     one: Any = SimpleNamespace(effect=block, name=block.name)
-    found = _laws._law_of(one, state, MODEL, likelihood)
+    found = _laws._law_of(one, state, state.fit.model, MODEL, likelihood)
     return None if found is None else (found[0], found[1].law)  # type: ignore[attr-defined]
 
 
@@ -147,8 +147,8 @@ def test_a_law_that_stands_beside_a_block_may_do_without_it(costs: dict[str, tup
     likelihood: Any = SimpleNamespace(cost=lambda model: NOTHING_COST - 1.0, sessions=())
     member: Any = SimpleNamespace(effect=block, name=block.name)
     costs["gain_drift"] = (0.0, USUAL)  # of a second one, were it tried
-    assert _laws._law_of(member, state, MODEL, likelihood) is None
+    assert _laws._law_of(member, state, state.fit.model, MODEL, likelihood) is None
     likelihood.cost = lambda model: NOTHING_COST + 1.0
-    found = _laws._law_of(member, state, MODEL, likelihood)
+    found = _laws._law_of(member, state, state.fit.model, MODEL, likelihood)
     assert found is not None
     assert found[1].model.names == ("gain_drift",)

@@ -166,7 +166,7 @@ def test_an_offset_that_is_taken_away_is_an_error_of_its_size(found: Diagnosis) 
 
 
 def test_traces_are_the_recordings_and_what_the_models_make_of_them(found: Diagnosis, runs: list[Recording]) -> None:
-    assert [one.name for one in found.traces] == [one.name for one in runs]
+    assert [(one.name, one.recording) for one in found.traces] == [(one.name, k) for k, one in enumerate(runs)]
     assert found.extended is not None
     for one, run in zip(found.traces, runs, strict=True):
         assert one.time_s == pytest.approx(run.time_s, abs=1e-9)
@@ -231,7 +231,7 @@ def test_a_load_that_pulls_as_much_as_it_presses_is_refused_in_newtons(runs: lis
     tared = Recording.from_arrays(
         time_s=runs[0].time_s, force_n=runs[0].force_n - 40.0, pressure_mbar=runs[0].sensor.values, name="tared"
     )
-    assert _outside([tared], Thresholds()) == ()
+    assert _outside(tared, Thresholds()) is None
 
 
 def _left(rms: float) -> ResidualStructure:

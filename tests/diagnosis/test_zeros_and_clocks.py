@@ -17,6 +17,7 @@ from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
+from smartshoe.errors import InputError
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -191,6 +192,12 @@ def test_an_effective_area_tells_how_much_of_the_load_the_wall_bears() -> None:
     assert _ratio(0.02, "v") == USUAL_WALL_RATIO
 
 
+@pytest.mark.parametrize("declared", ["40 cm2", "nan", "0", "-0.004"])
+def test_an_effective_area_that_is_no_positive_number_is_an_error_that_names_it(declared: str) -> None:
+    with pytest.raises(InputError, match=f"run_0: effective_area_m2 is '{declared}': give a positive number in m2"):
+        baseline_of(*_sessions(_run(effective_area_m2=declared)))
+
+
 def test_a_lag_comes_to_a_step_by_its_time_constant() -> None:
     step = np.concatenate([[0.0], np.ones(400)])
     answer = lagged(step, 0.01, 0.5)
@@ -217,7 +224,7 @@ def _late(lag_s: float, rate: float = 0.0) -> Recording:
 def test_a_reading_of_another_clock_is_moved_to_the_loads(lag_s: float, way: str) -> None:
     runs = [_late(lag_s), _run()]
     found = _told((lag_s, 0.0), (0.0, 0.0), runs)
-    assert found.parts == ()
+    assert (found.parts, found.moved) == ((), {0})
     (said,) = found.says
     assert "late" in said
     assert f"0.6 s {way}" in said

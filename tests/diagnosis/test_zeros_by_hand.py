@@ -19,6 +19,7 @@ from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameter
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, shift_of, zeros_of
 from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR, VOLT
@@ -395,9 +396,14 @@ def test_noise_that_remembers_is_told_where_it_was_not_yet(monkeypatch: pytest.M
      ("1/FS_load", (1.0 / 800.0, "1/N")), ("FS_reading/FS_load", (70.0 / 800.0, "mbar/N")), ("s", (1.0, "s"))],
 )  # fmt: skip
 def test_shares_come_to_units(unit: str, expected: tuple[float, str]) -> None:
-    factor, told = _scaled(unit, replace(SCALE, reading=-140.0), 0.5)
+    strength = EffectParameter("strength", unit, "", 0.0, -1.0, 1.0, 0.1)
+    factor, told = _scaled(strength, SCALE, 0.5)
     assert (factor, told) == (pytest.approx(expected[0]), expected[1])
-    assert _scaled("FS_reading", replace(SCALE, reading=math.inf), 0.5)[0] == 1.0
+    assert _scaled(strength, replace(SCALE, reading=math.inf), 0.5)[0] == (1.0 if "reading" in unit else factor)
+    # Of a reading that falls as the load grows: what moves it has its sign, a width or a level is a size.
+    falling = replace(SCALE, reading=-140.0)
+    assert _scaled(strength, falling, 0.5)[0] == (-factor if "reading" in unit else factor)
+    assert _scaled(replace(strength, null=None), falling, 0.5)[0] == factor
 
 
 def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> None:
@@ -434,6 +440,12 @@ def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> 
     low, high = max(1e-4 - 1.959963984540054 * sd, bounds.lower), min(1e-4 + 1.959963984540054 * sd, bounds.upper)
     assert one.ci95 == pytest.approx((112.0 * low, 112.0 * high))
     assert drift["temperature_coefficient"].sd == 0.0
+    falling, told = joint_parameters(fit, replace(SCALE, reading=-140.0))
+    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    assert np.array(told) == pytest.approx(np.array(joint) * np.outer(signs, signs))
+    turned = falling["zero_drift.drift_rate"]
+    assert (turned.value, turned.sd) == (-one.value, one.sd)
+    assert turned.ci95 == (-one.ci95[1], -one.ci95[0])
     covariance[6, 6] = 1e6
     limits = effect("dead_band").parameters[0]
     wide = parameters_of(fit, "dead_band", SCALE)["lost_load"]

@@ -52,7 +52,7 @@ def test_a_channel_that_is_constant_is_refused(load: float, reading: float) -> N
 def test_thousands_of_short_recordings_are_refused_each_and_a_long_one_among_them_stays() -> None:
     whole = _recording(force_n=LOAD_N, pressure_mbar=READING)
     found = examine([*(whole.taken(slice(k, k + 60)) for k in range(2000)), whole])
-    assert found.refusals == ()
+    assert len(found.refusals) == 2000
     assert {fault.kind for fault in found.faults} == {"short_recording"}
     assert len(found.faults) == 2000
     assert found.usable[-1].all()

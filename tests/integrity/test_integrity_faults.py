@@ -258,10 +258,12 @@ def test_a_reading_that_does_not_follow_is_refused(what):
     assert not found.usable[0].any()
 
 
-def test_refusals_need_every_recording_to_fail():
+def test_a_recording_is_refused_by_itself():
     good = recorded(dynamic_protocol(), 1)
     found = examine([good, good.taken(slice(0, 40)), good.without("force")])
-    assert found.refusals == ()
+    short, bare = found.refusals
+    assert "40 samples" in short
+    assert "--force" in bare
     assert [fault.kind for fault in found.faults] == ["short_recording", "no_reference"]
     assert [fault.recording for fault in found.faults] == [1, 2]
     assert [mask.any() for mask in found.usable] == [True, False, False]

@@ -24,6 +24,7 @@ from smartshoe.models.effects import Conditions, Effect, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
+from smartshoe.report.diagnosis._charts import faults
 from smartshoe.report.diagnosis._page import write_diagnosis_page
 from smartshoe.report.diagnosis._protocol_file import protocol_text
 from smartshoe.report.diagnosis._sentences import (
@@ -88,6 +89,7 @@ def _traces(parts: tuple[str, ...], found: tuple[str, ...], step_in_gain: float 
                 np.ones(time_s.size, dtype=bool),
                 np.full(time_s.size, index == 1),
                 np.minimum(time_s // 8, 11).astype(np.intp),
+                index,
             )
         )
     return tuple(traces)
@@ -291,7 +293,7 @@ def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be()
     assert "This data cannot tell it from bouc wen hysteresis" in text
     assert effect("bouc_wen_hysteresis").says in text
     assert "the nearest, zero drift, fits worse by 88" in text
-    assert "too small to be named as causes: sensor lag" in text
+    assert "not named, too small, unsure, undone by others or at a bound: sensor lag" in text
 
 
 def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
@@ -346,7 +348,7 @@ def test_a_page_of_unusual_data_is_written_all_the_same(tmp_path: Path) -> None:
     runaway = np.where(time_s > 8, np.inf, 1.0)
     usable = time_s > 1
     trace = Trace(
-        "t", time_s, steady, np.ones(300), np.zeros(300), runaway, usable, ~usable & usable, np.zeros(300, int)
+        "t", time_s, steady, np.ones(300), np.zeros(300), runaway, usable, ~usable & usable, np.zeros(300, int), 0
     )
     made = replace(case("one cause"), traces=(trace,), likeness=None, screening=(), gain=None)
     html = write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8")
@@ -355,6 +357,13 @@ def test_a_page_of_unusual_data_is_written_all_the_same(tmp_path: Path) -> None:
     nothing = replace(trace, usable=np.zeros(300, dtype=bool))
     html = write_diagnosis_page(tmp_path / "y.html", replace(made, traces=(nothing,)), "t", {}).read_text()
     assert "figure class=" not in html
+
+
+def test_faults_are_drawn_over_the_recording_that_has_them() -> None:
+    """The first that was given was left out: it has no trace."""
+    (trace, _) = case("one cause").traces
+    made = replace(case("one cause"), traces=(replace(trace, recording=1),), data_faults=FAULTS)
+    assert [chart.title for chart in faults(made)] == ["triangles_2"]
 
 
 @pytest.mark.parametrize("name", CASES)

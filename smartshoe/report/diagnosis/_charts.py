@@ -190,8 +190,8 @@ def over_frequency(found: EvidenceView, unit: str) -> Chart | None:
 def faults(diagnosis: Diagnosis) -> list[Chart]:
     """Reading and load of each recording with faults, which are shaded; what was left out of every fit is bare."""
     charts: list[Chart] = []
-    for index, trace in enumerate(diagnosis.traces):
-        own = [fault for fault in diagnosis.data_faults if fault.recording == index]
+    for trace in diagnosis.traces:
+        own = [fault for fault in diagnosis.data_faults if fault.recording == trace.recording]
         if not own or len(charts) == MOST_RECORDINGS:
             continue
         marks = [Mark(fault.start_s, fault.stop_s, "look", words(fault.kind)) for fault in own]

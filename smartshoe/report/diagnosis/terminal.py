@@ -41,7 +41,8 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     if diagnosis.minor:
         _line(
             console,
-            f"also in the extended model, too small to be named as causes: {listed(sorted(diagnosis.minor), 'and')}",
+            "also in the extended model and not named, too small, unsure, undone by others or at a bound:"
+            f" {listed(sorted(diagnosis.minor), 'and')}",
         )
     if diagnosis.leftover:
         _line(console, f"what is left: {diagnosis.leftover}")

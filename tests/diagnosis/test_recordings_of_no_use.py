@@ -1,0 +1,99 @@
+"""A recording that no diagnosis can use, among such as it can: it is left out and said, and the others are judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe import Recording, diagnose
+from smartshoe.models.effects import Conditions
+from smartshoe.models.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+STEP_S, FULL_N, NOISE_MBAR = 0.02, 800.0, 0.05
+MODEL = ExtendedModel(1.0, 0.08, 0.22, FULL_N, 100.0, "mbar")
+
+
+def _run(name: str, period_s: float, low_n: float = 0.0, **metadata: str) -> Recording:
+    """Triangles from ``low_n`` to full scale for a minute."""
+    time_s = np.arange(0.0, 60.0, STEP_S)
+    load_n = low_n + (FULL_N - low_n) * (1.0 - np.abs(2.0 * (time_s % period_s) / period_s - 1.0))
+    reading = MODEL.reading(Conditions(time_s, load_n / FULL_N, STEP_S))
+    reading = reading + NOISE_MBAR * np.random.default_rng(len(name)).standard_normal(time_s.size)
+    return Recording.from_arrays(
+        time_s=time_s, force_n=load_n, pressure_mbar=reading, name=name, metadata=metadata or None
+    )
+
+
+GOOD = _run("good", 8.0)
+OTHER = _run("other", 5.0)
+
+
+def _constant(one: Recording) -> Recording:
+    return one.with_channel(replace(one.sensor, values=np.full(len(one), 10.0)))
+
+
+BAD = {
+    "reference load": OTHER.without("force"),
+    "1 samples": OTHER.taken(slice(0, 1)),
+    "constant": _constant(OTHER),
+}
+
+
+@pytest.mark.parametrize("why", BAD)
+def test_a_recording_of_no_use_among_those_fitted_is_left_out(why: str) -> None:
+    found = diagnose([BAD[why], GOOD])
+    assert found.verdict == "adequate"
+    (said,) = (one for one in found.limits if one.startswith("left out: other:"))
+    assert why in said
+    assert [(trace.name, trace.recording) for trace in found.traces] == [("good", 1)]
+    assert {(fault.recording, fault.label) for fault in found.data_faults if fault.severity == "fatal"} == {
+        (0, "other")
+    }
+    assert {fault.label for fault in found.data_faults if fault.recording == 1} <= {"good"}
+
+
+def test_noise_is_told_of_the_recording_that_has_it() -> None:
+    hum = 0.3 * np.sin(2.0 * np.pi * 7.0 * GOOD.time_s)
+    humming = GOOD.with_channel(replace(GOOD.sensor, values=GOOD.sensor.values + hum))
+    found = diagnose([BAD["constant"], humming])
+    assert {(fault.recording, fault.label) for fault in found.data_faults if fault.kind == "hum"} == {(1, "good")}
+
+
+def test_held_out_recordings_of_no_use_are_replaced_by_load_cycles() -> None:
+    found = diagnose(GOOD, hold_out=BAD["reference load"])
+    assert found.verdict == "adequate"
+    assert [trace.name for trace in found.traces] == ["good"]
+    assert 0.1 < float(np.mean(found.traces[0].held_out)) < 0.6
+    assert sum(one.startswith("left out: other:") for one in found.limits) == 1
+    assert sum("load cycles of those that are fitted are held out instead" in one for one in found.limits) == 1
+    beside = diagnose(GOOD, hold_out=[BAD["constant"], OTHER])
+    assert [(trace.name, trace.recording) for trace in beside.traces] == [("good", 0), ("other", 2)]
+    assert [bool(trace.held_out.all()) for trace in beside.traces] == [False, True]
+    assert not any("held out instead" in one for one in beside.limits)
+
+
+def test_where_none_of_those_to_be_fitted_is_of_use_it_is_refused() -> None:
+    found = diagnose(BAD["constant"], hold_out=GOOD)
+    assert found.verdict == "refused"
+    assert "the reading is constant" in found.limits[0]
+    assert found.limits[0] in found.says
+
+
+def test_what_continues_a_recording_that_is_left_out_is_a_session_of_its_own() -> None:
+    found = diagnose([BAD["constant"], _run("later", 8.0, continues="other")])
+    assert "later continues other, which is left out: it is taken as a session of its own" in found.limits
+
+
+def test_a_load_that_pulls_refuses_where_it_is_fitted_and_is_left_out_where_it_is_held_out() -> None:
+    pulled = _run("pulled", 5.0, low_n=-500.0)
+    assert diagnose([GOOD, pulled]).verdict == "refused"
+    found = diagnose(GOOD, hold_out=[pulled, OTHER])
+    assert found.verdict == "adequate"
+    assert [(trace.name, trace.recording) for trace in found.traces] == [("good", 0), ("other", 2)]
+    (said,) = (one for one in found.limits if one.startswith("left out: pulled:"))
+    assert "from -4" in said
