@@ -30,6 +30,7 @@ SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 6.0  # times, beyond what keeps the fastest ramp
+LEAST_SPAN = 0.02  # of the widest: a load that moves by less has no ramp but its noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +127,7 @@ def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
 def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
     """By how much the samples may be thinned so that the fastest ramp keeps its shape."""
     factors = []
-    for recording in recordings:
+    for recording, span in zip(recordings, _spans(recordings, scale), strict=True):
         step_s = recording.sample_time_s
         load = recording.force_n / scale.load_n
         window = max(1, round(0.05 / step_s))
@@ -135,11 +136,18 @@ def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
             continue
         slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
         fastest = float(np.percentile(slope, 99.5))
-        ramp_s = 0.8 / fastest if fastest > 0 else recording.duration_s
+        ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
         factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s)))
     total = sum(len(recording) for recording in recordings)
     shape = min(factors)
     return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))
+
+
+def _spans(recordings: Sequence[Recording], scale: Scale) -> Array:
+    """By how much each load moves, in full scales; one where that is nearly all, or so little that it has no ramp."""
+    spans = np.array([np.ptp(np.percentile(one.force_n, [0.1, 99.9])) for one in recordings]) / scale.load_n
+    is_part = (spans > LEAST_SPAN * spans.max()) & (spans < 1.0 - LEAST_SPAN)
+    return np.where(is_part, spans, 1.0)
 
 
 def prepare(

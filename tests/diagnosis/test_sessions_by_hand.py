@@ -152,6 +152,18 @@ def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(coun
     assert thinning([_run(load[:half]), _run(load[half:])], SCALE) == factor
 
 
+@pytest.mark.parametrize("low", [0.9, 0.5, 0.1, 0.0])
+def test_a_ramp_keeps_its_samples_whatever_part_of_the_full_scale_it_spans(low: float) -> None:
+    """Triangles of 8 s at 100 Hz: 3.2 s from 10 to 90 % of what they span, 13 samples of it to a step."""
+    time_s = np.arange(0.0, 80.0, 0.01)
+    part = low + (1.0 - low) * np.abs((time_s / 4.0 + 1.0) % 2.0 - 1.0)
+    pressed = _run(part, step_s=0.01)
+    assert thinning([pressed], SCALE) == 13
+    # A load that stands still beside it has no ramp, however its noise slopes.
+    still = _run(0.5 + 1e-3 * (1.0 - low) * np.random.default_rng(1).standard_normal(8000), step_s=0.01)
+    assert thinning([pressed, still], SCALE) == 13
+
+
 # -- the load's rests and cycles --------------------------------------------------------------------------------------
 def test_a_unit_begins_unloaded_where_its_gauge_reads_a_quarter_of_a_still_load() -> None:
     """Over the first four tenths of a second, twenty samples."""
