@@ -53,7 +53,8 @@ class Excitation:
 
 
 def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excitation:
-    """What all sessions together hold."""
+    """What all sessions of which anything is fitted hold together: of the others nothing is learnt."""
+    sessions = [one for one in sessions if not one.held_out.all()]
     rises = [rise for session in sessions for rise in _rises(session, thresholds)]
     alike = float(np.log1p(thresholds.same))
     kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rises)

@@ -151,7 +151,7 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     clocks = aligned(recordings, integrity, thresholds)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
     held = None if count == len(recordings) else [index >= count for index in range(len(recordings))]
-    factor = thinning(clocks.recordings, scale)
+    factor = thinning(clocks.recordings[:count], scale)
     sessions = prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
     start = baseline_of(sessions, scale)
     if clocks.parts:  # against a load of another clock no relaxation is found

@@ -131,8 +131,9 @@ def test_these_are_all_in_their_order() -> None:
 def _session(load: Array, step_s: float = 0.1, thinned: int = 2, resting: Any = None) -> Any:
     at_rest = np.abs(load) < STANDARD.standing if resting is None else resting
     return SimpleNamespace(
-        conditions=Conditions(step_s * np.arange(load.size), load, step_s), thinned=thinned, resting=at_rest
-    )
+        conditions=Conditions(step_s * np.arange(load.size), load, step_s), thinned=thinned, resting=at_rest,
+        held_out=np.zeros(load.size, dtype=bool),
+    )  # fmt: skip
 
 
 def test_a_rise_is_told_by_its_middle_half() -> None:
@@ -288,6 +289,18 @@ def test_steps_low_loads_and_repeats() -> None:
         assert ("repeats" in found.present) is (repeats > 1)
     # Across recordings too.
     assert _shown(_rising((0.1, 1.0)), _rising((0.1, 1.0))).repeats == 2
+
+
+def test_a_recording_that_is_held_out_shows_nothing() -> None:
+    fitted = _rising((0.1, 1.0), (0.1, 1.0), (0.3, 0.5))
+    held = [_with([(False, 30), (True, 600)]), _rising(*[(1.0, 0.2)] * 9)]
+    assert "rates" not in _shown(fitted, *held).present  # nine of twelve rises are of one
+    for one in held:
+        one.held_out[:] = True
+    alone, beside = _shown(fitted), _shown(fitted, *held)
+    assert (beside.rates_per_s, beside.peaks, beside.repeats) == (alone.rates_per_s, alone.peaks, alone.repeats)
+    assert beside.present == alone.present
+    assert "rates" in beside.present
 
 
 def test_of_what_kind_a_repeat_is_goes_by_the_logarithm() -> None:

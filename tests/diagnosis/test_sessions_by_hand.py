@@ -16,6 +16,7 @@ from scipy.stats import norm
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import noise_sd, without_noise
+from smartshoe.diagnosis._procedure import _prepared
 from smartshoe.diagnosis._session import (
     Scale,
     Session,
@@ -32,6 +33,7 @@ from smartshoe.diagnosis._session import (
     thinning,
 )
 from smartshoe.errors import NotIdentifiableError
+from smartshoe.integrity import examine
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE
 from smartshoe.units import MILLIBAR
@@ -162,6 +164,15 @@ def test_a_ramp_keeps_its_samples_whatever_part_of_the_full_scale_it_spans(low: 
     # A load that stands still beside it has no ramp, however its noise slopes.
     still = _run(0.5 + 1e-3 * (1.0 - low) * np.random.default_rng(1).standard_normal(8000), step_s=0.01)
     assert thinning([pressed, still], SCALE) == 13
+
+
+def test_what_is_held_out_thins_nothing() -> None:
+    """Fast or long, it is seen at the rate that what is fitted asks for."""
+    slow, fast = (course(*((n, 1.0), (n, 0.0)) * 8) for n in (100, 8))
+    fitted = _run(slow, name="a")
+    for held in (_run(slow, name="b"), _run(fast, name="c"), _run(np.tile(slow, 60), name="d")):
+        given = _prepared([fitted, held], 1, examine([fitted, held], STANDARD), STANDARD)
+        assert [one.thinned for one in given.sessions] == [3, 3]
 
 
 # -- the load's rests and cycles --------------------------------------------------------------------------------------
