@@ -225,7 +225,7 @@ def _session(
         displacement = None if displacement is None else np.interp(even, time_s, displacement)
         time_s = even
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
-    weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
+    weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), load_n.size))
     quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s, thresholds)
     load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
