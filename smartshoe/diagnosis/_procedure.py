@@ -203,7 +203,7 @@ def _diagnosed(
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
     known = known_error(integrity, scale)
-    won = gain(baseline, best, scale)
+    won = gain(baseline, best, scale, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss)
