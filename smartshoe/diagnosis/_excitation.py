@@ -21,7 +21,7 @@ from smartshoe.signals.masks import runs_of
 class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
-    ``present`` holds the words of `Effect.exposed_by` that apply.
+    ``present`` holds the words of `Effect.exposed_by` that apply. ``is_judged``: what is held out can be used.
     """
 
     rates_per_s: tuple[float, ...]
@@ -29,10 +29,16 @@ class Excitation:
     repeats: int
     present: frozenset[str]
     thresholds: Thresholds
+    is_judged: bool = True
 
     def limits(self) -> list[str]:
         """A sentence for each thing of which this data says nothing."""
         said = []
+        if not self.is_judged:
+            said.append(
+                "nothing that is held out can be used: how good a simulation is on data it was not fitted to is not"
+                " known (hold out a recording whose reading follows its load)"
+            )
         if len(self.rates_per_s) <= 1:
             said.append(
                 "one loading rate only: nothing can be said of rate dependence, nor can viscous friction be told from"
@@ -54,6 +60,7 @@ class Excitation:
 
 def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excitation:
     """What all sessions of which anything is fitted hold together: of the others nothing is learnt."""
+    is_judged = any(one.judged.any() for one in sessions)
     sessions = [one for one in sessions if not one.held_out.all()]
     rises = [rise for session in sessions for rise in _rises(session, thresholds)]
     alike = float(np.log1p(thresholds.same))
@@ -80,7 +87,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
-    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds)
+    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged)
 
 
 class _Rise(NamedTuple):

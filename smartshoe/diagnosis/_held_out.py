@@ -6,6 +6,7 @@ every model alike, from what was fitted of it, or from all of it where nothing w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from smartshoe.diagnosis._sensitivity import nuisances
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import finite_or_none
 
 LEAST = 1e-300  # squared error, so that none has a logarithm
 MOST = 300.0  # logarithm of an error's growth, so that it is a number
@@ -48,7 +50,8 @@ def residual_of(session: Session, model: ExtendedModel) -> Array:
 class Errors:
     """Squared errors of the simulated reading by held-out load cycle: ``squares`` and ``counts`` (cycles,).
 
-    ``spread``: standard deviation of the held-out reading about each recording's own mean.
+    ``spread``: standard deviation of the held-out reading about each recording's own mean. Where nothing could be
+    judged there are no cycles, and every figure is NaN.
     """
 
     squares: Array
@@ -56,19 +59,24 @@ class Errors:
     spread: float
 
     @property
+    def is_empty(self) -> bool:
+        """Whether nothing could be judged."""
+        return not self.counts.size
+
+    @property
     def rmse(self) -> float:
         """Root mean square error, share of full scale."""
-        return float(np.sqrt(self.squares.sum() / max(float(self.counts.sum()), 1.0)))
+        return math.nan if self.is_empty else float(np.sqrt(self.squares.sum() / self.counts.sum()))
 
     @property
     def fit_percent(self) -> float:
         """100 (1 - error's norm over the reading's about its mean)."""
-        return 100.0 * (1.0 - self.rmse / self.spread) if self.spread > 0 else 0.0
+        return 100.0 * (1.0 - self.rmse / self.spread) if self.spread != 0.0 else 0.0
 
     @property
     def variance_explained_percent(self) -> float:
         """100 (1 - error's variance over the reading's)."""
-        return 100.0 * (1.0 - (self.rmse / self.spread) ** 2) if self.spread > 0 else 0.0
+        return 100.0 * (1.0 - (self.rmse / self.spread) ** 2) if self.spread != 0.0 else 0.0
 
 
 def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
@@ -89,7 +97,7 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
         spread += float(np.sum((values - values.mean()) ** 2))
         samples += values.size
     if not squares:
-        return Errors(np.zeros(1), np.zeros(1), 0.0)
+        return Errors(np.zeros(0), np.zeros(0), math.nan)
     joined, number_of = np.concatenate(squares), np.concatenate(counts)
     return Errors(joined[number_of > 0], number_of[number_of > 0], float(np.sqrt(spread / samples)))
 
@@ -98,7 +106,7 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
 class Gain:
     """Errors before and after in ``unit``, and by how many percent the error falls, with its 95 % interval.
 
-    The interval of one cycle, which knows none, is the gain itself. ``is_loss``: that the error grows, by what is
+    Of one cycle, of which there is none, the interval is the gain itself. ``is_loss``: that the error grows, by what is
     material, beyond chance, and over more than a few cycles.
     """
 
@@ -112,11 +120,11 @@ class Gain:
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
         return {
-            "rmse_before": self.rmse_before,
-            "rmse_after": self.rmse_after,
+            "rmse_before": finite_or_none(self.rmse_before),
+            "rmse_after": finite_or_none(self.rmse_after),
             "unit": self.unit,
-            "gain_percent": self.gain_percent,
-            "ci95": list(self.ci95),
+            "gain_percent": finite_or_none(self.gain_percent),
+            "ci95": [finite_or_none(bound) for bound in self.ci95],
         }
 
 
@@ -127,6 +135,9 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | N
     knows too little: of two that are alike by chance it finds a loss beyond chance in one case of four.
     """
     decided = thresholds or Thresholds()
+    unit, span = scale.unit.symbol, abs(scale.reading)
+    if before.is_empty:
+        return Gain(math.nan, math.nan, unit, math.nan, (math.nan, math.nan))
     n = before.squares.size
     total = _log_ratio(before.squares.sum(), after.squares.sum())
     low = high = total
@@ -138,7 +149,6 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | N
     ci95 = float(_percent(high)), float(_percent(low))
     grows = after.rmse - before.rmse > decided.material
     is_loss = bool(grows and ci95[1] < 0.0 and n >= decided.few)
-    unit, span = scale.unit.symbol, abs(scale.reading)
     return Gain(before.rmse * span, after.rmse * span, unit, float(_percent(total)), ci95, is_loss)
 
 
