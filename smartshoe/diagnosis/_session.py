@@ -159,13 +159,14 @@ def prepare(
     thresholds: Thresholds,
 ) -> list[Session]:
     """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out."""
-    sessions = []
+    made: dict[int, Session] = {}
     left_behind: dict[str, dict[str, float]] = {}
-    for index, (recording, mask) in enumerate(zip(recordings, usable, strict=True)):
+    for index in _by_continuation(recordings):
+        recording = recordings[index]
         before = left_behind.get(recording.metadata.get("continues", ""), {})
-        session = _session(recording, index, mask, scale, factor, before, thresholds)
-        left_behind[recording.name] = _left_behind(session.conditions, thresholds)
-        sessions.append(session)
+        made[index] = _session(recording, index, usable[index], scale, factor, before, thresholds)
+        left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
+    sessions = [made[index] for index in range(len(recordings))]
     if held_out is not None:
         return [
             replace(session, held_out=np.full(session.reading.size, out))
@@ -178,6 +179,22 @@ def prepare(
         kept.append(replace(session, held_out=(number + 1) % thresholds.held_out_every == 0))
         count = int(number[-1]) + 1
     return kept
+
+
+def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
+    """Places of the recordings in their order, but each after the one that it continues."""
+    order: list[int] = []
+    waiting = list(range(len(recordings)))
+    while waiting:
+        ready = [k for k in waiting if not any(continues(recordings[k], recordings[j]) for j in waiting if j != k)]
+        order += ready or waiting  # of those that continue each other in a ring none is the first
+        waiting = [k for k in waiting if k not in order]
+    return order
+
+
+def continues(later: Recording, earlier: Recording) -> bool:
+    """Whether a recording carries on from another one."""
+    return later.metadata.get("continues") == earlier.name
 
 
 def at_full_rate(
