@@ -80,7 +80,6 @@ class Session:
     resting: Mask
     thinned: int
     quiet: Quiet
-    displacement: Array | None = None
 
     @property
     def fitted(self) -> Mask:
@@ -231,15 +230,12 @@ def _session(
     neighbour = _neighbour(recording)
     if neighbour is not None:
         extra["neighbour"] = neighbour.in_unit(scale.unit) / abs(scale.reading)
-    crosshead = _named(recording, "displacement")
-    displacement = crosshead.si if crosshead is not None else None
     if not recording.is_uniform:
         even = step_s * np.arange(int(time_s[-1] / step_s) + 1)
         nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
         good = good[nearest] & (np.abs(time_s[nearest] - even) < step_s)
         load_n, reading = np.interp(even, time_s, load_n), np.interp(even, time_s, reading)
         extra = {name: np.interp(even, time_s, values) for name, values in extra.items()}
-        displacement = None if displacement is None else np.interp(even, time_s, displacement)
         time_s = even
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
     weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), load_n.size))
@@ -279,7 +275,6 @@ def _session(
         np.abs(load - base) < thresholds.standing,
         factor,
         quiet,
-        smoothed(displacement, weights, factor) if displacement is not None else None,
     )
 
 

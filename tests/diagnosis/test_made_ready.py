@@ -221,7 +221,6 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
         pressure_mbar=140.0 * load,
         pressure_2_mbar=35.0 * load,
         temperature_k=300.0 + 0.1 * time_s,
-        displacement_mm=4.0 * load,
     )
     (session,), scale = _prepared(run)
     at = session.conditions
@@ -229,10 +228,8 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
     assert at.temperature_k[[0, -1]] == pytest.approx([0.0, 0.1 * time_s[-1]], abs=1e-6)
     assert at.neighbour is not None
     assert at.neighbour.max() == pytest.approx(35.0 / abs(scale.reading), rel=0.03)
-    assert session.displacement is not None
-    assert session.displacement.max() == pytest.approx(0.004, rel=0.03)
     (plain,), _ = _prepared(_pressed(load))
-    assert (plain.conditions.temperature_k, plain.conditions.neighbour, plain.displacement) == (None, None, None)
+    assert (plain.conditions.temperature_k, plain.conditions.neighbour) == (None, None)
 
 
 def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> None:

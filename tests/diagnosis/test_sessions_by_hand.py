@@ -285,7 +285,6 @@ def test_of_two_channels_in_the_readings_unit_the_first_is_the_neighbour_but_no_
     assert both.conditions.neighbour == pytest.approx(np.full(PRESSES.size, 0.1))
     (none,) = _sessions(_run(PRESSES, displacement_mm=PRESSES))
     assert none.conditions.neighbour is None
-    assert none.displacement == pytest.approx(1e-3 * smoothed(PRESSES, kernel(3), 1))
 
 
 def test_at_the_full_rate_each_sample_is_of_the_nearest_thinned_one() -> None:
