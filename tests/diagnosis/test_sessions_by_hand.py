@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._denoise import noise_sd, without_noise
+from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._procedure import _prepared
 from smartshoe.diagnosis._session import (
     Scale,
@@ -363,6 +363,20 @@ def test_each_sample_is_of_the_longest_line_that_leaves_noise(step_s: float) -> 
     found, expected = without_noise(noisy, step_s, 0.003, STANDARD), _best_line(noisy, step_s, 0.003)
     assert found[0] == pytest.approx(expected[0], abs=1e-9)
     assert found[1] == pytest.approx(expected[1])
+
+
+@pytest.mark.parametrize("half", [100, 200, 1000])
+def test_lines_through_many_neighbours_are_those_of_plain_sums(half: int) -> None:
+    """At 10 kHz a tenth of a second either way is a thousand samples."""
+    signal = course((900, 0.0), (1500, 1.0), (700, 1.0)) - 0.4 + 1e-4 * np.random.default_rng(5).standard_normal(3101)
+    mean, slope, left, spread = _lines(signal, half)
+    k = np.arange(-half, half + 1.0)
+    windows = np.lib.stride_tricks.sliding_window_view(signal, k.size)
+    assert mean == pytest.approx(windows.mean(axis=1), abs=1e-13)
+    assert spread == pytest.approx(float(k @ k))
+    assert slope == pytest.approx(windows @ k / spread, abs=1e-15)
+    rest = windows - windows.mean(axis=1, keepdims=True) - np.outer(windows @ k / spread, k)
+    assert left == pytest.approx(np.sum(rest**2, axis=1) / (k.size - 2), abs=1e-13)
 
 
 def test_a_short_load_is_left_as_it_is() -> None:
