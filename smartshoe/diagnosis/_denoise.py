@@ -9,10 +9,13 @@ short, as far as what a line leaves is noise (after the crossing-lines idea of K
 from __future__ import annotations
 
 import numpy as np
+from scipy.signal import oaconvolve
 
 from smartshoe.arrays import Array
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import robust_sd
+
+FEW_TAPS = 300  # of a window: with more, blocks in the frequency domain take less time than sums
 
 
 def noise_sd(signal: Array, thresholds: Thresholds) -> float:
@@ -64,8 +67,9 @@ def _lines(signal: Array, half: int) -> tuple[Array, Array, Array, float]:
     k = np.arange(-half, half + 1, dtype=float)
     spread = float(np.sum(k**2))
     windows = np.ones(k.size)
-    mean = np.convolve(signal, windows, "valid") / k.size
-    slope = np.convolve(signal, k[::-1], "valid") / spread
-    power = np.convolve(signal**2, windows, "valid")
+    convolve = np.convolve if k.size < FEW_TAPS else oaconvolve
+    mean = convolve(signal, windows, "valid") / k.size
+    slope = convolve(signal, k[::-1], "valid") / spread
+    power = convolve(signal**2, windows, "valid")
     left = np.maximum(power - k.size * mean**2 - spread * slope**2, 0.0) / (k.size - 2)
     return mean, slope, left, spread

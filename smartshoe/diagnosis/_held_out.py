@@ -6,18 +6,23 @@ every model alike, from what was fitted of it, or from all of it where nothing w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._sensitivity import nuisances
 from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import finite_or_none
 
-RESAMPLED = 400  # draws, of which an interval is known to some percent of its width
+LEAST = 1e-300  # squared error, so that none has a logarithm
+MOST = 300.0  # logarithm of an error's growth, so that it is a number
 
 
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
@@ -45,7 +50,8 @@ def residual_of(session: Session, model: ExtendedModel) -> Array:
 class Errors:
     """Squared errors of the simulated reading by held-out load cycle: ``squares`` and ``counts`` (cycles,).
 
-    ``spread``: standard deviation of the held-out reading about each recording's own mean.
+    ``spread``: standard deviation of the held-out reading about each recording's own mean. Where nothing could be
+    judged there are no cycles, and every figure is NaN.
     """
 
     squares: Array
@@ -53,19 +59,24 @@ class Errors:
     spread: float
 
     @property
+    def is_empty(self) -> bool:
+        """Whether nothing could be judged."""
+        return not self.counts.size
+
+    @property
     def rmse(self) -> float:
         """Root mean square error, share of full scale."""
-        return float(np.sqrt(self.squares.sum() / max(float(self.counts.sum()), 1.0)))
+        return math.nan if self.is_empty else float(np.sqrt(self.squares.sum() / self.counts.sum()))
 
     @property
     def fit_percent(self) -> float:
         """100 (1 - error's norm over the reading's about its mean)."""
-        return 100.0 * (1.0 - self.rmse / self.spread) if self.spread > 0 else 0.0
+        return 100.0 * (1.0 - self.rmse / self.spread) if self.spread != 0.0 else 0.0
 
     @property
     def variance_explained_percent(self) -> float:
         """100 (1 - error's variance over the reading's)."""
-        return 100.0 * (1.0 - (self.rmse / self.spread) ** 2) if self.spread > 0 else 0.0
+        return 100.0 * (1.0 - (self.rmse / self.spread) ** 2) if self.spread != 0.0 else 0.0
 
 
 def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
@@ -86,50 +97,69 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
         spread += float(np.sum((values - values.mean()) ** 2))
         samples += values.size
     if not squares:
-        return Errors(np.zeros(1), np.zeros(1), 0.0)
+        return Errors(np.zeros(0), np.zeros(0), math.nan)
     joined, number_of = np.concatenate(squares), np.concatenate(counts)
     return Errors(joined[number_of > 0], number_of[number_of > 0], float(np.sqrt(spread / samples)))
 
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Errors before and after in ``unit``, and by how many percent the error falls, with its 95 % interval."""
+    """Errors before and after in ``unit``, and by how many percent the error falls, with its 95 % interval.
+
+    Of one cycle, of which there is none, the interval is the gain itself. ``is_loss``: that the error grows, by what is
+    material, beyond chance, and over more than a few cycles.
+    """
 
     rmse_before: float
     rmse_after: float
     unit: str
     gain_percent: float
     ci95: tuple[float, float]
-
-    @property
-    def is_loss(self) -> bool:
-        """Whether the error grows, beyond chance."""
-        return self.ci95[1] < 0.0
+    is_loss: bool = False
 
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
         return {
-            "rmse_before": self.rmse_before,
-            "rmse_after": self.rmse_after,
+            "rmse_before": finite_or_none(self.rmse_before),
+            "rmse_after": finite_or_none(self.rmse_after),
             "unit": self.unit,
-            "gain_percent": self.gain_percent,
-            "ci95": list(self.ci95),
+            "gain_percent": finite_or_none(self.gain_percent),
+            "ci95": [finite_or_none(bound) for bound in self.ci95],
         }
 
 
-def gain(before: Errors, after: Errors, scale: Scale) -> Gain:
-    """What ``after`` gains over ``before``: the interval from resampled load cycles (Efron and Tibshirani 1993)."""
-    percent = _percent(before.squares.sum(), after.squares.sum())
-    n = before.squares.size
-    drawn = np.random.default_rng(0).integers(0, n, size=(RESAMPLED, n))
-    again = _percent(before.squares[drawn].sum(axis=1), after.squares[drawn].sum(axis=1))
-    low, high = np.percentile(again, [2.5, 97.5]) if n > 1 else (percent, percent)
+def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | None = None) -> Gain:
+    """What ``after`` gains over ``before``: the interval by Student's t and the jackknife over load cycles.
+
+    The jackknife is of the logarithm of the errors' ratio (Efron and Tibshirani 1993), since of few cycles resampling
+    knows too little: of two that are alike by chance it finds a loss beyond chance in one case of four.
+    """
+    decided = thresholds or Thresholds()
     unit, span = scale.unit.symbol, abs(scale.reading)
-    return Gain(before.rmse * span, after.rmse * span, unit, float(percent), (float(low), float(high)))
+    if before.is_empty:
+        return Gain(math.nan, math.nan, unit, math.nan, (math.nan, math.nan))
+    n = before.squares.size
+    total = _log_ratio(before.squares.sum(), after.squares.sum())
+    low = high = total
+    if n > 1:
+        without = _log_ratio(before.squares.sum() - before.squares, after.squares.sum() - after.squares)
+        sd = float(np.sqrt((n - 1) * np.var(without)))
+        reach = -float(stdtrit(n - 1, 0.025)) * sd
+        low, high = total - reach, total + reach
+    ci95 = float(_percent(high)), float(_percent(low))
+    grows = after.rmse - before.rmse > decided.material
+    is_loss = bool(grows and ci95[1] < 0.0 and n >= decided.few)
+    return Gain(before.rmse * span, after.rmse * span, unit, float(_percent(total)), ci95, is_loss)
 
 
-def _percent(before: Array | float, after: Array | float) -> Array:
-    return np.asarray(100.0 * (1.0 - np.sqrt(np.asarray(after) / np.maximum(before, 1e-300))))
+def _log_ratio(before: Array | float, after: Array | float) -> Array:
+    """Logarithm of a squared error over another."""
+    return np.asarray(np.log(np.maximum(after, LEAST) / np.maximum(before, LEAST)))
+
+
+def _percent(log_ratio: Array | float) -> Array:
+    """By how much an error falls whose square changes so."""
+    return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), MOST))))
 
 
 def force_rmse_n(fine: Sequence[Session], model: ExtendedModel) -> float:

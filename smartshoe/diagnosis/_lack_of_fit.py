@@ -52,20 +52,17 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
     pairs = 0
     for rows, share in repeats(sessions, residuals, thresholds.cycle):
         count = rows.shape[0]
-        gram = rows @ rows.T / PLACES
-        products = gram[np.triu_indices(count, 1)]
+        pair_count = count * (count - 1) // 2
+        # Over all pairs, products add up to the sum's square less the squares.
+        mean = (float(np.sum(rows.sum(axis=0) ** 2)) - float(np.sum(rows**2))) / (2 * pair_count * PLACES)
         # Spread of a product of independent noises, from the rows' own autocovariance about their mean.
-        noise = rows - rows.mean(axis=0)
-        scale = count / (count - 1)
-        auto = np.zeros(PLACES)
-        for row in noise:
-            auto += np.correlate(row, row, "full")[PLACES - 1 :] / PLACES
-        auto *= scale / count
+        spectrum = np.sum(np.abs(np.fft.rfft(rows - rows.mean(axis=0), 2 * PLACES, axis=1)) ** 2, axis=0)
+        auto = np.fft.irfft(spectrum, 2 * PLACES)[:PLACES] / (PLACES * (count - 1))
         fewer = 1 - np.arange(1, auto.size) / auto.size
         spread = (auto[0] ** 2 + 2 * np.sum(fewer * auto[1:] ** 2)) / auto.size
-        power += share * float(products.mean())
-        variance += share**2 * spread / products.size
-        pairs += products.size
+        power += share * mean
+        variance += share**2 * spread / pair_count
+        pairs += pair_count
     if not pairs:
         return LackOfFit(0.0, 0.0, 0, thresholds)
     z = power / max(float(np.sqrt(variance)), 1e-300)
@@ -83,15 +80,14 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
     for session, residual in zip(sessions, residuals, strict=True):
         load = session.conditions.load
         total += load.size
-        for number in range(int(session.cycle[-1]) + 1):
-            index = np.flatnonzero(session.cycle == number)
-            part = load[index]
-            low, peak = float(load.min()), float(part.max())
-            tall = peak - low > 0.1 * np.ptp(load)
-            inside = np.flatnonzero(part > low + 0.1 * (peak - low)) if tall else np.zeros(0, dtype=int)
+        low, tall = float(load.min()), 0.1 * float(np.ptp(load))
+        starts = np.flatnonzero(np.diff(session.cycle, prepend=-1))
+        for start, part in zip(starts, np.split(load, starts[1:]), strict=True):
+            peak = float(part.max())
+            inside = np.flatnonzero(part > low + 0.1 * (peak - low)) if peak - low > tall else np.zeros(0, dtype=int)
             if inside.size < 8:
                 continue
-            first, last = index[inside[0]], index[inside[-1]]
+            first, last = int(start + inside[0]), int(start + inside[-1])
             span = slice(first, last + 1)
             if session.usable[span].mean() < 0.9:
                 continue

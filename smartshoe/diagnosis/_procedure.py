@@ -173,7 +173,7 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     count = held_out.count(False)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
     held = held_out if any(held_out) else None
-    factor = thinning(clocks.recordings, scale)
+    factor = thinning(clocks.recordings[:count], scale)
     sessions = [
         replace(one, index=clocks.places[one.index])
         for one in prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
@@ -231,7 +231,7 @@ def _diagnosed(
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
     known = known_error(integrity.faults, sessions, scale)
-    won = gain(baseline, best, scale)
+    won = gain(baseline, best, scale, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss)

@@ -92,7 +92,7 @@ def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: T
     """The bin of load and direction, and the stretch of time, that hold most of the residual's slow part."""
     load, rate, error, names = [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
-        width = max(1, round(0.5 / session.conditions.step_s))
+        width = min(max(1, round(0.5 / session.conditions.step_s)), residual.size)
         smooth = np.convolve(np.where(session.usable, residual, 0.0), np.full(width, 1.0 / width), "same")
         load.append(session.conditions.load)
         rate.append(session.conditions.rate_per_s)
@@ -112,11 +112,11 @@ def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: T
     numbers = np.array(names)
     worst = max(range(len(sessions)), key=lambda i: float(power[numbers == i].mean()))
     own = power[numbers == worst]
-    tenth = np.array_split(own, 10)
-    at = int(np.argmax([float(part.mean()) for part in tenth]))
+    parts = min(10, own.size)
+    at = int(np.argmax([float(part.mean()) for part in np.array_split(own, parts)]))
     duration = sessions[worst].conditions.time_s[-1]
     return (
         f"{100 * table[d, k] / total:.0f} % of it sits at {25 * k}-{25 * (k + 1)} % of the load {doing}"
         f" ({100 * share[d, k]:.0f} % of the samples); it is largest in {sessions[worst].recording.name},"
-        f" {at * duration / 10:.0f}-{(at + 1) * duration / 10:.0f} s"
+        f" {at * duration / parts:.0f}-{(at + 1) * duration / parts:.0f} s"
     )

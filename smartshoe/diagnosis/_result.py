@@ -99,7 +99,10 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
-    """How a model does on held-out data; ``structure_rms`` is what its residual holds beside noise (reading's unit)."""
+    """How a model does on held-out data; ``structure_rms`` is what its residual holds beside noise (reading's unit).
+
+    NaN where nothing could be judged.
+    """
 
     rmse: float
     unit: str
@@ -111,11 +114,11 @@ class GoodnessOfFit:
     def to_dict(self) -> dict[str, Any]:
         """The contract's ``baseline`` and ``extended``."""
         return {
-            "rmse": {"value": self.rmse, "unit": self.unit},
-            "fit_percent": self.fit_percent,
+            "rmse": {"value": finite_or_none(self.rmse), "unit": self.unit},
+            "fit_percent": finite_or_none(self.fit_percent),
             "force_rmse_n": finite_or_none(self.force_rmse_n),
             "structure_rms": {"value": self.structure_rms, "unit": self.unit},
-            "variance_explained_percent": self.variance_explained_percent,
+            "variance_explained_percent": finite_or_none(self.variance_explained_percent),
         }
 
 
@@ -262,8 +265,8 @@ class Diagnosis(Summarised):
             "baseline": self.baseline.to_dict() if self.baseline else nothing,
             "extended": self.extended.to_dict() if self.extended else nothing,
             "held_out": self.gain.to_dict() if self.gain else None,
-            "explainable_percent": self.explainable_percent,
-            "explained_percent": self.explained_percent,
+            "explainable_percent": finite_or_none(self.explainable_percent),
+            "explained_percent": finite_or_none(self.explained_percent),
             "rivals": [{"effect": rival.effect, "margin": finite_or_none(rival.margin)} for rival in self.rivals],
             "next_experiment": self.next_experiment.to_dict() if self.next_experiment else None,
             "limits": list(self.limits),

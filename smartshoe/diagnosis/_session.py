@@ -30,6 +30,7 @@ SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 6.0  # times, beyond what keeps the fastest ramp
+LEAST_SPAN = 0.02  # of the widest: a load that moves by less has no ramp but its noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +80,6 @@ class Session:
     resting: Mask
     thinned: int
     quiet: Quiet
-    displacement: Array | None = None
 
     @property
     def fitted(self) -> Mask:
@@ -126,7 +126,7 @@ def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
 def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
     """By how much the samples may be thinned so that the fastest ramp keeps its shape."""
     factors = []
-    for recording in recordings:
+    for recording, span in zip(recordings, _spans(recordings, scale), strict=True):
         step_s = recording.sample_time_s
         load = recording.force_n / scale.load_n
         window = max(1, round(0.05 / step_s))
@@ -135,11 +135,18 @@ def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
             continue
         slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
         fastest = float(np.percentile(slope, 99.5))
-        ramp_s = 0.8 / fastest if fastest > 0 else recording.duration_s
+        ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
         factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s)))
     total = sum(len(recording) for recording in recordings)
     shape = min(factors)
     return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))
+
+
+def _spans(recordings: Sequence[Recording], scale: Scale) -> Array:
+    """By how much each load moves, in full scales; one where that is nearly all, or so little that it has no ramp."""
+    spans = np.array([np.ptp(np.percentile(one.force_n, [0.1, 99.9])) for one in recordings]) / scale.load_n
+    is_part = (spans > LEAST_SPAN * spans.max()) & (spans < 1.0 - LEAST_SPAN)
+    return np.where(is_part, spans, 1.0)
 
 
 def prepare(
@@ -151,13 +158,14 @@ def prepare(
     thresholds: Thresholds,
 ) -> list[Session]:
     """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out."""
-    sessions = []
+    made: dict[int, Session] = {}
     left_behind: dict[str, dict[str, float]] = {}
-    for index, (recording, mask) in enumerate(zip(recordings, usable, strict=True)):
+    for index in _by_continuation(recordings):
+        recording = recordings[index]
         before = left_behind.get(recording.metadata.get("continues", ""), {})
-        session = _session(recording, index, mask, scale, factor, before, thresholds)
-        left_behind[recording.name] = _left_behind(session.conditions, thresholds)
-        sessions.append(session)
+        made[index] = _session(recording, index, usable[index], scale, factor, before, thresholds)
+        left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
+    sessions = [made[index] for index in range(len(recordings))]
     if held_out is not None:
         return [
             replace(session, held_out=np.full(session.reading.size, out))
@@ -170,6 +178,22 @@ def prepare(
         kept.append(replace(session, held_out=(number + 1) % thresholds.held_out_every == 0))
         count = int(number[-1]) + 1
     return kept
+
+
+def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
+    """Places of the recordings in their order, but each after the one that it continues."""
+    order: list[int] = []
+    waiting = list(range(len(recordings)))
+    while waiting:
+        ready = [k for k in waiting if not any(continues(recordings[k], recordings[j]) for j in waiting if j != k)]
+        order += ready or waiting  # of those that continue each other in a ring none is the first
+        waiting = [k for k in waiting if k not in order]
+    return order
+
+
+def continues(later: Recording, earlier: Recording) -> bool:
+    """Whether a recording carries on from another one."""
+    return later.metadata.get("continues") == earlier.name
 
 
 def at_full_rate(
@@ -206,18 +230,15 @@ def _session(
     neighbour = _neighbour(recording)
     if neighbour is not None:
         extra["neighbour"] = neighbour.in_unit(scale.unit) / abs(scale.reading)
-    crosshead = _named(recording, "displacement")
-    displacement = crosshead.si if crosshead is not None else None
     if not recording.is_uniform:
         even = step_s * np.arange(int(time_s[-1] / step_s) + 1)
         nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
         good = good[nearest] & (np.abs(time_s[nearest] - even) < step_s)
         load_n, reading = np.interp(even, time_s, load_n), np.interp(even, time_s, reading)
         extra = {name: np.interp(even, time_s, values) for name, values in extra.items()}
-        displacement = None if displacement is None else np.interp(even, time_s, displacement)
         time_s = even
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
-    weights = kernel(1 if like is not None else max(factor, LEAST_WINDOW))
+    weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), load_n.size))
     quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s, thresholds)
     load = quiet.load
     low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
@@ -254,7 +275,6 @@ def _session(
         np.abs(load - base) < thresholds.standing,
         factor,
         quiet,
-        smoothed(displacement, weights, factor) if displacement is not None else None,
     )
 
 

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, with_usual_arm
-from smartshoe.diagnosis._held_out import Errors, _percent, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis._held_out import Errors, errors, force_rmse_n, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
@@ -382,17 +383,66 @@ def test_errors_are_sums_over_held_out_cycles_and_deviations_from_each_mean() ->
     assert (level.fit_percent, level.variance_explained_percent) == (0.0, 0.0)
 
 
-def test_a_gain_is_of_norms_and_its_interval_of_draws_of_cycles() -> None:
+def test_a_gain_is_of_norms_and_its_interval_of_cycles_left_out_in_turn() -> None:
     rng = np.random.default_rng(3)
     before = Errors(rng.uniform(1.0, 2.0, 12), np.full(12, 5.0), 1.0)
     after = Errors(rng.uniform(0.1, 1.0, 12), np.full(12, 5.0), 1.0)
+
+    def gained(log_ratio: float) -> float:
+        return 100.0 * (1.0 - math.exp(0.5 * log_ratio))
+
+    for count in (12, 3, 2):
+        a, b = after.squares[:count], before.squares[:count]
+        found = gain(replace(before, squares=b), replace(after, squares=a), SCALE)
+        whole = math.log(sum(a) / sum(b))
+        assert found.gain_percent == pytest.approx(gained(whole))
+        kept = [[k for k in range(count) if k != out] for out in range(count)]
+        logs = [math.log(sum(a[k]) / sum(b[k])) for k in kept]
+        sd = math.sqrt((count - 1) / count * sum((one - sum(logs) / count) ** 2 for one in logs))
+        reach = float(student.isf(0.025, count - 1)) * sd
+        assert found.ci95 == pytest.approx((gained(whole + reach), gained(whole - reach)))
+        assert found.ci95[0] < found.gain_percent < found.ci95[1]
+
+
+def test_no_error_at_all_is_a_number_too() -> None:
+    none, some = (Errors(np.full(3, size), np.full(3, 5.0), 1.0) for size in (0.0, 1.0))
+    one = replace(some, squares=np.array([1.0, 0.0, 0.0]))
+    assert gain(none, none, SCALE).gain_percent == 0.0
+    assert gain(some, none, SCALE).gain_percent == pytest.approx(100.0)
+    for before, after in ((none, some), (one, some), (some, one)):
+        found = gain(before, after, SCALE)
+        assert np.isfinite([found.gain_percent, *found.ci95]).all()
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 6, 12])
+def test_models_that_are_alike_differ_beyond_chance_as_often_as_an_interval_says(count: int) -> None:
+    """About one in forty on either side. Cycles of unlike sizes, and errors of which the models share a half."""
+    rng = np.random.default_rng(count)
+    drawn = 2000
+    size = rng.uniform(0.5, 1.5, (drawn, count, 1))
+    shared, own, other = size * rng.standard_normal((3, drawn, count, 10))
+    times = np.ones(count)
+    losses = gains = certain = 0
+    for first, second in zip(np.sum((shared + own) ** 2, 2), np.sum((shared + other) ** 2, 2), strict=True):
+        found = gain(Errors(first, times, 1.0), Errors(second, times, 1.0), SCALE)
+        losses += found.ci95[1] < 0.0
+        gains += found.ci95[0] > 0.0
+        certain += found.is_loss
+    assert 0.015 * drawn < min(losses, gains)
+    assert max(losses, gains) < 0.04 * drawn
+    assert certain == (losses if count >= STANDARD.few else 0)
+
+
+@pytest.mark.parametrize(("count", "grows", "is_loss"), [(5, 1.001, True), (4, 1.001, False), (5, 0.999, False)])
+def test_a_loss_is_of_what_is_material_and_of_more_than_a_few_cycles(count: int, grows: float, is_loss: bool) -> None:
+    rmse = 0.01 + grows * STANDARD.material
+    cycles = np.linspace(0.9, 1.1, count)
+    before, after = (Errors(cycles * square, np.ones(count), 1.0) for square in (1e-4, rmse**2))
     found = gain(before, after, SCALE)
-    drawn = np.random.default_rng(0).integers(0, 12, size=(400, 12))
-    again = [100.0 * (1.0 - math.sqrt(sum(after.squares[d]) / sum(before.squares[d]))) for d in drawn]
-    assert found.ci95 == pytest.approx((np.percentile(again, 2.5), np.percentile(again, 97.5)))
-    pair = gain(replace(before, squares=before.squares[:2]), replace(after, squares=after.squares[:2]), SCALE)
-    assert pair.ci95[0] < pair.gain_percent < pair.ci95[1]
-    assert float(_percent(0.0, 0.0)) == 100.0
+    assert found.ci95[1] < 0.0
+    assert found.is_loss is is_loss
+    coarse = replace(STANDARD, material=2.0 * STANDARD.material)
+    assert not gain(before, after, SCALE, coarse).is_loss
 
 
 def test_a_forces_error_is_that_of_the_compensated_reading() -> None:

@@ -53,7 +53,7 @@ def test_each_place_of_an_even_grid_is_of_the_sample_that_is_near() -> None:
     reading[[60, 300]] = np.nan
     run = Recording.from_arrays(
         time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * reading, pressure_2_mbar=14.0 * time_s,
-        temperature_k=300.0 + time_s, displacement_mm=time_s,
+        temperature_k=300.0 + time_s,
     )  # fmt: skip
     assert not run.is_uniform
     session = _prepared(run)
@@ -75,7 +75,6 @@ def test_each_place_of_an_even_grid_is_of_the_sample_that_is_near() -> None:
     beside = session.conditions
     assert beside.temperature_k == pytest.approx(smoothed(np.interp(even, t, t), kernel(3), 1))
     assert beside.neighbour == pytest.approx(0.1 * smoothed(np.interp(even, t, time_s), kernel(3), 1))
-    assert session.displacement == pytest.approx(1e-3 * smoothed(np.interp(even, t, time_s), kernel(3), 1))
 
 
 def _levels(*levels: float) -> Array:

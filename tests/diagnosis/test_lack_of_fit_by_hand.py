@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import tracemalloc
 from types import SimpleNamespace
 from typing import Any
 
@@ -149,6 +150,33 @@ def test_the_power_of_what_repeats_and_its_score_are_those_of_written_out_sums(t
     turned = repeating(sessions, [one * sign for one, sign in zip(residuals, signs, strict=True)], STANDARD)
     if turned.z < 0.0:
         assert turned.rms == 0.0
+
+
+def test_of_many_repeats_the_sums_are_those_over_all_pairs_in_memory_for_one_each() -> None:
+    count = 1000
+    load, cycle = _pressed(*[(16, 1.0)] * count)
+    residual = 0.02 * load * (1.0 - load) + np.random.default_rng(4).standard_normal(load.size)
+    ((rows, share),) = repeats([_session(load, cycle)], [residual], ALIKE)
+    products = (rows @ rows.T / PLACES)[np.triu_indices(count, 1)]
+    noise = rows - rows.mean(axis=0)
+    auto = sum(np.correlate(row, row, "full")[PLACES - 1 :] for row in noise) / (PLACES * (count - 1))
+    spread = (auto[0] ** 2 + 2.0 * np.sum((1.0 - np.arange(1, PLACES) / PLACES) * auto[1:] ** 2)) / PLACES
+    tracemalloc.start()
+    found = repeating([_session(load, cycle)], [residual], STANDARD)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert found.rms == pytest.approx(math.sqrt(max(share * products.mean(), 0.0)), rel=1e-10)
+    assert found.z == pytest.approx(products.mean() / math.sqrt(spread / products.size), rel=1e-10)
+    assert found.pairs == products.size
+    assert most < 10 * rows.nbytes  # all products would be sixteen times as many
+
+
+def test_cycles_that_have_no_sample_are_passed_over() -> None:
+    """Few thinned samples, cut into more parts of the time than there are."""
+    load, cycle = _pressed((40, 1.0), (40, 1.0))
+    (told,), (spaced,) = (repeats([_session(load, by * cycle)], [load], ALIKE) for by in (1, 5))
+    assert np.array_equal(told[0], spaced[0])
+    assert repeating([_session(np.linspace(0.0, 1.0, 4), np.arange(4) * 3)], [np.ones(4)], STANDARD).pairs == 0
 
 
 def test_a_single_pair_is_enough_to_repeat_and_not_to_be_significant() -> None:

@@ -221,7 +221,6 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
         pressure_mbar=140.0 * load,
         pressure_2_mbar=35.0 * load,
         temperature_k=300.0 + 0.1 * time_s,
-        displacement_mm=4.0 * load,
     )
     (session,), scale = _prepared(run)
     at = session.conditions
@@ -229,10 +228,8 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
     assert at.temperature_k[[0, -1]] == pytest.approx([0.0, 0.1 * time_s[-1]], abs=1e-6)
     assert at.neighbour is not None
     assert at.neighbour.max() == pytest.approx(35.0 / abs(scale.reading), rel=0.03)
-    assert session.displacement is not None
-    assert session.displacement.max() == pytest.approx(0.004, rel=0.03)
     (plain,), _ = _prepared(_pressed(load))
-    assert (plain.conditions.temperature_k, plain.conditions.neighbour, plain.displacement) == (None, None, None)
+    assert (plain.conditions.temperature_k, plain.conditions.neighbour) == (None, None)
 
 
 def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> None:
@@ -277,6 +274,32 @@ def test_a_later_recording_knows_the_load_that_went_before_and_the_one_after_it_
         assert told["cycles"] == 6 * times
         assert told["time_s"] == pytest.approx(times * STEP_S * load.size, rel=0.01)
         assert told["largest_load"] == pytest.approx(1.0, abs=0.05)
+    # In whatever order they are given.
+    for order in ((2, 1, 0), (1, 2, 0), (0, 2, 1)):
+        again, _ = _prepared(*(runs[k] for k in order))
+        assert [one.conditions.before for one in again] == [before[k] for k in order]
+        assert [one.recording.name for one in again] == [runs[k].name for k in order]
+        assert [one.index for one in again] == [0, 1, 2]
+
+
+def test_recordings_that_continue_each_other_are_taken_as_they_are_given() -> None:
+    first, second = (_pressed(_triangles(6)) for _ in range(2))
+    ring = [replace(first, name=one, metadata={"continues": other}) for one, other in (("a", "b"), ("b", "a"))]
+    sessions, _ = _prepared(*ring)
+    assert [bool(one.conditions.before) for one in sessions] == [False, True]
+    (alone,), _ = _prepared(replace(second, name="a", metadata={"continues": "a"}))
+    assert alone.conditions.before == {}
+
+
+def test_a_recording_that_continues_one_that_is_not_given_says_so() -> None:
+    load = _triangles(6)
+    first, second = replace(_pressed(load), name="a"), replace(_pressed(load), name="b", metadata={"continues": "a"})
+    both, alone = (excitation_of(_prepared(*given)[0], STANDARD) for given in ((second, first), (second,)))
+    assert (both.pastless, alone.pastless) == ((), (("b", "a"),))
+    said = "b continues a, which is not among the recordings: it is taken as the unit's first after a rest"
+    assert any(one.startswith(said) for one in alone.limits())
+    itself = replace(second, name="a")
+    assert excitation_of(_prepared(itself)[0], STANDARD).pastless == (("a", "a"),)
 
 
 def test_a_load_cells_noise_is_taken_out_and_said() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -10,6 +12,7 @@ from scipy.stats import chi2
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._held_out import errors, gain
 from smartshoe.diagnosis._lack_of_fit import _mean_variance
+from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import _spread
 from smartshoe.models.extended import ExtendedModel
@@ -43,8 +46,20 @@ def test_a_spread_goes_by_no_number_of_samples() -> None:
     assert _spread([one, 1e6 * one], [seen, ~seen]) == pytest.approx(once)
 
 
-def test_where_nothing_is_held_out_nothing_is_gained() -> None:
+def test_where_nothing_is_held_out_no_number_is_said() -> None:
+    """Neither a good fit nor a gain of all there is."""
     nothing = errors([], ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar"))
-    assert nothing.squares.shape == nothing.counts.shape
-    assert (nothing.rmse, nothing.fit_percent, nothing.variance_explained_percent) == (0.0, 0.0, 0.0)
-    assert gain(nothing, nothing, Scale(800.0, 140.0, MILLIBAR)).rmse_after == 0.0
+    assert nothing.is_empty
+    assert nothing.squares.shape == nothing.counts.shape == (0,)
+    found = gain(nothing, nothing, Scale(800.0, 140.0, MILLIBAR))
+    assert not found.is_loss
+    assert found.to_dict() == {
+        "rmse_before": None, "rmse_after": None, "unit": "mbar", "gain_percent": None, "ci95": [None, None],
+    }  # fmt: skip
+    figures = GoodnessOfFit(
+        nothing.rmse, "mbar", nothing.fit_percent, math.nan, 0.0, nothing.variance_explained_percent
+    ).to_dict()
+    assert figures["rmse"] == {"value": None, "unit": "mbar"}
+    assert [figures[name] for name in ("fit_percent", "force_rmse_n", "variance_explained_percent")] == [None] * 3
+    said = Diagnosis("adequate", "", "mbar", 800.0, 140.0, explainable_percent=math.nan, explained_percent=math.nan)
+    assert (said.to_dict()["explainable_percent"], said.to_dict()["explained_percent"]) == (None, None)

@@ -23,6 +23,7 @@ from smartshoe.diagnosis._excitation import (
     excitation_of,
 )
 from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._session import Quiet, Session
 from smartshoe.models.effects import Conditions
 
 Array = NDArray[np.float64]
@@ -128,10 +129,13 @@ def test_these_are_all_in_their_order() -> None:
 
 
 # -- rises ------------------------------------------------------------------------------------------------------------
-def _session(load: Array, step_s: float = 0.1, thinned: int = 2, resting: Any = None) -> Any:
+def _session(load: Array, step_s: float = 0.1, thinned: int = 2, resting: Any = None, held_out: bool = False) -> Any:
     at_rest = np.abs(load) < STANDARD.standing if resting is None else resting
-    return SimpleNamespace(
-        conditions=Conditions(step_s * np.arange(load.size), load, step_s), thinned=thinned, resting=at_rest
+    held, every = np.full(load.size, held_out), np.ones(load.size, dtype=bool)
+    at = Conditions(step_s * np.arange(load.size), load, step_s)
+    told: Any = SimpleNamespace(name="", metadata={})
+    return Session(
+        told, 0, at, load, every, held, np.zeros(load.size, dtype=np.intp), at_rest, thinned, Quiet(load, 0.0, 0.0)
     )
 
 
@@ -290,6 +294,25 @@ def test_steps_low_loads_and_repeats() -> None:
     assert _shown(_rising((0.1, 1.0)), _rising((0.1, 1.0))).repeats == 2
 
 
+def test_a_recording_that_is_held_out_shows_nothing() -> None:
+    fitted = _rising((0.1, 1.0), (0.1, 1.0), (0.3, 0.5))
+    held = [_with([(False, 30), (True, 600)]), _rising(*[(1.0, 0.2)] * 9)]
+    assert "rates" not in _shown(fitted, *held).present  # nine of twelve rises are of one
+    for one in held:
+        one.held_out[:] = True
+    alone, beside = _shown(fitted), _shown(fitted, *held)
+    assert (beside.rates_per_s, beside.peaks, beside.repeats) == (alone.rates_per_s, alone.peaks, alone.repeats)
+    assert beside.present == alone.present
+    assert "rates" in beside.present
+
+
+def test_where_nothing_that_is_held_out_can_be_used_that_is_said() -> None:
+    fitted, held = _rising((0.1, 1.0)), _session(np.zeros(9), held_out=True)
+    lost = replace(held, usable=~held.usable)
+    for sessions, is_judged in (([fitted, held], True), ([fitted, lost, held], True), ([fitted, lost], False)):
+        assert excitation_of(sessions, STANDARD).is_judged is is_judged
+
+
 def test_of_what_kind_a_repeat_is_goes_by_the_logarithm() -> None:
     """Rates and peaks within steps of a quarter are one kind: 1 and 1.1 of a rate, 1 and 1.25 are not."""
     assert _shown(_rising((0.1, 1.0), (0.11, 1.0))).repeats == 2
@@ -311,6 +334,8 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
         (said,) = replace(rich, **changes).limits()  # type: ignore[arg-type]
         assert words in said
     assert len(replace(rich, rates_per_s=(0.1,), peaks=(1.0,)).limits()) == 2
+    (said,) = replace(rich, is_judged=False).limits()
+    assert "how good a simulation is on data it was not fitted to is not known" in said
     # Without any rise the rate is said alone.
     (said,) = replace(rich, rates_per_s=(), peaks=()).limits()
     assert "one loading rate only" in said

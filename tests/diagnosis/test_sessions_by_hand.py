@@ -15,7 +15,8 @@ from scipy.stats import norm
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._denoise import noise_sd, without_noise
+from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
+from smartshoe.diagnosis._procedure import _prepared
 from smartshoe.diagnosis._session import (
     Scale,
     Session,
@@ -32,6 +33,7 @@ from smartshoe.diagnosis._session import (
     thinning,
 )
 from smartshoe.errors import NotIdentifiableError
+from smartshoe.integrity import examine
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE
 from smartshoe.units import MILLIBAR
@@ -152,6 +154,27 @@ def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(coun
     assert thinning([_run(load[:half]), _run(load[half:])], SCALE) == factor
 
 
+@pytest.mark.parametrize("low", [0.9, 0.5, 0.1, 0.0])
+def test_a_ramp_keeps_its_samples_whatever_part_of_the_full_scale_it_spans(low: float) -> None:
+    """Triangles of 8 s at 100 Hz: 3.2 s from 10 to 90 % of what they span, 13 samples of it to a step."""
+    time_s = np.arange(0.0, 80.0, 0.01)
+    part = low + (1.0 - low) * np.abs((time_s / 4.0 + 1.0) % 2.0 - 1.0)
+    pressed = _run(part, step_s=0.01)
+    assert thinning([pressed], SCALE) == 13
+    # A load that stands still beside it has no ramp, however its noise slopes.
+    still = _run(0.5 + 1e-3 * (1.0 - low) * np.random.default_rng(1).standard_normal(8000), step_s=0.01)
+    assert thinning([pressed, still], SCALE) == 13
+
+
+def test_what_is_held_out_thins_nothing() -> None:
+    """Fast or long, it is seen at the rate that what is fitted asks for."""
+    slow, fast = (course(*((n, 1.0), (n, 0.0)) * 8) for n in (100, 8))
+    fitted = _run(slow, name="a")
+    for held in (_run(slow, name="b"), _run(fast, name="c"), _run(np.tile(slow, 60), name="d")):
+        given = _prepared([fitted, held], 1, examine([fitted, held], STANDARD), STANDARD)
+        assert [one.thinned for one in given.sessions] == [3, 3]
+
+
 # -- the load's rests and cycles --------------------------------------------------------------------------------------
 def test_a_unit_begins_unloaded_where_its_gauge_reads_a_quarter_of_a_still_load() -> None:
     """Over the first four tenths of a second, twenty samples."""
@@ -262,7 +285,6 @@ def test_of_two_channels_in_the_readings_unit_the_first_is_the_neighbour_but_no_
     assert both.conditions.neighbour == pytest.approx(np.full(PRESSES.size, 0.1))
     (none,) = _sessions(_run(PRESSES, displacement_mm=PRESSES))
     assert none.conditions.neighbour is None
-    assert none.displacement == pytest.approx(1e-3 * smoothed(PRESSES, kernel(3), 1))
 
 
 def test_at_the_full_rate_each_sample_is_of_the_nearest_thinned_one() -> None:
@@ -341,6 +363,20 @@ def test_each_sample_is_of_the_longest_line_that_leaves_noise(step_s: float) -> 
     found, expected = without_noise(noisy, step_s, 0.003, STANDARD), _best_line(noisy, step_s, 0.003)
     assert found[0] == pytest.approx(expected[0], abs=1e-9)
     assert found[1] == pytest.approx(expected[1])
+
+
+@pytest.mark.parametrize("half", [100, 200, 1000])
+def test_lines_through_many_neighbours_are_those_of_plain_sums(half: int) -> None:
+    """At 10 kHz a tenth of a second either way is a thousand samples."""
+    signal = course((900, 0.0), (1500, 1.0), (700, 1.0)) - 0.4 + 1e-4 * np.random.default_rng(5).standard_normal(3101)
+    mean, slope, left, spread = _lines(signal, half)
+    k = np.arange(-half, half + 1.0)
+    windows = np.lib.stride_tricks.sliding_window_view(signal, k.size)
+    assert mean == pytest.approx(windows.mean(axis=1), abs=1e-13)
+    assert spread == pytest.approx(float(k @ k))
+    assert slope == pytest.approx(windows @ k / spread, abs=1e-15)
+    rest = windows - windows.mean(axis=1, keepdims=True) - np.outer(windows @ k / spread, k)
+    assert left == pytest.approx(np.sum(rest**2, axis=1) / (k.size - 2), abs=1e-13)
 
 
 def test_a_short_load_is_left_as_it_is() -> None:

@@ -166,11 +166,6 @@ def test_what_is_worse_on_held_out_data_explains_a_part_at_most() -> None:
         assert tuple(verdict_of(given, left, left, STANDARD, worse=worse) for worse in (False, True)) == verdicts
 
 
-@pytest.mark.parametrize(("high", "worse"), [(-1.0, True), (0.0, False), (1.0, False)])
-def test_an_extension_is_worse_where_all_of_its_gains_interval_is_a_loss(high: float, worse: bool) -> None:
-    assert Gain(0.7, 1.1, "mbar", -40.0, (-80.0, high)).is_loss is worse
-
-
 def test_a_loss_is_said_with_its_interval_and_the_loads_that_it_is_of() -> None:
     won = Gain(0.7, 1.1, "mbar", -57.0, (-80.0, -40.0))
     assert "worse than the plain one (0.7 to 1.1 mbar, by 40 to 80 %): its loads reach 900 N;" in worse_of(
