@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smartshoe.arrays import Mask
-from smartshoe.diagnosis._session import Session, continues
+from smartshoe.diagnosis._session import LEAST_WINDOW, Session, continues
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 from smartshoe.signals.loading import turning_points
@@ -107,10 +107,13 @@ def _pastless(recordings: Sequence[Recording]) -> Iterator[tuple[str, str]]:
 
 
 class _Rise(NamedTuple):
-    """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at."""
+    """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at.
+
+    Where the load's window is longer than two samples, it counts those that it tells apart.
+    """
 
     rate: float
-    samples: int
+    samples: float
     peak: float
     is_minor: bool
 
@@ -128,7 +131,7 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
             continue  # a sample more or less makes another rate of it
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
         above = float(load[first]) - float(load.min()) > thresholds.clear * thresholds.cycle * span
-        yield _Rise(rate, samples, float(load[last]), above)
+        yield _Rise(rate, samples * min(1.0, session.thinned / LEAST_WINDOW), float(load[last]), above)
 
 
 def _held(session: Session, thresholds: Thresholds) -> Mask:
@@ -154,7 +157,7 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
     return found
 
 
-def _distinct_rates(rates: Sequence[tuple[float, int]], same: float) -> list[float]:
+def _distinct_rates(rates: Sequence[tuple[float, float]], same: float) -> list[float]:
     """Rates that differ by more than ``same``, and by more than ramps of so few samples tell.
 
     Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2. A
@@ -164,7 +167,7 @@ def _distinct_rates(rates: Sequence[tuple[float, int]], same: float) -> list[flo
     ramps: list[int] = []
     reach = 0.0
     for rate, samples in sorted(rates):
-        n = max(samples, 1)
+        n = max(samples, 1.0)
         if not found or (rate > found[-1] * (1.0 + same) and rate * n / (n + 2.0) > reach):
             found.append(rate)
             ramps.append(0)

@@ -129,7 +129,7 @@ def test_these_are_all_in_their_order() -> None:
 
 
 # -- rises ------------------------------------------------------------------------------------------------------------
-def _session(load: Array, step_s: float = 0.1, thinned: int = 2, resting: Any = None, held_out: bool = False) -> Any:
+def _session(load: Array, step_s: float = 0.1, thinned: int = 3, resting: Any = None, held_out: bool = False) -> Any:
     at_rest = np.abs(load) < STANDARD.standing if resting is None else resting
     held, every = np.full(load.size, held_out), np.ones(load.size, dtype=bool)
     at = Conditions(step_s * np.arange(load.size), load, step_s)
@@ -162,6 +162,19 @@ def test_a_step_within_a_sample_took_half_of_one() -> None:
         (thinned,) = _rises(_session(ramp), STANDARD)
         assert thinned.samples == steps // 2 + steps % 2
         assert bool(list(_rises(_session(ramp, thinned=1), STANDARD))) is is_told
+
+
+def test_samples_that_a_loads_window_makes_one_are_counted_as_one() -> None:
+    """A window is of three samples at least: so finely sampled, ramps of two thirds more make no other rate."""
+    load = course((20, 0.0), (24, 1.0), (20, 0.0), (24, 1.0), (20, 0.0), (40, 1.0), (20, 0.0), (40, 1.0), (20, 0.0))
+    for thinned, times, count in ((1, 1.0 / 3.0, 1), (2, 2.0 / 3.0, 2), (3, 1.0, 2), (9, 1.0, 2)):
+        session = _session(load, thinned=thinned)
+        assert [rise.samples for rise in _rises(session, STANDARD)] == pytest.approx(
+            [12 * times] * 2 + [20 * times] * 2
+        )
+        assert len(_shown(session).rates_per_s) == count
+    slower = _session(course((20, 0.0), (24, 1.0), (20, 0.0), (72, 1.0), (20, 0.0)), thinned=1)
+    assert len(_shown(slower).rates_per_s) == 2
 
 
 @pytest.mark.parametrize(("height", "is_told"), [(0.235, False), (0.245, True)])
