@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -254,7 +255,7 @@ def _diagnosed(
         data_faults=(*integrity.faults, *noise),
         baseline=_goodness(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
         extended=_goodness(best, force, after, scale),
-        gain=won,
+        gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
@@ -282,7 +283,9 @@ def _diagnosed(
 
 
 def _percent_less(after: float, before: float) -> float:
-    """By how many percent a variance falls, 0 where it grows."""
+    """By how many percent a variance falls, 0 where it grows, NaN where nothing was judged."""
+    if math.isnan(before):
+        return before
     return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
 
 
@@ -329,13 +332,16 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
 
 
 def _held_out_evidence(size: float, won: Gain) -> list[Statement]:
+    moves = Statement(
+        "size in percent of full scale",
+        100 * size,
+        0.0,
+        f"it moves the reading by {100 * size:.3g} % of full scale",
+    )
+    if math.isnan(won.gain_percent):
+        return [moves]
     return [
-        Statement(
-            "size in percent of full scale",
-            100 * size,
-            0.0,
-            f"it moves the reading by {100 * size:.3g} % of full scale",
-        ),
+        moves,
         Statement(
             "gain on held-out data in percent",
             won.gain_percent,
@@ -387,7 +393,9 @@ def _with_offset(
     return model
 
 
-def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit:
+def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:
+    if found.is_empty:
+        return None
     span = abs(scale.reading)
     return GoodnessOfFit(
         found.rmse * span,

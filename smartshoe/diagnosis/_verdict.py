@@ -119,11 +119,16 @@ def sentence_of(
     names = [cause.name.replace("_", " ") for cause in causes]
     named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
+    if baseline.is_empty:
+        good = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
     not_explained = f"{100 * rest.rms:.2g} % {rest.how} and is not explained"
     if verdict == "adequate":
         return good if rest.rms <= thresholds.material else f"{good}; {not_explained}"
     if verdict == "unexplained":
         return f"{good}; {not_explained}, and no effect of the catalogue accounts for it"
+    if baseline.is_empty:
+        said = f"{good}; what is fitted is explained by {named}"
+        return said if verdict == "explained" else f"{said}; {not_explained}"
     by_all = f"{100 * best.rmse:.2g} %"
     said = f"{good}; with {named} it is worse there, good to {by_all}" if worse else f"{good}, with {named} to {by_all}"
     return said if verdict == "explained" else f"{said}; {not_explained}"

@@ -40,7 +40,9 @@ def test_a_diagnosis_bears_a_recording_of_any_length(count: int, is_held_out: bo
     short = _pressed(count, 8.0, "short")
     found = diagnose(GOOD, hold_out=short) if is_held_out else diagnose([*GOOD, short])
     assert found.verdict == "adequate"
-    assert len(found.traces) == 3
+    left_out = any(said.startswith("left out: short") for said in found.limits)
+    assert len(found.traces) == (2 if left_out else 3)
+    assert left_out or count >= STANDARD.least_samples
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 30])
