@@ -19,6 +19,7 @@ from smartshoe.calibration import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import (
     Conditions,
+    CoreEffect,
     Effect,
     EffectParameter,
     Inverse,
@@ -84,6 +85,48 @@ def test_a_latency_moves_the_reading_in_time_and_changes_nothing_that_lasts() ->
             out = one.apply(hold, at, values)
             assert np.max(np.abs(out - hold)) > 1e-4, one.name
             assert out[[0, 3000]] == pytest.approx(hold[[0, 3000]], abs=1e-6), one.name
+
+
+@pytest.mark.parametrize("one", [one for one in EVERY if not isinstance(one, CoreEffect)], ids=lambda one: one.name)
+def test_what_bends_beside_the_arm_is_exactly_what_depends_on_it(one: Effect) -> None:
+    time_s = 0.05 * np.arange(1200)
+    load = np.interp(time_s, [0.0, 1.0, 2.0, 20.0, 22.0, 40.0, 60.0], [0.0, 0.0, 0.5, 0.5, 1.0, 0.2, 0.7])
+    at = Conditions(time_s, load, 0.05, 1e-3, np.sin(0.1 * time_s), np.roll(load, 40))
+    outside = one.apply(load, at, typical(one))
+    beside = [one.apply(load, at.within(share, 0.5), typical(one)) for share in (0.1, 0.4)]
+    moved = [float(np.max(np.abs(out - outside))) for out in beside]
+    if one.bends_beside_arm:
+        assert 1e-5 < moved[0] < moved[1]
+    else:
+        assert moved == [0.0, 0.0]
+
+
+class Told(Effect):
+    """An effect that keeps what it is told of the arm."""
+
+    name, family, stage, place = "told", "static_curve", "wall", "wall"
+    says = "nothing"
+    parameters = ()
+
+    def __init__(self, bends_beside_arm: bool) -> None:
+        self.bends_beside_arm = bends_beside_arm  # type: ignore[misc]
+        self.told: list[tuple[float, float] | None] = []
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        self.told.append(conditions.relaxing)
+        return signal.copy()
+
+
+def test_a_model_tells_its_arm_to_what_bends_beside_it_and_to_nothing_else() -> None:
+    at = Conditions(0.05 * np.arange(40), np.linspace(0.0, 1.0, 40), 0.05)
+    for bends in (True, False):
+        one = Told(bends)
+        model = BASELINE.with_part(one)
+        model.sensitivities(at)
+        share, rate = (model.theta[k] * 1.001 for k in (1, 2))
+        arms = [(0.15, 0.3), (pytest.approx(share), 0.3), (0.15, pytest.approx(rate))]
+        # What the arm does not move is not run anew for it.
+        assert one.told == (arms if bends else [None])
 
 
 def test_what_is_seen_at_rest_moves_the_reading_without_load() -> None:

@@ -74,7 +74,10 @@ def test_sensitivities_are_those_of_the_whole_chain(name: str) -> None:
         moved = model.theta
         step = derivative_step(parameter, moved[j])
         moved[j] += step
-        assert_allclose(slopes[:, j], (model.at(moved).simulate(at) - reading) / step, atol=1e-6)
+        whole = (model.at(moved).simulate(at) - reading) / step
+        assert_allclose(slopes[:, j], whole, atol=1e-6)
+        if j in (1, 2):  # what the arm does not move gives the same to the last digit
+            assert_array_equal(slopes[:, j], whole)
     of_it = [j for j, (owner, _) in enumerate(model.parameters) if owner == name]
     assert_array_equal(model.own_sensitivities(name, at, model.trace(at)), slopes[:, of_it])
 

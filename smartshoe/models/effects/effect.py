@@ -74,7 +74,8 @@ class Conditions:
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
     load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
     ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
-    ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, None outside a model.
+    ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, for effects that say that
+    they bend beside it; None for all others, and outside a model.
     """
 
     time_s: Array
@@ -152,6 +153,7 @@ class Effect(ABC):
     ``is_refinement`` where it follows members of other families too, and so tells no kind.
     ``is_steep_undone``: True where half a spacing of single precision in a signal moves the load by 3e-7 of full scale.
     ``is_memoryless``: True where the reading is a function of the present load alone.
+    ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
     """
 
@@ -174,6 +176,7 @@ class Effect(ABC):
     why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False
     is_memoryless: ClassVar[bool] = False
+    bends_beside_arm: ClassVar[bool] = False
     imitates: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
     is_steep_undone: ClassVar[bool] = False
