@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array
-from smartshoe.models.core import USUAL_WALL_RATIO, Core
+from smartshoe.models.core import USUAL_WALL_RATIO, Core, network
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter
 from smartshoe.models.elements import Arm, Element
@@ -105,7 +105,7 @@ class ExtendedModel:
         for part in self.parts:
             if isinstance(part.effect, CoreEffect):
                 elements += part.effect.elements(part.values)
-        return Core(elements, self.wall_ratio)
+        return network(tuple(elements), self.wall_ratio)
 
     @cached_property
     def chain(self) -> tuple[Part | None, ...]:

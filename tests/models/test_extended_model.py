@@ -110,3 +110,10 @@ def test_the_baseline_is_an_arm_and_a_gain() -> None:
 def test_an_unknown_effect_is_refused_with_the_names_there_are() -> None:
     with pytest.raises(UsageError, match="linear_leak"):
         effect("magic")
+
+
+def test_models_that_differ_elsewhere_in_the_chain_share_their_core() -> None:
+    model = baseline()
+    assert model.with_part("zero_offset", np.array([0.01])).core is model.core
+    assert model.at(model.theta * np.array([1.1, 1.0, 1.0])).core is model.core
+    assert model.at(model.theta * np.array([1.0, 1.1, 1.0])).core is not model.core
