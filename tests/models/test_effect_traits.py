@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import EntryPoint
 from itertools import combinations
@@ -66,6 +67,33 @@ def test_neighbours_say_the_same_of_one_another() -> None:
     for one, other in combinations(catalogue().values(), 2):
         assert one.separated_by.get(other.name) == other.separated_by.get(one.name), (one.name, other.name)
         assert told_apart_by(one, other) == told_apart_by(other, one) == one.separated_by.get(other.name, frozenset())
+
+
+def test_what_conditions_keep_is_made_once_for_its_numbers_and_the_oldest_is_forgotten() -> None:
+    at, made = Conditions(np.arange(3.0), np.zeros(3), 1.0), []
+
+    def asked(number: float) -> Array:
+        return at.kept("one", (number,), lambda: made.append(number) or np.full(3, number))  # type: ignore[func-returns-value]
+
+    for number in (0.0, 1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 0.0, 6.0, 0.0, 1.0):
+        np.testing.assert_array_equal(asked(number), np.full(3, number))
+    assert made == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1.0]
+    np.testing.assert_array_equal(at.kept("other", (0.0,), lambda: np.ones(1)), np.ones(1))
+    later = replace(at, time_s=at.time_s + 1.0)  # other conditions keep their own
+    np.testing.assert_array_equal(later.kept("one", (0.0,), lambda: np.ones(1)), np.ones(1))
+
+
+@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
+def test_a_block_gives_the_same_again_and_after_others_were_asked_for(one: Effect) -> None:
+    time_s = 0.05 * np.arange(400)
+    at = Conditions(time_s, 0.5 - 0.5 * np.cos(time_s), 0.05, 1e-3, np.sin(0.1 * time_s), np.sin(time_s))
+    first = one.apply(at.load, at, typical(one))
+    for size in (0.5, 2.0):
+        one.apply(at.load, at, one.begun(sizes=size))
+    for values in (1.01 * typical(one), typical(one)):
+        fresh = replace(at, cache={})
+        np.testing.assert_array_equal(one.apply(at.load, at, values), one.apply(at.load, fresh, values))
+    np.testing.assert_array_equal(one.apply(at.load, at, typical(one)), first)
 
 
 def test_noise_and_faults_of_data_are_the_effects_that_are_no_physical_cause() -> None:
