@@ -27,7 +27,7 @@ up would hide an effect of another family.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, cycle
@@ -155,9 +155,7 @@ class Evidence:
 
     def _departures_of(self, members: Members) -> list[range]:
         """Where the columns of members' departures stand, made when they are first asked for."""
-        for member in members:
-            if member not in self._departures:
-                self._departures[member] = self._departing(member)
+        self.make_ready(members)
         for pair in combinations(members, 2):
             if pair not in self._known:
                 self._known.add(pair)
@@ -168,7 +166,27 @@ class Evidence:
         there = [self._departures[member].places for member in members]
         return [range(places.start, places.stop) for places in there]
 
-    def _departing(self, member: int) -> _Departures:
+    def make_ready(self, members: Collection[int]) -> None:
+        """Make the departures of these candidates: all at once they cost half of one after another."""
+        missing = [member for member in dict.fromkeys(members) if member not in self._departures]
+        if not missing:
+            return
+        each = [self._departing(member) for member in missing]
+        together = _Columns(
+            [np.hstack(seen) for seen in zip(*(one.seen for one in each), strict=True)],
+            [np.vstack(past) for past in zip(*(one.past for one in each), strict=True)],
+        )
+        cross = self._between(self._all, together)
+        count = self._directions
+        for k, (member, own) in enumerate(zip(missing, each, strict=True)):
+            beside, first = cross[:, k * count : (k + 1) * count], self._first + member * count
+            half, places = self._taken_out(beside), slice(first, first + count)
+            self._reduced[: self._first, places] = beside - self._half.T @ half
+            self._reduced[places, : self._first] = self._reduced[: self._first, places].T
+            self._reduced[places, places] = self._between(own, own) - half.T @ half
+            self._departures[member] = _Departures(own, places, half)
+
+    def _departing(self, member: int) -> _Columns:
         given = self.given
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
@@ -177,14 +195,7 @@ class Evidence:
         parts = zip(departures(given, signatures), given.sessions, strict=True)
         seen = [where(one.fitted, part) for part, one in parts]
         past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
-        made = _Columns(seen, past)
-        cross = self._between(self._all, made)
-        half, first = self._taken_out(cross), self._first + member * self._directions
-        places = slice(first, first + self._directions)
-        self._reduced[: self._first, places] = cross - self._half.T @ half
-        self._reduced[places, : self._first] = self._reduced[: self._first, places].T
-        self._reduced[places, places] = self._between(made, made) - half.T @ half
-        return _Departures(made, places, half)
+        return _Columns(seen, past)
 
     def _visible(self, whole: Sequence[Array], columns: Sequence[int], weights: Array) -> list[Array]:
         """Of ``whole`` contributions (n,) a session what the baseline and the nuisances cannot follow."""
