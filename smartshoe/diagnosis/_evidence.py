@@ -95,6 +95,7 @@ class Evidence:
         self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
         self._of_all = of_all
         self._seen: dict[tuple[Members, bool], Posterior] = {}
+        self._extensions: dict[Members, list[tuple[float, int, Array]]] = {}
         self._inverse = [
             np.linalg.inv(
                 ridged(products[-2:, -2:] + noise_sd**2 * nuisance_precision(one, given.model, self.thresholds))
@@ -300,9 +301,14 @@ class Evidence:
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
         """For each candidate the score of ``members`` with it, its equation taken for exact, and its strengths (k,).
 
-        All follow from one factorisation, that of what ``members`` widen.
+        All follow from one factorisation, that of what ``members`` widen; cached.
         """
         best = self.posterior(members)
+        if best.members not in self._extensions:
+            self._extensions[best.members] = self._extended(best)
+        return self._extensions[best.members]
+
+    def _extended(self, best: Posterior) -> list[tuple[float, int, Array]]:
         index, sds = self._widened(best.members, best.strengths)
         factor, pull, _ = self._moved(index, sds)
         beside = sds[:, None] * self._reduced[index, : self._sds.size + 1]
