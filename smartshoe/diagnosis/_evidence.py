@@ -27,7 +27,7 @@ up would hide an effect of another family.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, cycle
@@ -95,6 +95,7 @@ class Evidence:
         self.given, self.noise_sd, self.thresholds = given, noise_sd, given.thresholds
         self._of_all = of_all
         self._seen: dict[tuple[Members, bool], Posterior] = {}
+        self._extensions: dict[Members, list[tuple[float, int, Array]]] = {}
         self._inverse = [
             np.linalg.inv(
                 ridged(products[-2:, -2:] + noise_sd**2 * nuisance_precision(one, given.model, self.thresholds))
@@ -155,9 +156,7 @@ class Evidence:
 
     def _departures_of(self, members: Members) -> list[range]:
         """Where the columns of members' departures stand, made when they are first asked for."""
-        for member in members:
-            if member not in self._departures:
-                self._departures[member] = self._departing(member)
+        self.make_ready(members)
         for pair in combinations(members, 2):
             if pair not in self._known:
                 self._known.add(pair)
@@ -168,7 +167,27 @@ class Evidence:
         there = [self._departures[member].places for member in members]
         return [range(places.start, places.stop) for places in there]
 
-    def _departing(self, member: int) -> _Departures:
+    def make_ready(self, members: Collection[int]) -> None:
+        """Make the departures of these candidates: all at once they cost half of one after another."""
+        missing = [member for member in dict.fromkeys(members) if member not in self._departures]
+        if not missing:
+            return
+        each = [self._departing(member) for member in missing]
+        together = _Columns(
+            [np.hstack(seen) for seen in zip(*(one.seen for one in each), strict=True)],
+            [np.vstack(past) for past in zip(*(one.past for one in each), strict=True)],
+        )
+        cross = self._between(self._all, together)
+        count = self._directions
+        for k, (member, own) in enumerate(zip(missing, each, strict=True)):
+            beside, first = cross[:, k * count : (k + 1) * count], self._first + member * count
+            half, places = self._taken_out(beside), slice(first, first + count)
+            self._reduced[: self._first, places] = beside - self._half.T @ half
+            self._reduced[places, : self._first] = self._reduced[: self._first, places].T
+            self._reduced[places, places] = self._between(own, own) - half.T @ half
+            self._departures[member] = _Departures(own, places, half)
+
+    def _departing(self, member: int) -> _Columns:
         given = self.given
         columns = list(given.candidates[member].columns)
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
@@ -177,14 +196,7 @@ class Evidence:
         parts = zip(departures(given, signatures), given.sessions, strict=True)
         seen = [where(one.fitted, part) for part, one in parts]
         past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
-        made = _Columns(seen, past)
-        cross = self._between(self._all, made)
-        half, first = self._taken_out(cross), self._first + member * self._directions
-        places = slice(first, first + self._directions)
-        self._reduced[: self._first, places] = cross - self._half.T @ half
-        self._reduced[places, : self._first] = self._reduced[: self._first, places].T
-        self._reduced[places, places] = self._between(made, made) - half.T @ half
-        return _Departures(made, places, half)
+        return _Columns(seen, past)
 
     def _visible(self, whole: Sequence[Array], columns: Sequence[int], weights: Array) -> list[Array]:
         """Of ``whole`` contributions (n,) a session what the baseline and the nuisances cannot follow."""
@@ -289,9 +301,14 @@ class Evidence:
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
         """For each candidate the score of ``members`` with it, its equation taken for exact, and its strengths (k,).
 
-        All follow from one factorisation, that of what ``members`` widen.
+        All follow from one factorisation, that of what ``members`` widen; cached.
         """
         best = self.posterior(members)
+        if best.members not in self._extensions:
+            self._extensions[best.members] = self._extended(best)
+        return self._extensions[best.members]
+
+    def _extended(self, best: Posterior) -> list[tuple[float, int, Array]]:
         index, sds = self._widened(best.members, best.strengths)
         factor, pull, _ = self._moved(index, sds)
         beside = sds[:, None] * self._reduced[index, : self._sds.size + 1]

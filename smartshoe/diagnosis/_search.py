@@ -44,13 +44,14 @@ def additions(evidence: Evidence, members: Members, breadth: int = BREADTH, bann
 def step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) -> Posterior:
     """The best set that one addition, drop or swap makes of ``start``, or ``start`` itself."""
     best = evidence.posterior(start)
-    trials: list[Posterior] = []
+    sets: list[Members] = []
     if len(best.members) < MOST_MEMBERS:
-        trials += [evidence.posterior((*best.members, k)) for k in additions(evidence, best.members, BREADTH, banned)]
+        sets += [(*best.members, k) for k in additions(evidence, best.members, BREADTH, banned)]
     for member in best.members:
         less = tuple(m for m in best.members if m != member)
-        trials.append(evidence.posterior(less))
-        trials += [evidence.posterior((*less, k)) for k in additions(evidence, less, SWAPS, banned)]
+        sets += [less, *((*less, k) for k in additions(evidence, less, SWAPS, banned))]
+    evidence.make_ready({member for members in sets for member in members})
+    trials = (evidence.posterior(members) for members in sets)
     return min([best, *(one for one in trials if allowed(evidence, one))], key=lambda one: one.score)
 
 

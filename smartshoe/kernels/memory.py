@@ -136,28 +136,16 @@ def _along(place, z, slope):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _place_of(value, z, slope):  # type: ignore[no-untyped-def]
-    """Where the rising branch has ``value``, in spacings, by bisection."""
+    """Where the rising branch has ``value``, in spacings, by bisection; where the ends of a piece tell, by these."""
     low, high = 0.0, z.size - 1.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        if _along(middle, z, slope) < value:
+        i = int(middle)
+        if z[i + 1] < value or (z[i] < value and _along(middle, z, slope) < value):
             low = middle
         else:
             high = middle
     return 0.5 * (low + high)
-
-
-@njit(cache=True)
-def _slide(move, value, direction, place, per_load, z, slope):  # type: ignore[no-untyped-def]
-    """Friction, direction and place on the branch after a ``move`` of the load."""
-    if move != 0.0:
-        turned = 1.0 if move > 0.0 else -1.0
-        if turned != direction:
-            direction = turned
-            place = _place_of(direction * value, z, slope)
-        place += abs(move) * per_load
-        value = direction * _along(place, z, slope)
-    return value, direction, place
 
 
 @njit(cache=True)
@@ -170,7 +158,12 @@ def bouc_wen(load, per_load, z, slope, state, out):  # type: ignore[no-untyped-d
     last, value, direction, place = state
     for k in range(load.size):
         move = load[k] - last if last < NO_LOAD else 0.0
-        value, direction, place = _slide(move, value, direction, place, per_load, z, slope)
+        if move != 0.0:
+            sense = 1.0 if move > 0.0 else -1.0
+            if sense != direction:
+                direction, place = sense, _place_of(sense * value, z, slope)
+            place += abs(move) * per_load
+            value = direction * _along(place, z, slope)
         last = load[k]
         out[k] = value
     state[0], state[1], state[2], state[3] = last, value, direction, place

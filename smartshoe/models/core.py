@@ -15,7 +15,7 @@ All of it is springs and dampers, so that the poles are real and it runs as a su
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -80,8 +80,9 @@ class Core:
         apart = 1e-6 * np.diag(np.diag(self.matrix) * np.arange(self.drive.size))
         for shift in (0.0, 1.0, 10.0):
             values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
-            if np.linalg.cond(vectors, "fro") < MOST_SKEWED:
-                return values, vectors, np.linalg.inv(vectors)
+            inverse = _inverse(vectors)
+            if inverse is not None and np.linalg.norm(vectors) * np.linalg.norm(inverse) < MOST_SKEWED:
+                return values, vectors, inverse
         return values, vectors, np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
 
     def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
@@ -90,10 +91,14 @@ class Core:
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4
-        safe = np.where(small, 1.0, z)
-        mean = -np.expm1(-safe) / safe
-        after = np.where(small, 0.5 - z / 6.0 + z * z / 24.0, (1.0 - mean) / safe)
-        before = np.where(small, 0.5 - z / 3.0 + z * z / 8.0, (mean - np.exp(-safe)) / safe)
+        if small.any():
+            safe = np.where(small, 1.0, z)
+            mean = -np.expm1(-safe) / safe
+            after = np.where(small, 0.5 - z / 6.0 + z * z / 24.0, (1.0 - mean) / safe)
+            before = np.where(small, 0.5 - z / 3.0 + z * z / 8.0, (mean - np.exp(-safe)) / safe)
+        else:
+            mean = -np.expm1(-z) / z
+            after, before = (1.0 - mean) / z, (mean - decay) / z
         scale = step_s * (inverse @ self.drive)
         return decay, scale * before, scale * after, vectors, inverse
 
@@ -128,6 +133,20 @@ class Core:
         whole = expm(block)
         ramp = whole[:n, n + 1]  # of a slope of one a step; from the hold it takes what the old sample keeps
         return whole[:n, :n], whole[:n, n] - ramp, ramp
+
+
+@lru_cache(maxsize=256)
+def network(elements: tuple[Element, ...], wall_ratio: float) -> Core:
+    """The `Core` of these, kept with its modes: models that differ elsewhere in the chain share it."""
+    return Core(elements, wall_ratio)
+
+
+def _inverse(vectors: Array) -> Array | None:
+    """(p, p), None where there is none."""
+    try:
+        return np.asarray(np.linalg.inv(vectors))
+    except np.linalg.LinAlgError:
+        return None
 
 
 def plain(core: Core, load: Array, step_s: float) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smartshoe.arrays import Array
-from smartshoe.models.core import USUAL_WALL_RATIO, Core
+from smartshoe.models.core import USUAL_WALL_RATIO, Core, network
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter
 from smartshoe.models.elements import Arm, Element
@@ -110,7 +110,7 @@ class ExtendedModel:
         for part in self.parts:
             if isinstance(part.effect, CoreEffect):
                 elements += part.effect.elements(part.values)
-        return Core(elements, self.wall_ratio)
+        return network(tuple(elements), self.wall_ratio)
 
     @cached_property
     def chain(self) -> tuple[Part | None, ...]:
@@ -134,14 +134,14 @@ class ExtendedModel:
         core: Core | None = None,
     ) -> Array:
         """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
-        conditions = self._around(conditions)
         for part in self.chain[first:]:
             if inputs is not None:
                 inputs.append(signal)
             if part is None:
                 signal = (core or self.core).simulate(signal, conditions.step_s)
             else:
-                signal = part.effect.apply(signal, conditions, part.values)
+                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
+                signal = part.effect.apply(signal, given, part.values)
         return self.gain * signal
 
     def _around(self, conditions: Conditions) -> Conditions:
@@ -180,13 +180,15 @@ class ExtendedModel:
         theta, made = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
         core = self.chain.index(None)
+        # What the arm is felt by first: a block that bends beside it, or the core.
+        arm = next(k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm)
         for j, (owner, parameter) in enumerate(self.parameters):
             if j == 0:
                 continue
             step = derivative_step(parameter, theta[j])
             moved = theta.copy()
             moved[j] += step
-            first = place_of.get(owner, core) if owner != "baseline" else 0
+            first = arm if owner == "baseline" else place_of.get(owner, core)
             trial = self.at(moved)
             alike = first != core and owner != "baseline"  # this parameter does not touch the core
             made.append(Extension(step, trial, first, self.core if alike else None))
@@ -195,7 +197,7 @@ class ExtendedModel:
     def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
-        The chain is run anew only from the block that a parameter belongs to; for the baseline's, from the beginning.
+        The chain is run anew only from the first block that a parameter moves.
         ``trace``: this model's own under the same conditions, where it is known.
         """
         trace = trace or self.trace(conditions)
@@ -233,7 +235,6 @@ class ExtendedModel:
     def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
         """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
         reading, inputs = trace
-        conditions = self._around(conditions)  # once for all that do not move the arm
         out = np.empty((reading.size, len(by)), order="F")
         for column, one in enumerate(by):
             out[:, column] = one.slope(reading, inputs, conditions)

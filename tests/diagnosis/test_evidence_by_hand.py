@@ -170,6 +170,16 @@ def test_a_member_that_stands_by_itself_departs_little_and_moves_the_reading_by_
     assert found.sizes[0] == pytest.approx(float(expected), rel=1e-3)
 
 
+def test_departures_made_at_once_are_those_made_one_after_another(given: Linearised) -> None:
+    after, once = Evidence(given, SD), Evidence(given, SD)
+    once.make_ready((9, 2, 5, 2))
+    once.make_ready(())
+    for members in ((2,), (2, 5), (2, 5, 9), (5, 11)):
+        one, other = after.posterior(members), once.posterior(members)
+        assert other.score == pytest.approx(one.score, rel=1e-9)
+        assert other.departed == pytest.approx(one.departed, rel=1e-6, abs=1e-9)
+
+
 def test_an_extension_of_a_set_scores_as_the_set_whose_new_equation_is_exact(
     given: Linearised, evidence: Evidence
 ) -> None:

@@ -48,6 +48,9 @@ class ToldEvidence:
         score = self.of_any_law if of_any_law else self._score
         return Posterior(members, score(members), strengths, (1.0,) * count, (0.5,) * count, float(count))
 
+    def make_ready(self, members: set[int]) -> None:
+        """Nothing is to be made before it is told."""
+
     def extensions(self, members: tuple[int, ...]) -> list[tuple[float, int, Array]]:
         return [
             (self._score(tuple(sorted((*members, k)))), k, self.strengths.get(k, np.ones(1)))

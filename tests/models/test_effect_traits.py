@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import EntryPoint
 from itertools import combinations
@@ -19,6 +20,7 @@ from smartshoe.calibration import ExtendedCompensator
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import (
     Conditions,
+    CoreEffect,
     Effect,
     EffectParameter,
     Inverse,
@@ -67,6 +69,33 @@ def test_neighbours_say_the_same_of_one_another() -> None:
         assert told_apart_by(one, other) == told_apart_by(other, one) == one.separated_by.get(other.name, frozenset())
 
 
+def test_what_conditions_keep_is_made_once_for_its_numbers_and_the_oldest_is_forgotten() -> None:
+    at, made = Conditions(np.arange(3.0), np.zeros(3), 1.0), []
+
+    def asked(number: float) -> Array:
+        return at.kept("one", (number,), lambda: made.append(number) or np.full(3, number))  # type: ignore[func-returns-value]
+
+    for number in (0.0, 1.0, 0.0, 2.0, 3.0, 4.0, 5.0, 0.0, 6.0, 0.0, 1.0):
+        np.testing.assert_array_equal(asked(number), np.full(3, number))
+    assert made == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1.0]
+    np.testing.assert_array_equal(at.kept("other", (0.0,), lambda: np.ones(1)), np.ones(1))
+    later = replace(at, time_s=at.time_s + 1.0)  # other conditions keep their own
+    np.testing.assert_array_equal(later.kept("one", (0.0,), lambda: np.ones(1)), np.ones(1))
+
+
+@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
+def test_a_block_gives_the_same_again_and_after_others_were_asked_for(one: Effect) -> None:
+    time_s = 0.05 * np.arange(400)
+    at = Conditions(time_s, 0.5 - 0.5 * np.cos(time_s), 0.05, 1e-3, np.sin(0.1 * time_s), np.sin(time_s))
+    first = one.apply(at.load, at, typical(one))
+    for size in (0.5, 2.0):
+        one.apply(at.load, at, one.begun(sizes=size))
+    for values in (1.01 * typical(one), typical(one)):
+        fresh = replace(at, cache={})
+        np.testing.assert_array_equal(one.apply(at.load, at, values), one.apply(at.load, fresh, values))
+    np.testing.assert_array_equal(one.apply(at.load, at, typical(one)), first)
+
+
 def test_noise_and_faults_of_data_are_the_effects_that_are_no_physical_cause() -> None:
     assert {one.family for one in EVERY if not one.is_physical} == {"noise", "data"}
     assert not any(one.family in ("noise", "data") for one in EVERY if one.is_physical)
@@ -84,6 +113,48 @@ def test_a_latency_moves_the_reading_in_time_and_changes_nothing_that_lasts() ->
             out = one.apply(hold, at, values)
             assert np.max(np.abs(out - hold)) > 1e-4, one.name
             assert out[[0, 3000]] == pytest.approx(hold[[0, 3000]], abs=1e-6), one.name
+
+
+@pytest.mark.parametrize("one", [one for one in EVERY if not isinstance(one, CoreEffect)], ids=lambda one: one.name)
+def test_what_bends_beside_the_arm_is_exactly_what_depends_on_it(one: Effect) -> None:
+    time_s = 0.05 * np.arange(1200)
+    load = np.interp(time_s, [0.0, 1.0, 2.0, 20.0, 22.0, 40.0, 60.0], [0.0, 0.0, 0.5, 0.5, 1.0, 0.2, 0.7])
+    at = Conditions(time_s, load, 0.05, 1e-3, np.sin(0.1 * time_s), np.roll(load, 40))
+    outside = one.apply(load, at, typical(one))
+    beside = [one.apply(load, at.within(share, 0.5), typical(one)) for share in (0.1, 0.4)]
+    moved = [float(np.max(np.abs(out - outside))) for out in beside]
+    if one.bends_beside_arm:
+        assert 1e-5 < moved[0] < moved[1]
+    else:
+        assert moved == [0.0, 0.0]
+
+
+class Told(Effect):
+    """An effect that keeps what it is told of the arm."""
+
+    name, family, stage, place = "told", "static_curve", "wall", "wall"
+    says = "nothing"
+    parameters = ()
+
+    def __init__(self, bends_beside_arm: bool) -> None:
+        self.bends_beside_arm = bends_beside_arm  # type: ignore[misc]
+        self.told: list[tuple[float, float] | None] = []
+
+    def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
+        self.told.append(conditions.relaxing)
+        return signal.copy()
+
+
+def test_a_model_tells_its_arm_to_what_bends_beside_it_and_to_nothing_else() -> None:
+    at = Conditions(0.05 * np.arange(40), np.linspace(0.0, 1.0, 40), 0.05)
+    for bends in (True, False):
+        one = Told(bends)
+        model = BASELINE.with_part(one)
+        model.sensitivities(at)
+        share, rate = (model.theta[k] * 1.001 for k in (1, 2))
+        arms = [(0.15, 0.3), (pytest.approx(share), 0.3), (0.15, pytest.approx(rate))]
+        # What the arm does not move is not run anew for it.
+        assert one.told == (arms if bends else [None])
 
 
 def test_what_is_seen_at_rest_moves_the_reading_without_load() -> None:

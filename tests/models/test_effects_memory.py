@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from smartshoe.arrays import Array
+from smartshoe.kernels.memory import _along, _place_of, bouc_wen_branch
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, dead_zone
 from smartshoe.models.effects.catalogue import effect
 from smartshoe.models.effects.effect import Conditions
@@ -49,6 +50,18 @@ def test_half_of_the_major_loop_is_the_strength(name: str, values: Array) -> Non
     # Bouc-Wen and the widest stops do not come to their end value within full scale.
     assert height == pytest.approx(values[0], rel=2e-3 if name == "play_hysteresis" and values[4] == 0.0 else 0.1)
     assert np.all(down - up >= -1e-12)
+
+
+@given(st.floats(0.6, 5.0), st.floats(0.0, 2.0), st.floats(-0.999, 0.999))
+@settings(max_examples=60, deadline=None)
+def test_a_place_on_the_branch_is_that_of_a_plain_bisection(exponent: float, turn: float, value: float) -> None:
+    z, slope = np.empty(241), np.empty(241)
+    bouc_wen_branch(exponent, turn, 10.0 / 240, z, slope)
+    low, high = 0.0, 240.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _along(middle, z, slope) < value else (low, middle)
+    assert _place_of(value, z, slope) == pytest.approx(0.5 * (low + high), abs=1e-12)
 
 
 @pytest.mark.parametrize(("name", "values"), LOOPS)

@@ -16,11 +16,17 @@ def by_sense(signal: Array, conditions: Conditions, lost: float, turn: float, fa
     """``signal`` (n,) times 1 - ``lost`` (1 - s)/2; the sense s turns over within ``turn`` and fades by ``fade``."""
     if lost == 0.0:
         return signal.copy()
+    sense = conditions.kept("sense_of_motion", (turn, fade), lambda: _sense(conditions, turn, fade))
+    return signal * (1.0 - 0.5 * lost * (1.0 - sense))
+
+
+def _sense(conditions: Conditions, turn: float, fade: float) -> Array:
     from smartshoe.kernels.memory import sense_of_motion
 
-    out = np.empty(signal.size)
-    sense_of_motion(cleaned_load(conditions), turn, fade, _start(fade), out)
-    return signal * (1.0 - 0.5 * lost * (1.0 - out))
+    load = cleaned_load(conditions)
+    out = np.empty(load.size)
+    sense_of_motion(load, turn, fade, _start(fade), out)
+    return out
 
 
 def undone_by_sense(lost: float, turn: float, fade: float) -> Undone:

@@ -32,7 +32,7 @@ TEMPERATURE_LAGS = ({"temperature_lag": SMOOTHED_S}, {"temperature_lag": 60.0}) 
 
 def running_time_s(conditions: Conditions) -> Array:
     """(n,) seconds since the unit rested and was zeroed, through the recordings that this one continues."""
-    return conditions.time_s + conditions.before.get("time_s", 0.0)
+    return conditions.kept("running_time_s", (), lambda: conditions.time_s + conditions.before.get("time_s", 0.0))
 
 
 def drift(conditions: Conditions, values: Array) -> Array:
@@ -49,6 +49,11 @@ def drift(conditions: Conditions, values: Array) -> Array:
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
         moved += values[0] * running_time_s(conditions)
     return moved
+
+
+def settled_so_far(conditions: Conditions, tau_s: float, stretch: float) -> Array:
+    """(n,) `settled` over the `running_time_s`."""
+    return conditions.kept("settled", (tau_s, stretch), lambda: settled(running_time_s(conditions), tau_s, stretch))
 
 
 def settled(time_s: Array, tau_s: float, stretch: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -81,12 +82,21 @@ START = (NO_LOAD, 0.0, 0.0, 0.0)
 
 def _branch(values: Array) -> tuple[float, Array, Array]:
     """Spacings per load, and the rising branch."""
+    width, exponent, turn = (float(value) for value in values[1:4])
+    return SPACINGS / (WIDTHS * width), *_rising(exponent, turn)
+
+
+@lru_cache(maxsize=64)
+def _rising(exponent: float, turn: float) -> tuple[Array, Array]:
+    """The branch and its slope, kept, since a fit asks for the same few often.
+
+    Nobody may write to them; were they marked so, kernels would be compiled once more.
+    """
     from smartshoe.kernels.memory import bouc_wen_branch
 
-    width, exponent, turn = (float(value) for value in values[1:4])
     z, slope = np.empty(SPACINGS + 1), np.empty(SPACINGS + 1)
     bouc_wen_branch(exponent, turn, WIDTHS / SPACINGS, z, slope)
-    return SPACINGS / (WIDTHS * width), z, slope
+    return z, slope
 
 
 def _row(values: Array) -> str:

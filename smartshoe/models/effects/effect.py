@@ -8,7 +8,7 @@ stands at the chain's end. So every strength is a share of full scale.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
@@ -66,6 +66,9 @@ class EffectParameter:
         return (self.kind_ends != "" and value >= self.upper) or (self.kind_ends == "both" and value <= self.lower)
 
 
+MOST_KEPT = 6  # of one name: a law's own, and those with one of its shape's numbers moved
+
+
 @dataclass(frozen=True, eq=False)
 class Conditions:
     """What a block may know beside its signal: one session (the unit at rest and zeroed before) on an even grid.
@@ -74,7 +77,8 @@ class Conditions:
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
     load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
     ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
-    ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, None outside a model.
+    ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, for effects that say that
+    they bend beside it; None for all others, and outside a model.
     """
 
     time_s: Array
@@ -87,10 +91,25 @@ class Conditions:
     relaxing: tuple[float, float] | None = None
     cache: dict[str, Array] = field(default_factory=dict, repr=False)
     """What blocks derive from the load alone (largest so far, cycles done), by name."""
+    _kept: dict[str, dict[tuple[float, ...], Array]] = field(default_factory=dict, init=False, repr=False)
 
     def within(self, share: float, rate_per_s: float) -> Conditions:
         """The same conditions, and what was derived from them, within a model whose arm relaxes so."""
         return replace(self, relaxing=(share, rate_per_s))
+
+    def kept(self, name: str, numbers: tuple[float, ...], make: Callable[[], Array]) -> Array:
+        """What ``make`` derives from these conditions and ``numbers`` alone: the last few by a name are kept.
+
+        A fit asks for the same again wherever it moves another parameter. Nobody may write to what it gives.
+        """
+        known = self._kept.setdefault(name, {})
+        found = known.pop(numbers, None)
+        if found is None:
+            found = make()
+            if len(known) >= MOST_KEPT:
+                known.pop(next(iter(known)))
+        known[numbers] = found  # the last asked for stands last
+        return found
 
     @property
     def rate_per_s(self) -> Array:
@@ -152,6 +171,7 @@ class Effect(ABC):
     ``is_refinement`` where it follows members of other families too, and so tells no kind.
     ``is_steep_undone``: True where half a spacing of single precision in a signal moves the load by 3e-7 of full scale.
     ``is_memoryless``: True where the reading is a function of the present load alone.
+    ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
     """
 
@@ -174,6 +194,7 @@ class Effect(ABC):
     why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False
     is_memoryless: ClassVar[bool] = False
+    bends_beside_arm: ClassVar[bool] = False
     imitates: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
     is_steep_undone: ClassVar[bool] = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import running_time_s, settled, unsettled_in_c
+from smartshoe.models.effects._sensor_clock import settled, settled_so_far, unsettled_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -36,7 +36,7 @@ class FlexibleGainDrift(Effect):
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the session's start."""
         change, tau, stretch = (float(value) for value in values)
-        return signal * (1.0 + change * settled(running_time_s(conditions), tau, stretch))
+        return signal * (1.0 + change * settled_so_far(conditions, tau, stretch))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Divide by the gain; exact while that stays above a hundredth of its first value."""

@@ -21,6 +21,7 @@ class GasCompression(Effect):
 
     name, family, stage, place = "gas_compression", "static_curve", "gas", "gas"
     is_memoryless = True
+    bends_beside_arm = True
     says = "the air stiffens as it is compressed: the reading against load is bent upwards, ever steeper"
     parameters = (
         EffectParameter(

@@ -26,6 +26,7 @@ class MullinsSoftening(Effect):
     """
 
     name, family, stage, place = "mullins_softening", "softening", "wall", "wall"
+    bends_beside_arm = True
     says = "the first loading to a level reads lower than every later one to that level or below"
     parameters = (
         EffectParameter(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -60,8 +61,7 @@ class PlayHysteresis(Effect):
             return signal.copy()
         from smartshoe.kernels.memory import relays
 
-        half_widths = np.maximum(HALF_WIDTHS, dead_zone(conditions))
-        closed, open_ = _weights(half_widths, values)
+        half_widths, closed, open_ = _bank(dead_zone(conditions), *(float(value) for value in values[1:]))
         out = np.empty(signal.size)
         relays(np.ascontiguousarray(signal), half_widths, closed, open_, float(values[3]), -half_widths, out)
         return signal - float(values[0]) * out
@@ -71,7 +71,7 @@ class PlayHysteresis(Effect):
         from smartshoe.kernels.memory import relays_undone
 
         strength, levelling = float(values[0]), float(values[3])
-        closed, open_ = _weights(HALF_WIDTHS, values)
+        closed, open_ = _weights(HALF_WIDTHS, *(float(value) for value in values[1:]))
         members = tuple(f"play{k}" for k in range(HALF_WIDTHS.size))
 
         def body(of: Mapping[str, str]) -> str:
@@ -80,9 +80,20 @@ class PlayHysteresis(Effect):
         return Undone(relays_undone, (strength, HALF_WIDTHS, closed, open_, levelling), -HALF_WIDTHS, members, body)
 
 
-def _weights(half_widths: Array, values: Array) -> tuple[Array, Array]:
+@lru_cache(maxsize=64)
+def _bank(
+    narrowest: float, width: float, spread: float, levelling: float, openness: float
+) -> tuple[Array, Array, Array]:
+    """Half widths (m,), none below ``narrowest``, and `_weights`: kept, since a fit asks for the same few often.
+
+    Nobody may write to them; were they marked so, kernels would be compiled once more.
+    """
+    half_widths = np.maximum(HALF_WIDTHS, narrowest)
+    return half_widths, *_weights(half_widths, width, spread, levelling, openness)
+
+
+def _weights(half_widths: Array, width: float, spread: float, levelling: float, openness: float) -> tuple[Array, Array]:
     """Weights (m,) of relays and of stops, for a loop of half height one."""
-    width, spread, levelling, openness = (float(value) for value in values[1:])
     weight = np.exp(-0.5 * (np.log(HALF_WIDTHS / width) / spread) ** 2) / HALF_WIDTHS
     low = np.maximum(LEVELS[:, None] - 2.0 * half_widths, 0.0)
     up = np.maximum(np.minimum(LEVELS[:, None], 1.0 - 2.0 * half_widths), low)

@@ -21,6 +21,7 @@ class WallHardening(Effect):
 
     name, family, stage, place = "wall_hardening", "static_curve", "wall", "wall"
     is_memoryless = True
+    bends_beside_arm = True
     says = (
         "the wall stiffens with deformation: the reading against load is straight at first and flattens at high loads"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import running_time_s, settled, unsettled_in_c
+from smartshoe.models.effects._sensor_clock import settled, settled_so_far, unsettled_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -37,7 +37,8 @@ class WarmUp(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and what the zero has moved."""
-        return signal + float(values[0]) * settled(running_time_s(conditions), float(values[1]), float(values[2]))
+        change, tau, stretch = (float(value) for value in values)
+        return signal + change * settled_so_far(conditions, tau, stretch)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Subtract it; exact."""
