@@ -26,9 +26,12 @@ from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scal
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
+    elsewhere_of,
+    force_of,
     known_error,
     moved_of,
     none_of,
+    off_elsewhere,
     other_kind_of,
     parted_clocks,
     past_of,
@@ -226,35 +229,37 @@ def _diagnosed(
     crept = [(one, tare) for one in names if (tare := creeping(zeros, one.effect, one.member.size, thresholds))]
     names = tuple(one for one in names if one not in [drift for drift, _ in crept])
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
-    causes = [_cause(name, found, fine, best, given) for name in names]
+    causes = [_cause(name, found, fine, best, given, thresholds) for name in names]
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
     follows = not any(name.kind_only for name in names)
     known = known_error(integrity.faults, sessions, scale)
     won = gain(baseline, best, scale, thresholds)
+    elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:
-        verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss)
+        verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=elsewhere)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, zeros, sessions, scale)
-    noise_variance = max(best.rmse**2 - after.rms**2, 0.0)
+    noise_variance = max(best.rmse**2 - max(after.rms, elsewhere) ** 2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
     named = {cause.name for cause in causes} | {name.member.name for name in names}
     parameters, covariance = joint_parameters(found.fit, scale)
-    force = force_rmse_n(fine, extended)
+    plain_n, force_n = (force_rmse_n(fine, model) for model in (found.baseline.model, extended))
+    ways = beyond(fine, scale, thresholds) if won.is_loss or elsewhere else None
     return Diagnosis(
         verdict,
-        sentence_of(verdict, causes, baseline, best, rest, thresholds, worse=won.is_loss),
+        sentence_of(verdict, causes, baseline, best, rest, thresholds, worse=won.is_loss, elsewhere=elsewhere),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
         causes=tuple(causes),
         minor=tuple(part.name for part in extended.parts if part.name not in named),
         data_faults=(*integrity.faults, *noise),
-        baseline=_goodness(baseline, force_rmse_n(fine, found.baseline.model), before, scale),
-        extended=_goodness(best, force, after, scale),
+        baseline=_goodness(baseline, plain_n, before, scale),
+        extended=_goodness(best, force_n, after, scale),
         gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
@@ -264,7 +269,9 @@ def _diagnosed(
         ),
         limits=(
             *given.limits,
-            *([worse_of(won, beyond(fine, scale, thresholds))] if won.is_loss else []),
+            *([worse_of(won, ways)] if won.is_loss else []),
+            *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
+            *([force_of(plain_n, force_n)] if force_n > (1.0 + thresholds.standing) * plain_n else []),
             *parted,
             *(said for _, said in unclear),
             *past,
@@ -289,10 +296,14 @@ def _percent_less(after: float, before: float) -> float:
     return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
 
 
-def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared) -> Cause:
+def _cause(
+    name: Name, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared, thresholds: Thresholds
+) -> Cause:
     member = name.member
     won = gain(errors(fine, member.without.model), best, given.scale)
-    near = {a.effect: a.margin for a in (*member.alternatives, *member.laws) if a.effect is not None}
+    near = {
+        a.effect: a.margin for a in (*member.alternatives, *member.laws) if a.effect not in (None, name.effect.name)
+    }
     rivals = tuple(Rival(effect, margin) for effect, margin in sorted(near.items(), key=lambda one: one[1]))
     nothing = next((a.margin for a in member.alternatives if a.effect is None), 0.0)
     evidence = [
@@ -303,7 +314,7 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
             f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log, also where the"
             " others may depart towards any law of their kinds",
         ),
-        *_held_out_evidence(member.size, won),
+        *_held_out_evidence(member.size, won, thresholds.material),
     ]
     if rivals:
         evidence.append(
@@ -331,22 +342,23 @@ def _cause(name: Name, found: Inference, fine: Sequence[Session], best: Errors, 
     return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals)
 
 
-def _held_out_evidence(size: float, won: Gain) -> list[Statement]:
+def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:
     moves = Statement(
         "size in percent of full scale",
         100 * size,
-        0.0,
+        100 * material,
         f"it moves the reading by {100 * size:.3g} % of full scale",
     )
     if math.isnan(won.gain_percent):
         return [moves]
+    way = "falls" if won.rmse_after <= won.rmse_before else "rises"
     return [
         moves,
         Statement(
             "gain on held-out data in percent",
             won.gain_percent,
             0.0,
-            f"on data not fitted the error falls from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+            f"on data not fitted the error {way} from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
         ),
     ]
 
@@ -375,7 +387,7 @@ def _zero_cause(
         else 1.0 - thresholds.false_name,  # by its model alone, or seen
         1.0 / (1.0 + len(zero.alternatives)),
     )
-    evidence = (seen, *_held_out_evidence(zero.size, won))
+    evidence = (seen, *_held_out_evidence(zero.size, won, thresholds.material))
     return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
 
 

@@ -99,7 +99,7 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
-    """How a model does on held-out data; ``structure_rms`` is what its residual holds beside noise (reading's unit).
+    """How a model does on held-out data; ``structure_rms`` is what its residual of all recordings holds beside noise.
 
     NaN where nothing could be judged.
     """

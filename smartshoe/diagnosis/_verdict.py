@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
 from smartshoe.diagnosis._held_out import Errors, Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._residual_structure import ResidualStructure
+from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import listed
@@ -88,10 +91,12 @@ def verdict_of(
     known: float = 0.0,
     *,
     worse: bool = False,
+    elsewhere: float = 0.0,
 ) -> Verdict:
     """What is left, against what was wrong ``before`` and what is tolerable.
 
     ``worse``: that the extension is so, for certain, on what is held out: whatever it follows, it explains a part.
+    ``elsewhere``: `off_elsewhere`.
 
     ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
 
@@ -101,8 +106,22 @@ def verdict_of(
     least = max(thresholds.material, thresholds.tolerable, known)
     if causes:
         least = max(least, thresholds.departure * before.rms if follows else 0.0)
-        return "partly_explained" if left > least or worse else "explained"
-    return "unexplained" if left > least else "adequate"
+        return "partly_explained" if left > least or worse or elsewhere else "explained"
+    return "unexplained" if left > least or elsewhere else "adequate"
+
+
+def off_elsewhere(
+    sessions: Sequence[Session], residuals: Sequence[Array], within: float, thresholds: Thresholds
+) -> float:
+    """Rms beyond white noise of recordings that were not fitted, 0 where it is as what was fitted is off by.
+
+    ``within`` is that of what was fitted. What is off by `clear` of it, and of what is tolerable, is of another unit or
+    of loads of which nothing was learnt.
+    """
+    apart = [(one, left) for one, left in zip(sessions, residuals, strict=True) if one.held_out.all()]
+    alone = [replace(one, held_out=np.zeros_like(one.held_out)) for one, _ in apart]
+    off = beyond_noise(alone, [left for _, left in apart], thresholds)
+    return off if off > thresholds.clear * max(within, thresholds.tolerable) else 0.0
 
 
 def sentence_of(
@@ -114,6 +133,7 @@ def sentence_of(
     thresholds: Thresholds,
     *,
     worse: bool = False,
+    elsewhere: float = 0.0,
 ) -> str:
     """The answer in a sentence: size before judgement; ``rest`` is what no cause accounts for."""
     names = [cause.name.replace("_", " ") for cause in causes]
@@ -122,14 +142,18 @@ def sentence_of(
     if baseline.is_empty:
         good = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
     not_explained = f"{100 * rest.rms:.2g} % {rest.how} and is not explained"
+    if elsewhere > rest.rms:
+        not_explained = f"of what is held out {100 * elsewhere:.2g} % is not explained"
+    by_all = f"{100 * best.rmse:.2g} %"
     if verdict == "adequate":
         return good if rest.rms <= thresholds.material else f"{good}; {not_explained}"
+    if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:
+        return f"{good}; {not_explained}: the extended model is good to {by_all}, by effects of which none is sure"
     if verdict == "unexplained":
         return f"{good}; {not_explained}, and no effect of the catalogue accounts for it"
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
         return said if verdict == "explained" else f"{said}; {not_explained}"
-    by_all = f"{100 * best.rmse:.2g} %"
     said = f"{good}; with {named} it is worse there, good to {by_all}" if worse else f"{good}, with {named} to {by_all}"
     return said if verdict == "explained" else f"{said}; {not_explained}"
 
@@ -142,6 +166,20 @@ def worse_of(won: Gain, beyond: str | None) -> str:
         f"on what was held out the extended model is worse than the plain one ({won.rmse_before:.3g} to"
         f" {won.rmse_after:.3g} {won.unit}, by {-high:.2g} to {-low:.2g} %): {why}; do not correct such recordings by"
         " it before one of them is among those that are fitted"
+    )
+
+
+def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
+    """What is said where recordings that were not fitted are ``off`` by far more than those that were."""
+    why = beyond or "its loads are as those that were fitted, so that it is of another unit, or the unit was changed"
+    return f"what is held out is off by {100 * off:.2g} % of full scale, what was fitted by {100 * within:.2g} %: {why}"
+
+
+def force_of(plain_n: float, extended_n: float) -> str:
+    """What is said of an extended model that gives the load back worse than the plain one does."""
+    return (
+        f"the force that the extended model gives back is worse than the plain one's ({plain_n:.3g} to {extended_n:.3g}"
+        " N on what was held out), since to undo its effects makes more of what is left: compensate by the plain model"
     )
 
 

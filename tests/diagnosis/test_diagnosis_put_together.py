@@ -131,6 +131,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
+    answer("off_elsewhere", 0.0)
     return made
 
 
@@ -283,3 +284,13 @@ def test_what_effects_undo_is_offered_no_name(parts: Any) -> None:
 def test_what_is_left_beyond_the_error_leaves_no_noise(parts: Any) -> None:
     parts.kinds[1].rms = 0.5
     assert _run_diagnosis(parts).explainable_percent == 100.0
+
+
+def test_a_force_that_comes_back_worse_is_said(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    for worse_n, is_said in ((9.1, False), (9.3, True)):
+        parts.seen.clear()
+        monkeypatch.setattr(
+            _procedure, "force_rmse_n", lambda fine, model, worse_n=worse_n: worse_n if len(model.parts) else 9.0
+        )
+        told = _run_diagnosis(parts)
+        assert any("compensate by the plain model" in limit for limit in told.limits) is is_said

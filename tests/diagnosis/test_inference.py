@@ -193,7 +193,7 @@ def test_what_is_held_out_selects_nothing(
     assert_allclose(again.model.theta, found.model.theta, rtol=1e-9, atol=1e-12)
     assert [(one.name, one.confidence) for one in again.causes] == [(one.name, one.confidence) for one in found.causes]
     assert again.causes[0].held_out.rmse_after != found.causes[0].held_out.rmse_after
-    assert again.verdict == ("partly_explained" if wander else "explained")
+    assert again.verdict == "partly_explained"  # of another unit, or of one that wanders
 
 
 def test_nothing_is_named_where_nothing_is_wrong() -> None:

@@ -142,7 +142,12 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
     assert _said("explained", "dead_band", "delay", "rate_gain").endswith("with dead band, delay and rate gain to 10 %")
     rest = "3.4 % repeats and is not explained"
     assert _said("partly_explained", "delay") == f"{good}, with delay to 10 %; {rest}"
-    assert _said("unexplained") == f"{good}; {rest}, and no effect of the catalogue accounts for it"
+    unsure = "the extended model is good to 10 %, by effects of which none is sure"
+    assert _said("unexplained") == f"{good}; {rest}: {unsure}"
+    alone = sentence_of("unexplained", [], BEFORE, BEFORE, _left(0.034), STANDARD)
+    assert alone == f"{good}; {rest}, and no effect of the catalogue accounts for it"
+    elsewhere = sentence_of("unexplained", [], BEFORE, BEFORE, _left(0.034), STANDARD, elsewhere=0.19)
+    assert f"{good}; of what is held out 19 % is not explained, and" in elsewhere
     assert _said("adequate") == f"{good}; {rest}"
     for quiet in (_left(STANDARD.material), _left(0.5, significant=False)):
         assert _said("adequate", left=quiet) == good
@@ -170,11 +175,13 @@ def test_a_fall_is_in_percent_and_never_below_nothing() -> None:
 
 # -- causes -----------------------------------------------------------------------------------------------------------
 def test_evidence_on_held_out_data_is_in_the_readings_unit() -> None:
-    size, gained = _held_out_evidence(0.0123, Gain(2.5, 0.75, "mbar", 70.0, (60.0, 80.0)))
-    assert (size.value, size.threshold) == (pytest.approx(1.23), 0.0)
+    size, gained = _held_out_evidence(0.0123, Gain(2.5, 0.75, "mbar", 70.0, (60.0, 80.0)), 0.0002)
+    assert (size.value, size.threshold) == (pytest.approx(1.23), 0.02)
     assert "by 1.23 % of full scale" in size.says
     assert (gained.value, gained.threshold) == (70.0, 0.0)
-    assert "from 2.5 to 0.75 mbar" in gained.says
+    assert "falls from 2.5 to 0.75 mbar" in gained.says
+    _, lost = _held_out_evidence(0.0123, Gain(0.75, 2.5, "mbar", -233.0, (-300.0, -200.0)), 0.0002)
+    assert "rises from 0.75 to 2.5 mbar" in lost.says
 
 
 def _told(monkeypatch: pytest.MonkeyPatch, present: frozenset[str], kind_only: bool = False, laws: Any = ()) -> Any:
@@ -199,7 +206,7 @@ def _told(monkeypatch: pytest.MonkeyPatch, present: frozenset[str], kind_only: b
     )
     given: Any = SimpleNamespace(scale=SCALE, excitation=SimpleNamespace(present=present))
     found: Any = SimpleNamespace(fit="fit")
-    cause = _cause(name, found, "fine", AFTER, given)  # type: ignore[arg-type]
+    cause = _cause(name, found, "fine", AFTER, given, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]
     assert cause.parameters == {"of": ("fit", "static_curve_block", SCALE)}
     assert (cause.effect, cause.confidence, cause.law_confidence) == (one, 0.9, 0.6)

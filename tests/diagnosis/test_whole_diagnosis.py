@@ -18,7 +18,7 @@ from smartshoe.diagnosis._lack_of_fit import LackOfFit
 from smartshoe.diagnosis._procedure import _outside, _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import full_scale, prepare
-from smartshoe.diagnosis._verdict import sentence_of, verdict_of
+from smartshoe.diagnosis._verdict import off_elsewhere, sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Conditions, effect
@@ -253,7 +253,9 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     assert said(causes, small) == ("explained", f"{good}, with dead band, delay and zero offset to 1 %")
     assert said(causes[:1], small)[1] == f"{good}, with dead band to 1 %"
     rest = f"{100 * large:.2g} % repeats and is not explained"
-    assert said([], large) == ("unexplained", f"{good}; {rest}, and no effect of the catalogue accounts for it")
+    assert said([], large) == (
+        "unexplained", f"{good}; {rest}: the extended model is good to 1 %, by effects of which none is sure"
+    )  # fmt: skip
     assert said(causes[:2], large) == ("partly_explained", f"{good}, with dead band and delay to 1 %; {rest}")
     # What laws usually depart by may be left, but not where no law of the kind follows.
     usual = 0.9 * limits.departure * large
@@ -332,3 +334,38 @@ def test_what_a_loaded_unit_brings_along_fades_with_its_pole_and_is_no_effect(sh
     assert found.model.relaxation_rate_per_s == pytest.approx(0.22, rel=0.02)
     assert found.baseline is not None
     assert found.baseline.rmse == pytest.approx(0.02, rel=0.1)
+
+
+def test_another_unit_held_out_leaves_nothing_good_enough(runs: list[Recording], found: Diagnosis) -> None:
+    other = Recording.from_arrays(
+        time_s=runs[2].time_s, force_n=runs[2].force_n, pressure_mbar=0.7 * runs[2].sensor.values, name="other"
+    )
+    again = diagnose(runs[:2], hold_out=other)
+    assert [one.name for one in again.causes] == [one.name for one in found.causes]
+    assert (found.verdict, again.verdict) == ("explained", "partly_explained")
+    (said,) = [limit for limit in again.limits if limit.startswith("what is held out is off by")]
+    assert "another unit" in said
+    share = float(np.std(0.3 * runs[2].sensor.values) / FULL_MBAR)
+    assert again.extended is not None
+    assert again.extended.rmse / FULL_MBAR == pytest.approx(share, rel=0.2)
+
+
+def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() -> None:
+    limits, count = Thresholds(), 2000
+    time_s = STEP_S * np.arange(count)
+    run = Recording.from_arrays(time_s=time_s, force_n=100.0 + time_s, pressure_mbar=10.0 + time_s, name="r")
+    usable = np.ones(count, dtype=bool)
+    scale = full_scale([run], [usable], limits)
+    fitted, apart = prepare([run, run], [usable, usable], [False, True], scale, 1, limits)
+    wave = np.sqrt(2.0) * np.sin(time_s)
+    noise = np.random.default_rng(1).standard_normal(count)
+    for size, within, off in (
+        (2.1 * limits.tolerable, 0.0, 2.1 * limits.tolerable),
+        (1.9 * limits.tolerable, 0.0, 0.0),
+        (0.02, 0.011, 0.0),
+        (0.02, 0.009, 0.02),
+    ):
+        told = off_elsewhere([fitted, apart], [10.0 * wave, size * wave + 0.001 * noise], within, limits)
+        assert told == pytest.approx(off, rel=0.05)
+    assert off_elsewhere([fitted], [wave], 0.0, limits) == 0.0  # every recording is fitted in part
+    assert off_elsewhere([fitted, apart], [wave, 0.05 * noise], 0.0, limits) == 0.0

@@ -164,7 +164,7 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
         )
     rows.append(
         Row(
-            "structure that is left in the error, rms (of full scale)",
+            "structure that is left in all recordings, rms (of full scale)",
             of_scale(before, before.structure_rms) if before.structure_rms > 0 else NO_STRUCTURE,
             of_scale(after, after.structure_rms) if after.structure_rms > 0 else NO_STRUCTURE,
             _change(before.structure_rms, after.structure_rms),
