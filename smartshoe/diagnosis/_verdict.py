@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -18,7 +19,7 @@ from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import listed
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity import DataFault
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -121,7 +122,11 @@ def off_elsewhere(
     apart = [(one, left) for one, left in zip(sessions, residuals, strict=True) if one.held_out.all()]
     alone = [replace(one, held_out=np.zeros_like(one.held_out)) for one, _ in apart]
     off = beyond_noise(alone, [left for _, left in apart], thresholds)
-    return off if off > thresholds.clear * max(within, thresholds.tolerable) else 0.0
+    seen = np.concatenate([left[one.usable] for one, left in apart]) if apart else np.zeros(1)
+    white = float(seen @ seen) / max(seen.size, 1) - off**2
+    chance = largest_of_noise(1, thresholds) * math.sqrt(2.0 / max(seen.size, 1)) * white
+    is_off = off > thresholds.clear * max(within, thresholds.tolerable) and off**2 > chance
+    return off if is_off else 0.0
 
 
 def sentence_of(
