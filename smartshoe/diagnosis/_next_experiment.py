@@ -42,10 +42,11 @@ def next_experiment(
     open_: bool,
     worse: bool = False,
 ) -> NextExperiment | None:
-    """For the most doubtful cause: the protocol with the largest expected margin, or the channel to log.
+    """For the most doubtful cause: the shortest protocol that tells it clearly better than this data, or a channel.
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
-    Where no cause is in doubt and something is left (``open_``), what this data never showed; else None.
+    Where no cause is in doubt and something is left (``open_``), or none can be told, what this data never showed;
+    else None.
     """
     if worse:
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
@@ -53,7 +54,8 @@ def next_experiment(
         return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.name in found.fit.model.names]
     if not doubtful:
-        return _unseen(found, causes, excitation) if open_ or any(c.equivalents for c in causes) else None
+        is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)
+        return _unseen(found, causes, excitation) if is_open else None
     cause = max(doubtful, key=lambda one: one.size)
     rival = cause.equivalents[0]
     other = _in_place_of(found, cause.name, rival)
@@ -72,11 +74,25 @@ def next_experiment(
         instead = f"log the {channel} too" if channel else "take either, they predict the same"
         says = f"no load history that a machine can run tells {pair} apart: {instead}"
         return NextExperiment(names, None, channel, says, expected[best])
+    telling = {
+        name: EXPERIMENTS[name](peak_n)
+        for name, by in expected.items()
+        if by > max(margin, expected[best] / excitation.thresholds.clear)
+    }
+    if not telling:
+        instead = f"log the {channel} too" if channel else f"{cause.name.replace('_', ' ')} follows better"
+        says = (
+            f"none of the {len(expected)} protocols is expected to tell {pair} apart better than this data does,"
+            f" {best.replace('_', ' ')} by {expected[best]:,.0f} of -2 log likelihood and this data by {margin:,.0f}:"
+            f" {instead}"
+        )
+        return NextExperiment(names, None, channel, says, expected[best])
+    chosen = min(telling, key=lambda name: telling[name].duration_s)
     says = (
-        f"run {best.replace('_', ' ')}: it should tell {pair} apart by {expected[best]:,.0f} of -2 log likelihood,"
+        f"run {chosen.replace('_', ' ')}: it should tell {pair} apart by {expected[chosen]:,.0f} of -2 log likelihood,"
         f" where this data does by {max(margin, 0.0):,.0f}"
     )
-    return NextExperiment(names, best, channel, says, expected[best], EXPERIMENTS[best](peak_n))
+    return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
 
 
 def _in_place_of(found: Inference, name: str, rival: str) -> Fit:

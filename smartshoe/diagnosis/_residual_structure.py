@@ -89,7 +89,7 @@ def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array], thresh
 
 
 def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> str:
-    """The bin of load and direction, and the stretch of time, that hold most of the residual's slow part."""
+    """The bin of load and direction, and the stretch of the file's time, that hold most of the residual's slow part."""
     load, rate, error, names = [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):
         width = min(max(1, round(0.5 / session.conditions.step_s)), residual.size)
@@ -114,9 +114,9 @@ def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: T
     own = power[numbers == worst]
     parts = min(10, own.size)
     at = int(np.argmax([float(part.mean()) for part in np.array_split(own, parts)]))
-    duration = sessions[worst].conditions.time_s[-1]
+    begin_s, duration_s = sessions[worst].recording.time_s[0], sessions[worst].conditions.time_s[-1]
     return (
         f"{100 * table[d, k] / total:.0f} % of it sits at {25 * k}-{25 * (k + 1)} % of the load {doing}"
         f" ({100 * share[d, k]:.0f} % of the samples); it is largest in {sessions[worst].recording.name},"
-        f" {at * duration / parts:.0f}-{(at + 1) * duration / parts:.0f} s"
+        f" {begin_s + at * duration_s / parts:.0f}-{begin_s + (at + 1) * duration_s / parts:.0f} s"
     )

@@ -15,13 +15,15 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
-MOST_FOLDS = 6  # of a single recording, a resolution
+MOST_FOLDS = 6  # of a single recording and of many, a resolution
+MOST_ALONE = 2 * MOST_FOLDS  # recordings that are left out one at a time
 OWN_STEPS = 2  # of an effect's own parameters, from where all recordings have them
 
 
 class LeftOut:
     """Each fitted recording in turn, predicted by fits to the others; of a single one, its load cycles in blocks.
 
+    Many recordings are left out in groups, so that six fits do; the errors are still those of each recording.
     A fit begins where that of all of them ended, so that few steps lead to its end.
     """
 
@@ -34,7 +36,7 @@ class LeftOut:
         self._errors: dict[ExtendedModel, Array] = {}
 
     def errors(self, model: ExtendedModel) -> Array:
-        """(folds,) squared errors of what is left out; cached."""
+        """(recordings or blocks,) squared errors of what is left out; cached."""
         if model not in self._errors:
             start = within_bounds(model)
             rows = self._rows_of(start)
@@ -69,8 +71,16 @@ class LeftOut:
         return lambda rest: [rows[id(one.conditions)] for one in rest.sessions]
 
     def _squares(self, models: Sequence[ExtendedModel]) -> Array:
-        """(folds,) squared errors of a model each where its fold is left out."""
-        left = [residual_of(fold.seen, model)[fold.left_out] for fold, model in zip(self._folds, models, strict=True)]
+        """(recordings or blocks,) squared errors of what each fold leaves out, by its model.
+
+        What is left out together shares a fit, whose own error moves their gains in the second order only: each of them
+        counts in a standard error.
+        """
+        left = [
+            residual_of(session, model)[mask]
+            for fold, model in zip(self._folds, models, strict=True)
+            for session, mask in fold.left_out
+        ]
         return np.array([float(one @ one) for one in left])
 
     def stands(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
@@ -89,24 +99,36 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class _Fold:
-    """``rest`` is fitted, and ``left_out`` (n,) of ``seen`` predicted, whose offset and past are its own always."""
+    """``rest`` is fitted, samples (n,) of recordings ``left_out`` predicted, whose offset and past stay their own."""
 
     rest: list[Session]
-    seen: Session
-    left_out: Mask
+    left_out: list[tuple[Session, Mask]]
 
 
 def _folds(sessions: Sequence[Session]) -> list[_Fold]:
+    """Many recordings are dealt out to groups, there and back.
+
+    Neighbours, which a loading rate or a day often has in common, come into different groups, and so do those of a
+    protocol that comes round with every sixth: no group takes all of a kind away.
+    """
     fitted = [session for session in sessions if session.fitted.any()]
     if len(fitted) > 1:
-        return [_Fold([one for one in fitted if one is not this], this, this.fitted) for this in fitted]
+        turns = [*range(MOST_FOLDS), *reversed(range(MOST_FOLDS))]
+        groups = [k if len(fitted) <= MOST_ALONE else turns[k % len(turns)] for k in range(len(fitted))]
+        return [
+            _Fold(
+                [one for one, group in zip(fitted, groups, strict=True) if group != k],
+                [(one, one.fitted) for one, group in zip(fitted, groups, strict=True) if group == k],
+            )
+            for k in range(max(groups) + 1)
+        ]
     (session,) = fitted
     folds = []
     for cycles in np.array_split(np.unique(session.cycle[session.fitted]), MOST_FOLDS):
         mask = np.isin(session.cycle, cycles) & session.fitted
         rest = replace(session, held_out=session.held_out | mask)
         if mask.any() and rest.fitted.any():
-            folds.append(_Fold([rest], session, mask))
+            folds.append(_Fold([rest], [(session, mask)]))
     return folds
 
 

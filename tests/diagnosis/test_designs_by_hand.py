@@ -213,19 +213,28 @@ def _cause(name: str, size: float, equivalents: tuple[str, ...], rivals: tuple[t
     return SimpleNamespace(name=name, size=size, equivalents=equivalents, rivals=told)
 
 
-def _next(monkeypatch: pytest.MonkeyPatch, causes: list[Any], margins: dict[str, float], open_: bool = False) -> Any:
+def _next(
+    monkeypatch: pytest.MonkeyPatch,
+    causes: list[Any],
+    margins: dict[str, float],
+    open_: bool = False,
+    can_validate: bool = True,
+) -> Any:
     def margin(truth: Any, rival: Any, protocol: Any, noise_sd: float, like: Any) -> float:
         assert (truth.model.names, rival, noise_sd, like) == (("linear_leak", "dead_band"), "other", 0.01, "session")
-        return margins.get(protocol, 0.0)
+        return margins.get(protocol.name, 0.0)
 
     monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, name, rival: "other")
     monkeypatch.setattr(_next_experiment, "expected_margin", margin)
     monkeypatch.setattr(_next_experiment, "_channel", lambda name, rival, sessions: "temperature" if margins else None)
-    made = {name: (lambda peak_n, name=name: f"{name}") for name in ("steps", "long_hold")}
+    lasting = {"long_hold": 600.0, "steps": 50.0}
+    made = {name: (lambda peak_n, name=name: SimpleNamespace(name=name, duration_s=lasting[name])) for name in lasting}
     monkeypatch.setattr(_next_experiment, "EXPERIMENTS", made)
     monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: "unseen")
     model = MODEL.with_part("linear_leak").with_part("dead_band")
-    found: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=SimpleNamespace(noise_sd=0.01))
+    found: Any = SimpleNamespace(
+        fit=SimpleNamespace(model=model), likelihood=SimpleNamespace(noise_sd=0.01), can_validate=can_validate
+    )
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
     return next_experiment(found, causes, ["session"], excitation, open_=open_)  # type: ignore[list-item]
 
@@ -234,9 +243,9 @@ def test_the_largest_doubtful_cause_is_parted_by_what_parts_it_best(monkeypatch:
     small = _cause("dead_band", 0.01, ("contact_area",))
     large = _cause("linear_leak", 0.02, ("orifice_leak", "zero_drift"), (("other", 3.0), ("orifice_leak", 5.0)))
     sure = _cause("dead_band", 0.09, ())
-    told = _next(monkeypatch, [sure, small, large], {"steps": 40.0, "long_hold": 60.0})
+    told = _next(monkeypatch, [sure, small, large], {"steps": 20.0, "long_hold": 60.0})
     assert told.separates == ("linear_leak", "orifice_leak", "zero_drift")
-    assert (told.protocol, told.channel, told.expected_margin, told.steps) == (
+    assert (told.protocol, told.channel, told.expected_margin, told.steps.name) == (
         "long_hold", "temperature", 60.0, "long_hold",
     )  # fmt: skip
     assert "it should tell linear leak and orifice leak apart by 60 of" in told.says
@@ -245,6 +254,26 @@ def test_the_largest_doubtful_cause_is_parted_by_what_parts_it_best(monkeypatch:
     assert "where this data does by 0" in _next(monkeypatch, [better], {"steps": 40.0}).says
     unknown = _cause("linear_leak", 0.02, ("orifice_leak",))
     assert "where this data does by 0" in _next(monkeypatch, [unknown], {"steps": 40.0}).says
+
+
+def test_of_protocols_that_tell_about_as_much_the_shortest_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At least half of what the best does, and more than this data."""
+    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), (("orifice_leak", 35.0),))]
+    for by, protocol in ((40.1, "steps"), (39.9, "long_hold")):
+        told = _next(monkeypatch, doubtful, {"steps": by, "long_hold": 80.0})
+        assert (told.protocol, told.steps.name) == (protocol, protocol)
+    assert _next(monkeypatch, doubtful, {"steps": 34.9, "long_hold": 60.0}).protocol == "long_hold"
+
+
+def test_no_protocol_is_run_that_tells_no_more_than_this_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), (("orifice_leak", 60.0),))]
+    assert _next(monkeypatch, doubtful, {"long_hold": 60.1}).protocol == "long_hold"
+    told = _next(monkeypatch, doubtful, {"steps": 40.0, "long_hold": 60.0})
+    assert (told.protocol, told.channel, told.expected_margin, told.steps) == (None, "temperature", 60.0, None)
+    assert told.says == (
+        "none of the 2 protocols is expected to tell linear leak and orifice leak apart better than this data does,"
+        " long hold by 60 of -2 log likelihood and this data by 60: log the temperature too"
+    )
 
 
 def replace_margin(cause: Any, margin: float) -> Any:
@@ -266,6 +295,7 @@ def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytes
     sure, elsewhere = _cause("linear_leak", 0.02, ()), _cause("zero_offset", 0.02, ("load_cell_tare",))
     assert _next(monkeypatch, [sure], {}) is None
     assert _next(monkeypatch, [sure], {}, open_=True) == "unseen"
+    assert _next(monkeypatch, [], {}, can_validate=False) == "unseen"  # nothing can be told of a single load cycle
     assert _next(monkeypatch, [sure, elsewhere], {}) == "unseen"  # a zero that is no part of the model
     assert _next(monkeypatch, [], {}) is None
 

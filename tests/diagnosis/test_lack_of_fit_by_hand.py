@@ -45,7 +45,7 @@ def _session(load: Array, cycle: Any = None, usable: Any = None, step_s: float =
         usable=kept,
         fitted=kept,
         cycle=np.zeros(load.size, dtype=np.intp) if cycle is None else cycle,
-        recording=SimpleNamespace(name=name),
+        recording=SimpleNamespace(name=name, time_s=step_s * np.arange(load.size)),
     )
 
 
@@ -396,3 +396,6 @@ def test_the_tenth_of_the_time_with_the_largest_part_is_said() -> None:
     residual[600:700] = np.resize([2.0, -2.0], 100)
     assert where([one], [residual], STANDARD).endswith("largest in one, 30-40 s")
     assert where([one], [np.zeros(1001)], STANDARD).startswith("0 % of it")
+    # It is the file's own time, which need not begin at none.
+    one.recording.time_s += 2215.0
+    assert where([one], [residual], STANDARD).endswith("largest in one, 2245-2255 s")

@@ -83,6 +83,24 @@ def test_of_a_single_recording_blocks_of_its_cycles_are_left_out() -> None:
     assert float(errors.sum()) < 0.5 * float(_left_out(sessions).errors(_fitted(sessions)).sum())
 
 
+def test_of_many_recordings_each_has_its_error_by_a_fit_without_its_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    sessions = _sessions([_curved(0.08)] * 13)
+    model, fits = _fitted(sessions, "gas_compression"), []
+
+    def counted(*given: Any) -> Fit:
+        fits.append(fit(*given))
+        return fits[-1]
+
+    monkeypatch.setattr(_validation, "fit", counted)
+    errors = _left_out(sessions).errors(model)
+    assert (errors.size, len(fits)) == (13, MOST_FOLDS)
+    for found in fits:
+        gone = [one for one in sessions if not any(one is other for other in found.likelihood.sessions)]
+        for one in gone:
+            expected = float(np.sum(residual_of(one, found.model) ** 2))
+            assert np.isclose(errors, expected, rtol=1e-12).sum() == 1
+
+
 def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
     sessions = _sessions([_curved(0.1)] * 3)
     left_out, plain = _left_out(sessions), _fitted(sessions)

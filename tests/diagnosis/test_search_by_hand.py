@@ -234,24 +234,36 @@ def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
 def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blocks() -> None:
     one, two, none = (session_of(WAVE, np.full(240, bool(k))) for k in (1, 1, 0))
     folds = _folds([one, none, two])
-    assert [(fold.rest[0] is two, fold.seen is one, len(fold.rest)) for fold in folds[:1]] == [(True, True, 1)]
-    assert (folds[1].rest[0] is one, folds[1].seen is two, len(folds)) == (True, True, 2)
-    assert folds[0].left_out.all()
+    assert [[fold.rest, [seen for seen, _ in fold.left_out]] for fold in folds] == [[[two], [one]], [[one], [two]]]
+    assert folds[0].left_out[0][1].all()
     kept = np.ones(240, dtype=bool)
     kept[200:] = False
     single = session_of(WAVE, kept, np.repeat(np.arange(12), 20))
     folds = _folds([single, none])
     assert len(folds) == 6
     # Ten cycles are fitted: two each in four of the blocks, one in the others.
-    left = [sorted(set(single.cycle[fold.left_out])) for fold in folds]
+    left = [sorted(set(single.cycle[mask])) for fold in folds for _, mask in fold.left_out]
     assert left == [[0, 1], [2, 3], [4, 5], [6, 7], [8], [9]]
     for fold in folds:
-        (rest,) = fold.rest
-        assert fold.seen is single  # whose offset is its own, as that of a recording that is left out
-        assert not (rest.fitted & fold.left_out).any()
-        assert (rest.fitted | fold.left_out).sum() == 200
+        (rest,), ((seen, mask),) = fold.rest, fold.left_out
+        assert seen is single  # whose offset is its own, as that of a recording that is left out
+        assert not (rest.fitted & mask).any()
+        assert (rest.fitted | mask).sum() == 200
     assert len(_folds([session_of(WAVE, None, np.repeat(np.arange(3), 80))])) == 3
     assert _folds([session_of(WAVE)]) == []
+
+
+@pytest.mark.parametrize(("count", "largest", "folds"), [(12, 1, 12), (13, 3, 6), (40, 7, 6)])
+def test_more_than_twelve_recordings_are_left_out_in_six_groups(count: int, largest: int, folds: int) -> None:
+    sessions = [session_of(WAVE) for _ in range(count)]
+    found = _folds(sessions)
+    groups = [[sessions.index(seen) for seen, _ in fold.left_out] for fold in found]
+    assert (len(groups), max(map(len, groups))) == (folds, largest)
+    assert sorted(k for group in groups for k in group) == list(range(count))  # each once, and nothing else
+    for fold, group in zip(found, groups, strict=True):
+        assert fold.rest == [one for k, one in enumerate(sessions) if k not in group]
+    if count > 12:
+        assert all(len({k % 6 for k in group}) > 1 for group in groups)  # of six kinds that take turns, none is gone
 
 
 def test_gains_are_counted_in_their_standard_errors() -> None:
