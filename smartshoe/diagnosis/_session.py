@@ -257,7 +257,10 @@ def _session(
         neighbour=beside.get("neighbour"),
         before=before,
     )
-    kept = smoothed(good.astype(float), weights, factor) > 0.7
+    there = smoothed(good.astype(float), weights, factor)
+    # A reading that is logged at a part of the load's rate never fills a window.
+    usual = float(np.median(there[there > 0.0])) if good.any() else 1.0
+    kept = there > 0.7 * usual
     load = conditions.load
     if like is None:
         held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions, thresholds)

@@ -57,6 +57,15 @@ def test_a_recording_of_no_use_among_those_fitted_is_left_out(why: str) -> None:
     assert {fault.label for fault in found.data_faults if fault.recording == 1} <= {"good"}
 
 
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_reading_logged_at_a_part_of_the_loads_rate_is_judged(every: int) -> None:
+    lacking = np.arange(len(GOOD)) % every == 1
+    found = diagnose(GOOD.with_channel(replace(GOOD.sensor, missing=lacking)))
+    assert found.verdict == "adequate"
+    assert found.baseline is not None
+    assert found.baseline.rmse == pytest.approx(NOISE_MBAR, rel=0.1)
+
+
 def test_noise_is_told_of_the_recording_that_has_it() -> None:
     hum = 0.3 * np.sin(2.0 * np.pi * 7.0 * GOOD.time_s)
     humming = GOOD.with_channel(replace(GOOD.sensor, values=GOOD.sensor.values + hum))
