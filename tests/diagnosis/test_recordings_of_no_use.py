@@ -9,8 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
+from smartshoe.errors import UnitError
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import find_unit
 
 Array = NDArray[np.float64]
 
@@ -106,3 +108,10 @@ def test_a_load_that_pulls_refuses_where_it_is_fitted_and_is_left_out_where_it_i
     assert [(trace.name, trace.recording) for trace in found.traces] == [("good", 0), ("other", 2)]
     (said,) = (one for one in found.limits if one.startswith("left out: pulled:"))
     assert "from -4" in said
+
+
+@pytest.mark.parametrize("hold_out", [True, False])
+def test_readings_of_two_quantities_are_refused_by_name(hold_out: bool) -> None:
+    counted = OTHER.without("pressure").with_channel(replace(OTHER.sensor, unit=find_unit("counts")))
+    with pytest.raises(UnitError, match=r"^other: pressure is in counts .* in mbar .*: give all recordings in units"):
+        diagnose(GOOD, hold_out=counted) if hold_out else diagnose([GOOD, counted])
