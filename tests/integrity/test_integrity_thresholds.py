@@ -125,7 +125,7 @@ def test_material_is_the_error_from_which_on_a_lattice_is_a_fault() -> None:
 
 @pytest.mark.parametrize("material", [float("nan"), float("inf"), -1.0, 0.0, "a", True])
 def test_what_is_material_is_a_share_above_zero(material: float) -> None:
-    with pytest.raises(UsageError, match="material is .*: give a"):
+    with pytest.raises(UsageError, match=r"material is .*: give a"):
         diagnose(_pressed(TRIANGLE), material=material)
 
 
