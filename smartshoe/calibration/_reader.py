@@ -96,9 +96,11 @@ class Reader:
         if "extended" not in found:
             return None
         given = self.mapping(found, "extended")
-        for key in ("gain", "relaxation_rate_per_s", "full_scale_load_n", "full_scale_reading", "wall_ratio"):
+        for key in ("gain", "relaxation_rate_per_s", "full_scale_load_n", "wall_ratio"):
             if not self.number(given, key, "extended.") > 0.0:
                 raise self.fault(f"extended.{key}", f"is {given[key]!r}, it must be above 0")
+        if self.number(given, "full_scale_reading", "extended.") == 0.0:  # negative where readings fall with load
+            raise self.fault("extended.full_scale_reading", "is 0, it must not be")
         self.number(given, "relaxing_share", "extended.")
         self.text(given, "reading_unit", "extended.")
         effects = self.mapping(given, "effects", "extended.")

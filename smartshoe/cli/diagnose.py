@@ -77,6 +77,7 @@ def command(
     if design_path is not None:
         if files or held_out:
             raise UsageError("--design asks about protocols, before anything is measured: name no FILE beside it")
+        _refuse_beside_design()
         _design(design_path, json_path)
         return
     if not files:
@@ -135,13 +136,38 @@ def with_what_is_left(step: ShownSteps, with_report: bool) -> Callable[[str], No
     return show
 
 
+def _refuse_beside_design() -> None:
+    """Raise `UsageError` for options that mean nothing to a design."""
+    from smartshoe.errors import UsageError
+
+    context = click.get_current_context()
+    given = [
+        one.opts[0]
+        for one in context.command.params
+        if one.name not in ("design_path", "json_path")
+        and context.get_parameter_source(one.name or "") is click.core.ParameterSource.COMMANDLINE
+    ]
+    if given:
+        raise UsageError(f"--design takes no {', '.join(given)}: only --json goes with it")
+
+
 def _design(path: str, json_path: str | None) -> None:
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, note
     from smartshoe.diagnosis.design import design
     from smartshoe.report.diagnosis.terminal import print_design
-    from smartshoe.runs.scenario import load, protocols_of
+    from smartshoe.runs.scenario import load, noise_of, protocols_of
 
-    found = design(tuple(protocols_of(*load(path)).values()))
+    scenario, source = load(path)
+    protocols = tuple(protocols_of(scenario, source).values())
+    if not protocols:
+        raise source.error(("protocol",), "there is none, and a design asks about protocols: add a [protocol.dynamic]")
+    noise = noise_of(scenario, source)
+    if noise is None:
+        found = design(protocols)
+    else:
+        unit, percent = noise
+        found = design(protocols, noise_percent=percent)
+        note(f"noise of {percent:g} % of full scale, the largest that a unit of the scenario states ({unit})")
     if not emit_json(found.to_dict(), json_path):
         print_design(found)
 

@@ -16,7 +16,7 @@ import numpy as np
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._denoise import noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
-from smartshoe.errors import NotIdentifiableError
+from smartshoe.errors import NotIdentifiableError, UnitError
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects.cycle_conditioning import half_way
@@ -95,11 +95,11 @@ class Session:
 def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds) -> Scale:
     """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
 
-    Raises `NotIdentifiableError` where load or reading never changes.
+    Raises `NotIdentifiableError` where load or reading never changes, `UnitError` for readings of two quantities.
     """
     unit = recordings[0].sensor.unit
     pairs = [
-        (recording.force_n[mask], recording.sensor.in_unit(unit)[mask])
+        (recording.force_n[mask], _reading(recording, unit)[mask])
         for recording, mask in zip(recordings, usable, strict=True)
         if mask.any()
     ]
@@ -115,6 +115,17 @@ def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], threshol
     if unit.quantity != "pressure":
         zero = float(np.median(np.concatenate([values[lowest(force, thresholds)] for force, values in pairs])))
     return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
+
+
+def _reading(recording: Recording, unit: Unit) -> Array:
+    """(n,) the reading in ``unit``; raises `UnitError` naming the recording where it is of another quantity."""
+    sensor = recording.sensor
+    if sensor.unit.quantity != unit.quantity:
+        raise UnitError(
+            f"{recording.label}: {sensor.name} is in {sensor.unit.symbol} ({sensor.unit.quantity}), the first recording"
+            f" is in {unit.symbol} ({unit.quantity}): give all recordings in units of one quantity"
+        )
+    return sensor.in_unit(unit)
 
 
 def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
@@ -219,7 +230,7 @@ def _session(
     time_s = recording.time_s - recording.time_s[0]
     step_s = recording.sample_time_s
     load_n, load_present = recording.force_n, recording.load.present
-    reading = recording.sensor.in_unit(scale.unit)
+    reading = _reading(recording, scale.unit)
     good = usable & recording.sensor.present & load_present
     reading = bridged(time_s, reading, good)
     load_n = bridged(time_s, load_n, load_present)
@@ -257,7 +268,10 @@ def _session(
         neighbour=beside.get("neighbour"),
         before=before,
     )
-    kept = smoothed(good.astype(float), weights, factor) > 0.7
+    there = smoothed(good.astype(float), weights, factor)
+    # A reading that is logged at a part of the load's rate never fills a window.
+    usual = float(np.median(there[there > 0.0])) if good.any() else 1.0
+    kept = there > 0.7 * usual
     load = conditions.load
     if like is None:
         held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions, thresholds)

@@ -2,5 +2,6 @@
 
 from smartshoe.integrity._examination import examine
 from smartshoe.integrity._fault import DataFault, Integrity
+from smartshoe.integrity._twins import twins
 
-__all__ = ["DataFault", "Integrity", "examine"]
+__all__ = ["DataFault", "Integrity", "examine", "twins"]

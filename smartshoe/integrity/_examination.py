@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.errors import InputError
+from smartshoe.errors import InputError, UsageError
 from smartshoe.integrity._clocks import align, two_clocks
 from smartshoe.integrity._dropouts import dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity
@@ -49,7 +49,7 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     """What is wrong with the data of ``recordings``, before any model; deterministic.
 
     Each recording has one reference load and one reading; where it has not, that is its refusal, whatever the others
-    are. Raises `InputError` where there is no recording at all.
+    are. Raises `InputError` where there is no recording at all, `UsageError` for ``thresholds`` that are none.
     """
     if not recordings:
         raise InputError("there is no recording to examine: give at least one file")
@@ -58,6 +58,8 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     offsets: list[tuple[float, float]] = []
     refusals: list[str] = []
     decided = thresholds or Thresholds()
+    if not isinstance(decided, Thresholds):
+        raise UsageError(f"thresholds is of type {type(decided).__name__}: give Thresholds, or none for the usual ones")
     examined = [_examined(recording, decided) for recording in recordings]
     dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
     if dropped_to.size and len(recordings) > 1:

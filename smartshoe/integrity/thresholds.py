@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields
+from numbers import Real
 from typing import Any
+
+from smartshoe.errors import UsageError
 
 
 def threshold(value: Any, unit: str, meaning: str, origin: str) -> Any:
@@ -13,7 +17,10 @@ def threshold(value: Any, unit: str, meaning: str, origin: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """What a diagnosis decides by. Carried in the result and printed in the page; `described` lists it."""
+    """What a diagnosis decides by. Carried in the result and printed in the page; `described` lists it.
+
+    Raises `UsageError` for what is no number, and for a ``material`` that is not above 0.
+    """
 
     material: float = threshold(
         2e-4, "share of full scale", "what moves the reading by less counts for nothing", "contract, section 4"
@@ -121,6 +128,16 @@ class Thresholds:
     bins: int = threshold(4000, "bins", "to which long recordings are thinned where lags are looked for", "speed")
     hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
     idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
+
+    def __post_init__(self) -> None:
+        """Refuse what nothing can be decided by."""
+        for one in fields(self):
+            given = getattr(self, one.name)
+            for value in given if isinstance(given, tuple) else (given,):
+                if isinstance(value, bool) or not isinstance(value, Real) or math.isnan(value):
+                    raise UsageError(f"{one.name} is {value!r}: give a number ({one.metadata['unit']})")
+        if not 0.0 < self.material < math.inf:
+            raise UsageError(f"material is {self.material:g}: give a share of full scale above 0, such as 0.0002")
 
     @property
     def few(self) -> int:

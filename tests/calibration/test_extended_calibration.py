@@ -95,6 +95,8 @@ def test_the_linear_part_is_the_papers_equation_13(gain: float, share: float, ra
         ({"gain": "x"}, "extended.gain"),
         ({"relaxation_rate_per_s": -1.0}, "extended.relaxation_rate_per_s"),
         ({"full_scale_load_n": None}, "extended.full_scale_load_n"),
+        ({"full_scale_reading": 0.0}, "extended.full_scale_reading"),
+        ({"full_scale_reading": None}, "extended.full_scale_reading"),
         ({"reading_unit": 5}, "extended.reading_unit"),
         ({"surplus": 1.0}, "surplus"),
         ({"effects": []}, "extended.effects"),
@@ -197,6 +199,23 @@ def test_a_plain_calibration_simulates_forward_what_it_undoes(
     force_n = plain.compensator(1000.0).apply(plain.model().reading(conditions))
     assert np.max(np.abs(force_n / 800.0 - conditions.load)) < 2e-3 * share * a1
     assert extended_calibration(plain.model()).offset == pytest.approx(offset)
+
+
+def test_a_reading_that_falls_as_the_load_grows_is_compensated_by_its_file(tmp_path: Path) -> None:
+    falling = replace(chain_of(["zero_offset", "play_hysteresis"], 7), full_scale_reading=-1200.0, reading_unit="ohm")
+    path = tmp_path / "c.json"
+    extended_calibration(falling).save(path)
+    conditions = some_conditions(1)
+    given = Recording.from_arrays(
+        time_s=conditions.time_s,
+        force_n=falling.full_scale_load_n * conditions.load,
+        pressure_ohm=falling.reading(conditions),
+    )
+    assert given.sensor.values.min() < -600.0
+    found = compensated(given, path)
+    assert np.max(np.abs(found["force_estimate"].values - given.force_n)) < 1e-6
+    assert validate([given], path).overall.rmse_compensated_n < 1e-6
+    assert np.array_equal(Calibration.load(path).model().reading(conditions), falling.reading(conditions))
 
 
 def test_coefficients_of_no_passive_solid_are_not_simulated() -> None:

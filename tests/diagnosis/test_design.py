@@ -113,3 +113,42 @@ def test_the_command_asks_a_scenario_and_no_file(root: Path, capsys: pytest.Capt
     assert {one["effect"] for one in told["effects"]} >= CURVES
     assert run_command(["diagnose", "x.csv", "--design", scenario]) == 2
     assert run_command(["diagnose"]) == 2
+
+
+def _asked(tmp_path: Path, text: str) -> list[str]:
+    (tmp_path / "asked.toml").write_text(text)
+    return ["diagnose", "--design", str(tmp_path / "asked.toml"), "--json", str(tmp_path / "told.json")]
+
+
+def test_the_command_takes_the_largest_noise_of_the_scenarios_units(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    units = "".join(
+        f'[[unit]]\nname = "unit_{k}"\nsensor = {{noise_percent = {noise}}}\n' for k, noise in enumerate((0.5, 2.0, 0))
+    )
+    assert run_command(_asked(tmp_path, "[protocol.dynamic]\nrates_n_per_s = [200.0]\n" + units)) == 0
+    assert "noise of 2 % of full scale" in capsys.readouterr().err
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told == design([dynamic_protocol((200.0,))], noise_percent=2.0).to_dict()
+    wrong = units.replace("2.0", "-2.0")
+    assert run_command(_asked(tmp_path, "[protocol.dynamic]\n" + wrong)) != 0
+    assert "unit.1.sensor.noise_percent" in capsys.readouterr().err
+
+
+def test_the_command_names_the_file_and_key_where_there_is_no_protocol(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(_asked(tmp_path, '[[unit]]\nname = "toe"\nrecordings = ["toe.csv"]\n')) != 0
+    said = capsys.readouterr().err
+    assert "asked.toml" in said
+    assert "key protocol" in said
+
+
+@pytest.mark.parametrize(
+    "more", [("--out", "o"), ("--calibration", "c.json"), ("--material", "5"), ("--unit", "toe"), ("--sensor", "6")]
+)
+def test_the_command_refuses_options_that_a_design_does_not_heed(
+    root: Path, more: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(["diagnose", "--design", str(root / "scenarios" / "calibration.toml"), *more]) == 2
+    assert f"--design takes no {more[0]}" in capsys.readouterr().err

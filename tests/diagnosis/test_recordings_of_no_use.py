@@ -9,8 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
+from smartshoe.errors import UnitError
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import find_unit
 
 Array = NDArray[np.float64]
 
@@ -57,6 +59,15 @@ def test_a_recording_of_no_use_among_those_fitted_is_left_out(why: str) -> None:
     assert {fault.label for fault in found.data_faults if fault.recording == 1} <= {"good"}
 
 
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_reading_logged_at_a_part_of_the_loads_rate_is_judged(every: int) -> None:
+    lacking = np.arange(len(GOOD)) % every == 1
+    found = diagnose(GOOD.with_channel(replace(GOOD.sensor, missing=lacking)))
+    assert found.verdict == "adequate"
+    assert found.baseline is not None
+    assert found.baseline.rmse == pytest.approx(NOISE_MBAR, rel=0.1)
+
+
 def test_noise_is_told_of_the_recording_that_has_it() -> None:
     hum = 0.3 * np.sin(2.0 * np.pi * 7.0 * GOOD.time_s)
     humming = GOOD.with_channel(replace(GOOD.sensor, values=GOOD.sensor.values + hum))
@@ -97,3 +108,10 @@ def test_a_load_that_pulls_refuses_where_it_is_fitted_and_is_left_out_where_it_i
     assert [(trace.name, trace.recording) for trace in found.traces] == [("good", 0), ("other", 2)]
     (said,) = (one for one in found.limits if one.startswith("left out: pulled:"))
     assert "from -4" in said
+
+
+@pytest.mark.parametrize("hold_out", [True, False])
+def test_readings_of_two_quantities_are_refused_by_name(hold_out: bool) -> None:
+    counted = OTHER.without("pressure").with_channel(replace(OTHER.sensor, unit=find_unit("counts")))
+    with pytest.raises(UnitError, match=r"^other: pressure is in counts .* in mbar .*: give all recordings in units"):
+        diagnose(GOOD, hold_out=counted) if hold_out else diagnose([GOOD, counted])

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from smartshoe import diagnose
+from smartshoe.errors import UsageError
 from smartshoe.integrity import Integrity, examine
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
@@ -118,3 +121,20 @@ def test_material_is_the_error_from_which_on_a_lattice_is_a_fault() -> None:
     coarse = _pressed(np.rint(TRIANGLE / 0.02) * 0.02)
     assert "quantisation" in _kinds(coarse, material=2e-4)
     assert "quantisation" not in _kinds(coarse, material=1e-2)
+
+
+@pytest.mark.parametrize("material", [float("nan"), float("inf"), -1.0, 0.0, "a", True])
+def test_what_is_material_is_a_share_above_zero(material: float) -> None:
+    with pytest.raises(UsageError, match=r"material is .*: give a"):
+        diagnose(_pressed(TRIANGLE), material=material)
+
+
+@pytest.mark.parametrize("numbers", [{"standing": float("nan")}, {"memory_s": (0.3, "x")}, {"hold_s": None}])
+def test_numbers_to_decide_by_are_numbers(numbers: dict[str, object]) -> None:
+    with pytest.raises(UsageError, match=f"{next(iter(numbers))} is .*: give a number"):
+        replace(STANDARD, **numbers)
+
+
+def test_thresholds_of_another_type_are_refused() -> None:
+    with pytest.raises(UsageError, match="thresholds is of type int"):
+        diagnose(_pressed(TRIANGLE), thresholds=3)  # type: ignore[arg-type]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -110,6 +111,23 @@ def protocols_of(scenario: Scenario, source: ScenarioText) -> dict[str, Protocol
         except LimitError as error:
             raise source.error(("protocol", name), str(error)) from error
     return built
+
+
+def noise_of(scenario: Scenario, source: ScenarioText) -> tuple[str, float] | None:
+    """The unit with the largest ``sensor.noise_percent`` above zero and that number, None where none is stated.
+
+    Raises `ScenarioError` for one that is no number from 0 on.
+    """
+    found: list[tuple[float, str]] = []
+    for index, unit in enumerate(scenario.unit):
+        sensor = {**scenario.machine.options, **unit.options}.get("sensor")
+        given = sensor.get("noise_percent", 0.0) if isinstance(sensor, dict) else 0.0
+        if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 <= given < math.inf:
+            at = ("unit", index) if "sensor" in unit.options else ("machine",)
+            raise source.error((*at, "sensor", "noise_percent"), f"is {given!r}: give a number from 0 on")
+        found.append((float(given), unit.name))
+    largest, name = max(found, key=lambda one: one[0])
+    return (name, largest) if largest > 0.0 else None
 
 
 def _record(
