@@ -45,7 +45,7 @@ from smartshoe.diagnosis._zero import Zero, creeping, offsets, shift_of, zeros_o
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
-from smartshoe.integrity import Integrity, examine
+from smartshoe.integrity import Integrity, examine, twins
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Effect
@@ -107,7 +107,7 @@ def diagnose(
         return _refused(everything, integrity, list(left_out.values()), decided)
     usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
     found = _diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
-    return replace(found, limits=(*_without(everything, count, left_out), *found.limits))
+    return replace(found, limits=(*_without(everything, count, left_out), *twins(everything), *found.limits))
 
 
 def _outside(recording: Recording, thresholds: Thresholds) -> str | None:

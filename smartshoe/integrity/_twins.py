@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,9 +13,11 @@ from smartshoe.recording import Channel, Recording
 
 def twins(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """One sentence for each recording whose time, load and readings are all those of an earlier one."""
-    said = []
-    for k, recording in enumerate(recordings):
-        first = next((one for one in recordings[:k] if _are_alike(one, recording)), None)
+    said, alike = [], defaultdict[tuple[int, float], list[Recording]](list)
+    for recording in recordings:
+        known = alike[recording.time_s.size, float(sum(np.nansum(_si(one)) for one in recording.sensors))]
+        first = next((one for one in known if _are_alike(one, recording)), None)
+        known.append(recording)
         if first is not None:
             said.append(
                 f"{recording.label} holds the same samples as {first.label}: they are one experiment, and neither"

@@ -115,3 +115,9 @@ def test_readings_of_two_quantities_are_refused_by_name(hold_out: bool) -> None:
     counted = OTHER.without("pressure").with_channel(replace(OTHER.sensor, unit=find_unit("counts")))
     with pytest.raises(UnitError, match=r"^other: pressure is in counts .* in mbar .*: give all recordings in units"):
         diagnose(GOOD, hold_out=counted) if hold_out else diagnose([GOOD, counted])
+
+
+def test_a_copy_confirms_nothing_and_is_said() -> None:
+    copy = replace(GOOD, name="copy")
+    found = diagnose([GOOD, OTHER], hold_out=copy)
+    assert any("copy holds the same samples as" in limit for limit in found.limits)
