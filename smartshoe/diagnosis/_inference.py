@@ -100,7 +100,9 @@ def infer(
             break  # a law that follows better in its place led to a set that does not
         found, members = other, other.members()
     if found.is_stepped_down:
-        found = found.with_nothing_but(plain)
+        first = _first_step(begun, state, sessions)
+        alone = None if first is None else _judged(first, plain, sessions)
+        found = found.with_nothing_but(plain) if alone is None or alone.is_stepped_down else alone
         members = found.members()
     return Inference(plain, found.fit, found.likelihood, members, screening, found.refused, undone=found.undone)
 
@@ -179,6 +181,16 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = bool(extra) and extended is not followed
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)
+
+
+def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> State | None:
+    """The first set of the last search, before other effects bent it: it may stand where what it led to does not."""
+    path = [model for model in state.path if len(model.parts) > len(begun.fit.model.parts)]
+    if not path or {*path[0].names} == {*state.fit.model.names}:
+        return None
+    likelihood = begun.likelihood(sessions)
+    evidence, best = evidence_about(path[0], sessions, begun.evidence)
+    return State(evidence.given, evidence, best, fit(likelihood, path[0]), state.banned)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

@@ -145,7 +145,7 @@ class TestInsole:
         assert not {cause.effect.family for cause in found.causes} & {"relaxation", "leak"}
         for cause in found.causes:
             if cause.name == "delay":
-                assert cause.parameters["delay"].value == pytest.approx(INSOLE_LAGS_S[name], abs=0.25)
+                assert cause.parameters["delay"].value == pytest.approx(offset_s, abs=0.25)
 
     def test_a_wrong_rate_of_the_rows_is_seen_as_a_lag_that_grows(self, measured: Path) -> None:
         name = "experiment_Inf_17September_dynamic_2"
@@ -274,10 +274,15 @@ class TestSensors:
 
     @pytest.mark.bank
     def test_a_gain_that_drifts_only_with_a_load_that_grows_is_not_named(self, measured: Path) -> None:
-        """In the whole record of the air channel the peaks grow with the clock, so that it follows the curve."""
+        """In the whole record of the air channel the peaks grow with the clock, so that it follows the curve.
+
+        Nor is the curve, then: the falling zero and the drifting gain do what it does. All of them are in the model.
+        """
         found = diagnose(_files(measured, "air_whole", "pressure_v"))
-        assert found.causes[0].effect.family == "static_curve"
         assert "gain_drift" not in {cause.name for cause in found.causes}
+        assert "by effects of which none is sure" in found.says
+        assert found.extended is not None
+        assert found.extended.variance_explained_percent > 99.0
 
     @pytest.mark.parametrize("name", _few(SENSORS))
     def test_the_baseline_is_as_good_as_a_plain_standard_linear_solid(self, measured: Path, name: str) -> None:

@@ -214,7 +214,7 @@ def test_a_gain_that_settles_with_the_clock_is_a_drift_of_the_gain_and_no_condit
     assert [(effect["id"], effect["law"]) for effect in made.truth["effects"]] == [("gain_drift", "settling")]
     found = diagnose(made.recordings, hold_out=made.hold_out)
     assert [cause.effect.family for cause in found.causes] == ["gain_drift"]
-    assert found.explained_percent > 0.9 * found.explainable_percent
+    assert found.explained_percent > 0.85 * found.explainable_percent
 
 
 def test_a_zero_that_drifted_before_the_recordings_began_is_no_offset_beside_its_drift() -> None:
