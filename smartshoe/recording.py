@@ -204,6 +204,17 @@ class Recording(Summarised):
         """The file, or else the name: what an error message calls this recording."""
         return self.source or self.name
 
+    def positive(self, key: str, unit: str) -> float:
+        """The number that the metadata states under ``key``; raises `InputError` where it is none above 0."""
+        text = self.metadata[key]
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{self.label}: {key} is {text!r}: give a positive number in {unit}")
+        return value
+
     def __len__(self) -> int:
         return int(self.time_s.size)
 

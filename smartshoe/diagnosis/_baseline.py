@@ -9,7 +9,6 @@ import numpy as np
 
 from smartshoe.diagnosis._sensitivity import lagged, marginal
 from smartshoe.diagnosis._session import Scale, Session
-from smartshoe.errors import InputError
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
 
@@ -62,15 +61,9 @@ def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:
     """1 + k1 x0^2/(nRT) where an effective area is declared, from the static gain; else what units usually have."""
     recording = sessions[0].recording
-    declared = recording.metadata.get("effective_area_m2")
-    if declared is None or scale.unit.quantity != "pressure":
+    if "effective_area_m2" not in recording.metadata or scale.unit.quantity != "pressure":
         return USUAL_WALL_RATIO
-    try:
-        area_m2 = float(declared)
-    except ValueError:
-        area_m2 = np.nan
-    if not (np.isfinite(area_m2) and area_m2 > 0):
-        raise InputError(f"{recording.label}: effective_area_m2 is {declared!r}: give a positive number in m2")
+    area_m2 = recording.positive("effective_area_m2", "m2")
     pascal_per_newton = gain * float(scale.unit.to_si(np.array([scale.reading]))[0]) / scale.load_n
     ratio = 1.0 / (area_m2 * pascal_per_newton)
     return ratio if 1.02 < ratio < 50.0 else USUAL_WALL_RATIO

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from smartshoe.arrays import Mask
-from smartshoe.errors import InputError, NotConvergedError, NotIdentifiableError, UsageError
+from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.identification._conclude import Choice, conclude
 from smartshoe.identification._estimator import Estimator, estimate
@@ -245,10 +245,5 @@ def _scale(
     text = areas.pop() if len(areas) == 1 else None
     if text is None or reading_unit.quantity != "pressure":
         return 1.0, "scale is 1: the reading is taken in the paper's force units"
-    try:
-        area_m2 = float(text)
-    except ValueError:
-        area_m2 = np.nan
-    if not (np.isfinite(area_m2) and area_m2 > 0):
-        raise InputError(f"{recordings[0].label}: effective_area_m2 is {text!r}: give a positive number in m2")
+    area_m2 = recordings[0].positive("effective_area_m2", "m2")
     return area_m2 * reading_unit.scale, f"scale follows from effective_area_m2 = {area_m2:g}"
