@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, with_usual_arm
 from smartshoe.diagnosis._held_out import Errors, errors, force_rmse_n, gain, own_of, residual_of
@@ -328,9 +329,11 @@ def test_a_reading_that_falls_under_load_has_a_plain_baseline() -> None:
 @pytest.mark.parametrize(("ratio", "is_told"), [(1.019, False), (1.021, True), (49.9, True), (50.1, False)])
 def test_a_declared_area_tells_the_walls_ratio_within_what_can_be(ratio: float, is_told: bool) -> None:
     pascal_per_newton = 1.1 * 140.0 * 100.0 / 800.0
-    session: Any = SimpleNamespace(
-        recording=SimpleNamespace(metadata={"effective_area_m2": 1.0 / (ratio * pascal_per_newton)})
+    area = {"effective_area_m2": str(1.0 / (ratio * pascal_per_newton))}
+    recording = Recording.from_arrays(
+        time_s=np.arange(3.0), force_n=np.ones(3), pressure_mbar=np.ones(3), metadata=area
     )
+    session: Any = SimpleNamespace(recording=recording)
     found = _wall_ratio([session], 1.1, SCALE)
     assert found == pytest.approx(ratio if is_told else USUAL_WALL_RATIO)
     assert _wall_ratio([session], 1.1, replace(SCALE, unit=VOLT)) == USUAL_WALL_RATIO
