@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from smartshoe.arrays import Mask
-from smartshoe.diagnosis._session import LEAST_WINDOW, Session, continues
+from smartshoe.diagnosis._session import LEAST_WINDOW, Session
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.recording import Recording
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
 
@@ -23,7 +22,6 @@ class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
     ``present`` holds the words of `Effect.exposed_by` that apply. ``is_judged``: what is held out can be used.
-    ``pastless``: names of recordings that continue one that is not given, and of that one.
     """
 
     rates_per_s: tuple[float, ...]
@@ -32,7 +30,6 @@ class Excitation:
     present: frozenset[str]
     thresholds: Thresholds
     is_judged: bool = True
-    pastless: tuple[tuple[str, str], ...] = ()
 
     def limits(self) -> list[str]:
         """A sentence for each thing of which this data says nothing."""
@@ -42,11 +39,6 @@ class Excitation:
                 "nothing that is held out can be used: how good a simulation is on data it was not fitted to is not"
                 " known (hold out a recording whose reading follows its load)"
             )
-        said += [
-            f"{name} continues {earlier}, which is not among the recordings: it is taken as the unit's first after a"
-            f" rest (give {earlier} too)"
-            for name, earlier in self.pastless
-        ]
         if len(self.rates_per_s) <= 1:
             said.append(
                 "one loading rate only: nothing can be said of rate dependence, nor can viscous friction be told from"
@@ -69,7 +61,6 @@ class Excitation:
 def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excitation:
     """What all sessions of which anything is fitted hold together: of the others nothing is learnt."""
     is_judged = any(one.judged.any() for one in sessions)
-    pastless = tuple(_pastless([one.recording for one in sessions]))
     sessions = [one for one in sessions if not one.held_out.all()]
     rises = [rise for session in sessions for rise in _rises(session, thresholds)]
     alike = float(np.log1p(thresholds.same))
@@ -96,14 +87,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
-    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, pastless)
-
-
-def _pastless(recordings: Sequence[Recording]) -> Iterator[tuple[str, str]]:
-    for k, one in enumerate(recordings):
-        others = [*recordings[:k], *recordings[k + 1 :]]
-        if "continues" in one.metadata and not any(continues(one, other) for other in others):
-            yield one.name, one.metadata["continues"]
+    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged)
 
 
 class _Rise(NamedTuple):

@@ -22,7 +22,7 @@ from smartshoe.diagnosis._parameters import in_unit, joint_parameters, may_be_no
 from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, pastless, prepare, thinning
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._verdict import (
     crept_of,
@@ -122,14 +122,17 @@ def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
 
 
 def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
-    """What is said of recordings that are left out, by place, of which the first ``count`` were to be fitted."""
+    """What is said of recordings that lack or are left out, by place; the first ``count`` were to be fitted."""
     said = [f"left out: {why}" for why in left_out.values()]
     names = {recordings[k].name for k in left_out}
-    said += [
-        f"{one.label} continues {one.metadata['continues']}, which is left out: it is taken as a session of its own"
-        for k, one in enumerate(recordings)
-        if k not in left_out and one.metadata.get("continues") in names
-    ]
+    for one in pastless([one for k, one in enumerate(recordings) if k not in left_out]):
+        earlier = one.metadata["continues"]
+        said.append(
+            f"{one.label} continues {earlier}, which is left out: it is taken as a session of its own"
+            if earlier in names
+            else f"{one.name} continues {earlier}, which is not among the recordings: it is taken as the unit's first"
+            f" after a rest (give {earlier} too)"
+        )
     if count < len(recordings) and all(k in left_out for k in range(count, len(recordings))):
         said.append("no recording to judge on is left: load cycles of those that are fitted are held out instead")
     return said
@@ -300,7 +303,7 @@ def _cause(
     name: Name, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared, thresholds: Thresholds
 ) -> Cause:
     member = name.member
-    won = gain(errors(fine, member.without.model), best, given.scale)
+    won = gain(errors(fine, member.without.model), best, given.scale, thresholds)
     near = {
         a.effect: a.margin for a in (*member.alternatives, *member.laws) if a.effect not in (None, name.effect.name)
     }
@@ -369,7 +372,7 @@ def _zero_cause(
     """An offset or tare: removed, every reading is off by it."""
     scale = given.scale
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
-    won = gain(worse, best, scale)
+    won = gain(worse, best, scale, thresholds)
     parameter = zero.effect.parameters[0]
     factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
     interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd

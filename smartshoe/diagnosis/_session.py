@@ -202,6 +202,12 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
     return order
 
 
+def pastless(recordings: Sequence[Recording]) -> list[Recording]:
+    """Recordings that carry on from one that is not among them."""
+    given = [one for one in recordings if "continues" in one.metadata]
+    return [one for one in given if not any(continues(one, other) for other in recordings if other is not one)]
+
+
 def continues(later: Recording, earlier: Recording) -> bool:
     """Whether a recording carries on from another one."""
     return later.metadata.get("continues") == earlier.name

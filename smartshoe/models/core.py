@@ -91,14 +91,12 @@ class Core:
         z = -values * step_s
         decay = np.exp(-z)
         small = np.abs(z) < 1e-4
+        safe = np.where(small, 1.0, z)
+        mean = -np.expm1(-safe) / safe
+        after, before = (1.0 - mean) / safe, (mean - np.exp(-safe)) / safe
         if small.any():
-            safe = np.where(small, 1.0, z)
-            mean = -np.expm1(-safe) / safe
-            after = np.where(small, 0.5 - z / 6.0 + z * z / 24.0, (1.0 - mean) / safe)
-            before = np.where(small, 0.5 - z / 3.0 + z * z / 8.0, (mean - np.exp(-safe)) / safe)
-        else:
-            mean = -np.expm1(-z) / z
-            after, before = (1.0 - mean) / z, (mean - decay) / z
+            after = np.where(small, 0.5 - z / 6.0 + z * z / 24.0, after)
+            before = np.where(small, 0.5 - z / 3.0 + z * z / 8.0, before)
         scale = step_s * (inverse @ self.drive)
         return decay, scale * before, scale * after, vectors, inverse
 

@@ -24,9 +24,20 @@ from smartshoe.diagnosis._laws import _is_stretched
 from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
 from smartshoe.diagnosis._parameters import parameters_of
+from smartshoe.diagnosis._procedure import _without
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.diagnosis._sensitivity import available, nuisance_precision
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, kernel, prepare, smoothed, thinning
+from smartshoe.diagnosis._session import (
+    Scale,
+    Session,
+    at_full_rate,
+    full_scale,
+    kernel,
+    pastless,
+    prepare,
+    smoothed,
+    thinning,
+)
 from smartshoe.diagnosis._state import state_at
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import effect
@@ -294,12 +305,12 @@ def test_recordings_that_continue_each_other_are_taken_as_they_are_given() -> No
 def test_a_recording_that_continues_one_that_is_not_given_says_so() -> None:
     load = _triangles(6)
     first, second = replace(_pressed(load), name="a"), replace(_pressed(load), name="b", metadata={"continues": "a"})
-    both, alone = (excitation_of(_prepared(*given)[0], STANDARD) for given in ((second, first), (second,)))
-    assert (both.pastless, alone.pastless) == ((), (("b", "a"),))
+    assert (pastless([second, first]), pastless([second])) == ([], [second])
     said = "b continues a, which is not among the recordings: it is taken as the unit's first after a rest"
-    assert any(one.startswith(said) for one in alone.limits())
+    assert any(one.startswith(said) for one in _without([second], 1, {}))
+    assert not _without([second, first], 2, {})
     itself = replace(second, name="a")
-    assert excitation_of(_prepared(itself)[0], STANDARD).pastless == (("a", "a"),)
+    assert pastless([itself]) == [itself]
 
 
 def test_a_load_cells_noise_is_taken_out_and_said() -> None:

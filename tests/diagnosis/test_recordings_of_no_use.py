@@ -98,6 +98,7 @@ def test_where_none_of_those_to_be_fitted_is_of_use_it_is_refused() -> None:
 def test_what_continues_a_recording_that_is_left_out_is_a_session_of_its_own() -> None:
     found = diagnose([BAD["constant"], _run("later", 8.0, continues="other")])
     assert "later continues other, which is left out: it is taken as a session of its own" in found.limits
+    assert sum("continues" in one for one in found.limits) == 1
 
 
 def test_a_load_that_pulls_refuses_where_it_is_fitted_and_is_left_out_where_it_is_held_out() -> None:
