@@ -16,7 +16,8 @@ class Name:
     """``confidence`` that it is this effect or one of ``equivalents``, which nothing tells from it; ``law`` of the two.
 
     ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
-    family is what was found; its equation follows no better than others of the family.
+    family is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this
+    family.
     """
 
     member: Member
@@ -25,21 +26,34 @@ class Name:
     law: float
     equivalents: tuple[str, ...]
     kind_only: bool = False
+    is_sure: bool = True
 
 
-def names_of(members: Sequence[Member], left: float, thresholds: Thresholds) -> tuple[Name, ...]:
+def names_of(
+    members: Sequence[Member], left: float, thresholds: Thresholds, *, is_followed: bool = False
+) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
+
+    ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
+    what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
+    are.
 
     A flexible block is named by the law of its family, and of its stage in the chain, that comes nearest.
     """
-    likely = ((one, probability_of_kind(one, left, thresholds)) for one in members if one.size >= thresholds.material)
-    return tuple(_named(one, kind, left, thresholds) for one, kind in likely if kind >= thresholds.least_confidence)
+    likely = [
+        _named(one, probability_of_kind(one, left, thresholds), left, thresholds)
+        for one in members
+        if one.size >= thresholds.material
+    ]
+    sure = tuple(one for one in likely if one.is_sure)
+    return sure or tuple(one for one in likely if is_followed and one.member.size > left)
 
 
 def _named(one: Member, kind: float, left: float, thresholds: Thresholds) -> Name:
+    is_sure = kind >= thresholds.least_confidence
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
-        return Name(one, one.effect, kind, law, equivalents)
+        return Name(one, one.effect, kind, law, equivalents, False, is_sure)
     family = [e for e in catalogue().values() if e.family == one.effect.family]
     margins = {a.effect: a.margin for a in one.laws}
     # What grows with the load borne is none that goes with the clock; but curves look alike wherever they stand.
@@ -48,7 +62,7 @@ def _named(one: Member, kind: float, left: float, thresholds: Thresholds) -> Nam
     others = tuple(e.name for e in family if e is not nearest)
     # Of a family of one law nothing follows better or worse than another.
     sure = probability_of_kind(one, left, thresholds, lawless=bool(others))
-    return Name(one, nearest, sure, 1.0 / len(family), others, True)
+    return Name(one, nearest, sure, 1.0 / len(family), others, True, is_sure)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:

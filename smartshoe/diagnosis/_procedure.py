@@ -24,6 +24,7 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, pastless, prepare, thinning
 from smartshoe.diagnosis._settling import Progress
+from smartshoe.diagnosis._validation import error_of
 from smartshoe.diagnosis._verdict import (
     crept_of,
     elsewhere_of,
@@ -217,7 +218,10 @@ def _diagnosed(
     within = residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
     everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
-    names = names_of([one for one in found.members if one.name not in found.undone], everything, thresholds)
+    plain_rms, left_rms = (error_of(sessions, model) for model in (found.baseline.model, extended))
+    is_followed = left_rms <= thresholds.departure * plain_rms
+    members = [one for one in found.members if one.name not in found.undone]
+    names = names_of(members, everything, thresholds, is_followed=is_followed)
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
@@ -236,7 +240,7 @@ def _diagnosed(
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
     causes.sort(key=lambda one: -one.size)
     # What follows something else than the load is simulated by no unit, however well it fits.
-    follows = not any(name.kind_only for name in names)
+    follows = all(name.is_sure and not name.kind_only for name in names)
     known = known_error(integrity.faults, sessions, scale)
     won = gain(baseline, best, scale, thresholds)
     elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
@@ -328,7 +332,17 @@ def _cause(
                 f"{rivals[0].effect.replace('_', ' ')} in its place is worse by {rivals[0].margin:,.0f}",
             )
         )
-    if name.kind_only:
+    if not name.is_sure:
+        evidence.append(
+            Statement(
+                "confidence of its kind",
+                name.confidence,
+                thresholds.least_confidence,
+                "it is not sure, since others may do what it does: it is named because all of them together follow the"
+                " data, and it moves more than all that is left",
+            )
+        )
+    elif name.kind_only:
         evidence.append(
             Statement(
                 "kind", 1.0, 1.0, "the kind is sure, the law is not: no equation of it follows better than others"

@@ -122,6 +122,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("may_be_none", lambda fit, name: name == "faint")
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
+    answer("error_of", 1.0)
     answer("_cause", cause)
     answer("_zero_cause", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
     answer("_with_offset", "with offset")
@@ -143,9 +144,9 @@ def _run_diagnosis(parts: Any) -> Any:
     return result
 
 
-def _name(name: str, kind_only: bool = False, size: float = 0.1) -> Any:
-    known = effect("delay" if name in ("turned", "faint") else name)
-    return SimpleNamespace(name=name, kind_only=kind_only, effect=known, member=SimpleNamespace(size=size, name=name))
+def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True) -> Any:
+    known, member = effect("delay" if name in ("turned", "faint") else name), SimpleNamespace(size=size, name=name)
+    return SimpleNamespace(name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member)
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
@@ -176,11 +177,20 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
         [("fitted", [True, True, False])],  # a cycle that is held out decides over no name
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
+    assert seen["names_of"][1] == {"is_followed": False}
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
     assert seen["next_experiment"][1] == {"open_": True, "worse": False}
     assert seen["infer"][0][4] is True
+
+
+def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    for left, is_followed in ((STANDARD.departure, True), (1.01 * STANDARD.departure, False)):
+        parts.seen.clear()
+        monkeypatch.setattr(_procedure, "error_of", lambda _, model, left=left: left if len(model.parts) else 1.0)
+        _run_diagnosis(parts)
+        assert parts.seen["names_of"][1] == {"is_followed": is_followed}
 
 
 def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -> None:
@@ -235,10 +245,11 @@ def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
     assert parts.seen["noise_kinds"][0][3] is True
 
 
-def test_a_kind_without_a_law_leaves_no_more_than_what_is_tolerable(parts: Any) -> None:
-    for kind_only, verdict in ((False, "explained"), (True, "partly_explained")):
+def test_a_kind_without_a_law_or_in_doubt_leaves_no_more_than_what_is_tolerable(parts: Any) -> None:
+    for kind_only, is_sure in ((False, True), (True, True), (False, False)):
+        verdict = "explained" if is_sure and not kind_only else "partly_explained"
         parts.seen.clear()
-        parts.names = [_name("linear_leak"), _name("delay", kind_only)]
+        parts.names = [_name("linear_leak"), _name("delay", kind_only, is_sure=is_sure)]
         told = _run_diagnosis(parts)
         assert (told.verdict, told.leftover is None) == (verdict, verdict == "explained")
 

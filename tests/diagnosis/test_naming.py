@@ -147,6 +147,21 @@ def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
     assert name.confidence == probability_of_kind(name.member, 0.0, STANDARD)
 
 
+def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_what_is_left() -> None:
+    doubted = [member(size=0.05, departed=4.0), member("rate_gain", size=0.02, departed=4.0)]
+    assert not names_of(doubted, 0.03, STANDARD)
+    name = only(names_of(doubted, 0.03, STANDARD, is_followed=True))
+    assert name.effect.name == "linear_leak"
+    assert not name.is_sure
+    assert name.confidence == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
+
+
+def test_beside_a_sure_name_no_other_is_named_that_is_not() -> None:
+    sure, doubted = member("rate_gain", size=0.04), member(size=0.05, departed=4.0)
+    name = only(names_of([doubted, sure], 0.03, STANDARD, is_followed=True))
+    assert (name.effect.name, name.is_sure) == ("rate_gain", True)
+
+
 # -- what each number decides -----------------------------------------------------------------------------------
 def test_material_is_the_size_from_which_on_a_member_is_named() -> None:
     small = [member(size=1e-3)]

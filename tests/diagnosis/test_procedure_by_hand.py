@@ -184,7 +184,13 @@ def test_evidence_on_held_out_data_is_in_the_readings_unit() -> None:
     assert "rises from 0.75 to 2.5 mbar" in lost.says
 
 
-def _told(monkeypatch: pytest.MonkeyPatch, present: frozenset[str], kind_only: bool = False, laws: Any = ()) -> Any:
+def _told(
+    monkeypatch: pytest.MonkeyPatch,
+    present: frozenset[str],
+    kind_only: bool = False,
+    laws: Any = (),
+    is_sure: bool = True,
+) -> Any:
     asked: list[Any] = []
 
     def after(fine: Any, model: Any) -> Errors:
@@ -202,7 +208,13 @@ def _told(monkeypatch: pytest.MonkeyPatch, present: frozenset[str], kind_only: b
     )
     one = effect("linear_leak")
     name: Any = SimpleNamespace(
-        member=member, effect=one, confidence=0.9, law=0.6, equivalents=("orifice_leak",), kind_only=kind_only
+        member=member,
+        effect=one,
+        confidence=0.9,
+        law=0.6,
+        equivalents=("orifice_leak",),
+        kind_only=kind_only,
+        is_sure=is_sure,
     )
     given: Any = SimpleNamespace(scale=SCALE, excitation=SimpleNamespace(present=present))
     found: Any = SimpleNamespace(fit="fit")
@@ -235,6 +247,9 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     assert lacking.says == "the data holds no " + ", no ".join(sorted(one.replace("_", " ") for one in exposed))
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 1.0, 1.0)
+    doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
+    assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
+    assert "not sure" in doubt.says
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])
