@@ -154,6 +154,18 @@ class Evidence:
         index = np.asarray(columns, dtype=np.intp)
         return math.sqrt(max(float(strengths @ self.raw[index[:, None], index] @ strengths), 0.0))
 
+    def likeness(self, alone: Sequence[int]) -> Array:
+        """How alike (k, k) ``alone`` k candidates look in this data: 1 in every sample, 0 not at all.
+
+        Absolute cosine of what each by itself would add that the baseline and the nuisances cannot follow.
+        """
+        made = np.zeros((self.raw.shape[0], len(alone)))
+        for k, member in enumerate(alone):
+            made[list(self.given.candidates[member].columns), k] = self.posterior((member,)).strengths[0]
+        inner = made.T @ self.raw @ made
+        norm = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        return np.asarray(np.minimum(np.abs(inner) / np.outer(norm, norm), 1.0))
+
     def _departures_of(self, members: Members) -> list[range]:
         """Where the columns of members' departures stand, made when they are first asked for."""
         self.make_ready(members)

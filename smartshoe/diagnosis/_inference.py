@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import (
     is_beyond_memory,
     is_stretched,
@@ -41,8 +42,9 @@ from smartshoe.signals.loading import turning_points
 class Inference:
     """``baseline`` and ``fit``: the plain and the extended model; ``likelihood`` they were fitted by.
 
-    ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score; ``undone``:
-    members that fit by their difference, of which one is idle, and others undo one another without it.
+    ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
+    ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
+    one is idle, and others undo one another without it.
     """
 
     baseline: Fit
@@ -50,6 +52,7 @@ class Inference:
     likelihood: Likelihood
     members: tuple[Member, ...]
     screening: tuple[tuple[str, float], ...]
+    likeness: Array
     refused: tuple[str, ...] = ()
     can_validate: bool = True
     undone: tuple[str, ...] = ()
@@ -62,11 +65,11 @@ def infer(
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
     given, evidence, best = searched(plain.model, sessions, thresholds)
-    screening = _screening(evidence)
+    screening, likeness = _screening(evidence)
     can_validate = independent(sessions, thresholds) > 1  # within one, nothing validates anything
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
-        return Inference(plain, plain, likelihood, (), screening, (), can_validate)
+        return Inference(plain, plain, likelihood, (), screening, likeness, (), can_validate)
     state = State(given, evidence, best, plain)
     if is_stretched(plain.model):
         state = simpler(with_a_latency(state, sessions), state, sessions)
@@ -104,7 +107,8 @@ def infer(
         alone = None if first is None else _judged(first, plain, sessions)
         found = found.with_nothing_but(plain) if alone is None or alone.is_stepped_down else alone
         members = found.members()
-    return Inference(plain, found.fit, found.likelihood, members, screening, found.refused, undone=found.undone)
+    known = plain, found.fit, found.likelihood, members
+    return Inference(*known, screening, likeness, found.refused, undone=found.undone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,10 +213,9 @@ def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     return sum(load[b] > load[a] for a, b in pairwise(points))
 
 
-def _screening(evidence: Evidence) -> tuple[tuple[str, float], ...]:
+def _screening(evidence: Evidence) -> tuple[tuple[tuple[str, float], ...], Array]:
+    """What each of the strongest effects alone takes off the baseline's score, and how alike they look (k, k)."""
     nothing = evidence.posterior(()).score
-    found = [
-        (evidence.given.candidates[k].name, nothing - evidence.posterior((k,)).score)
-        for k in additions(evidence, (), 2 * BREADTH)
-    ]
-    return tuple(sorted(found, key=lambda one: -one[1]))
+    falls = {k: nothing - evidence.posterior((k,)).score for k in additions(evidence, (), 2 * BREADTH)}
+    order = sorted(falls, key=lambda k: -falls[k])
+    return tuple((evidence.given.candidates[k].name, falls[k]) for k in order), evidence.likeness(order)

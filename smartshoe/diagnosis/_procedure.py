@@ -287,6 +287,7 @@ def _diagnosed(
         ),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
+        likeness=found.likeness,
         model=with_zero,
         baseline_model=found.baseline.model,
         parameters=parameters,

@@ -91,7 +91,7 @@ class Thresholds:
     least_confidence: float = threshold(
         0.667,
         "probability",
-        "of the kind; below it no cause is named beside one that is sure; of a zero that is never seen",
+        "of the kind; below it no cause is named beside one above it; of a zero that is never seen",
         "two to one for being right",
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")

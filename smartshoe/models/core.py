@@ -55,7 +55,6 @@ class Core:
             matrix[-1] = leak * read
             drive[-1] = leak * direct
         self.matrix, self.drive, self.read, self.direct = matrix, drive, read, float(direct)
-        self._to_deformation, self._stiffness = to_u, stiffness
         self._memory = len(inner)
         self._known_modes: dict[float, tuple[Array, Array, Array, Array, Array]] = {}
 
@@ -102,21 +101,14 @@ class Core:
 
     def simulate(self, load: Array, step_s: float) -> Array:
         """Pressure (n,) for ``load`` (n,), shares of full scale, every ``step_s``; started in steady state."""
-        return self._response(load, step_s, self.read, self.direct)
-
-    def deformation(self, load: Array, step_s: float) -> Array:
-        """The wall's deformation u (n,) for the same: f at rest."""
-        return self._response(load, step_s, self._to_deformation, 1.0 / self._stiffness)
-
-    def _response(self, load: Array, step_s: float, read: Array, direct: float) -> Array:
         if not self.drive.size:
-            return direct * load
+            return self.direct * load
         from smartshoe.kernels.modal import respond
 
         decay, before, after, vectors, inverse = self._modes(step_s)
         out = np.empty(load.size)
         state = inverse @ self.steady_state(float(load[0]))
-        respond(np.ascontiguousarray(load), decay, before, after, read @ vectors, direct, state, out)
+        respond(np.ascontiguousarray(load), decay, before, after, self.read @ vectors, self.direct, state, out)
         return out
 
     def recursion(self, step_s: float) -> tuple[Array, Array, Array]:

@@ -157,23 +157,6 @@ class ExtendedModel:
         """The reading (n,) in ``reading_unit``."""
         return self.full_scale_reading * self.simulate(conditions)
 
-    def deformation(self, conditions: Conditions) -> Array:
-        """The wall's deformation (n,), scaled as the load: what a displacement channel follows.
-
-        A gas that stiffens beyond the linear one takes load off the wall, one that leaks leaves it to the wall: from
-        u = f + omega/N and p = f - omega (1 - 1/N) of `smartshoe.models.core`.
-        """
-        inputs: list[Array] = []
-        self._run(conditions.load, conditions, 0, inputs)
-        core = self.chain.index(None)
-        load = inputs[core]
-        for k, part in enumerate(self.chain):
-            if part is not None and part.effect.air is not None and k > core:
-                pressure = inputs[k]
-                share = self.wall_ratio - (1.0 if part.effect.air == "leaves" else 0.0)
-                load = load + (pressure - part.effect.apply(pressure, conditions, part.values)) / share
-        return self.core.deformation(load, conditions.step_s)
-
     @cached_property
     def _varied(self) -> Extensions:
         """For each parameter but the gain."""

@@ -92,6 +92,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
         can_validate=True, refused=(), undone=(), screening=tuple((f"n{k}", float(k)) for k in range(6)),
+        likeness=np.eye(6),
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size = "memory", 0.07
@@ -165,6 +166,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - 0.02**2) / 0.04))
     assert told.explained_percent == pytest.approx(75.0)
     assert (told.rivals, told.next_experiment) == (("rival of delay",), "next")
+    assert told.likeness is parts.found.likeness
     assert (told.limits, told.leftover, told.screening) == (("limit", "it turned"), None, parts.found.screening)
     assert (told.model, told.baseline_model, told.parameters) == ("with offset", MODEL, {"p": 1})
     assert (told.covariance, told.traces, told.thresholds) == (((1.0,),), ("trace",), STANDARD)

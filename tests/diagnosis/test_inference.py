@@ -105,6 +105,24 @@ def test_every_extension_is_the_score_of_the_extended_set(small: Linearised) -> 
         assert_allclose(strengths, exact.strengths[0], rtol=1e-3, atol=1e-9)
 
 
+def test_likeness_is_the_cosine_of_what_the_baseline_cannot_follow(small: Linearised) -> None:
+    evidence, alone = Evidence(small, 0.002), [0, 5, 11, 30]
+    followed, made = [], []
+    for k, (session, rows) in enumerate(zip(small.sessions, small.rows, strict=True)):
+        past = np.zeros((rows.shape[0], 2 * len(small.sessions)))
+        past[:, 2 * k : 2 * k + 2] = nuisances(session, small.model.pole_per_s)
+        adds = [rows[:, small.candidates[m].columns] @ evidence.posterior((m,)).strengths[0] for m in alone]
+        followed.append(np.column_stack([rows[:, 1 : 1 + small.own], past])[session.fitted])
+        made.append(np.column_stack(adds)[session.fitted])
+    z, y = np.concatenate(followed), np.concatenate(made)
+    left = y - z @ np.linalg.lstsq(z, y, rcond=None)[0]
+    left /= np.linalg.norm(left, axis=0)
+    found = evidence.likeness(alone)
+    assert_allclose(found, np.abs(left.T @ left), atol=1e-3)
+    assert_allclose(np.diag(found), 1.0, atol=1e-12)
+    assert found.min() >= 0.0
+
+
 def test_a_departure_never_makes_the_right_law_much_less_likely(small: Linearised) -> None:
     evidence = Evidence(small, 0.002)
     (right,) = (k for k, one in enumerate(small.candidates) if one.name == "gas_compression")

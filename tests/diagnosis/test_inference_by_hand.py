@@ -33,8 +33,10 @@ def test_what_can_be_left_out_is_a_recording_or_a_rise_of_a_single_one() -> None
 
 def test_screening_is_what_each_effect_alone_takes_off() -> None:
     evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(12)], worth(*(float(k) for k in range(12))))
-    found = _screening(evidence)
+    evidence.likeness = lambda alone: list(alone)
+    found, alike = _screening(evidence)
     assert found == tuple((f"n{k}", float(k)) for k in range(11, 1, -1))
+    assert alike == list(range(11, 1, -1))  # in the same order
 
 
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
@@ -79,7 +81,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(
         _inference, "searched", lambda *given: ("given", SimpleNamespace(noise_sd=0.1), SimpleNamespace())
     )
-    monkeypatch.setattr(_inference, "_screening", lambda evidence: "screening")
+    monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
     monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
@@ -107,7 +109,7 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
     for flow.independent, is_unit, can_validate in ((1, True, False), (2, False, True), (1, False, False)):
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
-        assert (found.screening, found.likelihood) == ("screening", "likelihood")
+        assert (found.screening, found.likeness, found.likelihood) == ("screening", "likeness", "likelihood")
         assert found.baseline is found.fit
 
 

@@ -89,8 +89,3 @@ def test_halving_the_step_changes_nothing_for_straight_lines(parts: list, seed: 
     fine = np.interp(np.arange(801) / 2, np.arange(401), coarse)
     core = Core(parts)
     assert_allclose(core.simulate(fine, STEP_S / 2)[::2], core.simulate(coarse, STEP_S), atol=1e-8)
-
-
-def test_the_deformation_is_the_load_at_rest() -> None:
-    f = np.concatenate([np.linspace(0, 0.7, 20), np.full(100_000, 0.7)])
-    assert Core([Arm(0.3, 0.2)]).deformation(f, STEP_S)[-1] == pytest.approx(0.7, abs=1e-6)

@@ -55,7 +55,6 @@ def test_traits_are_words_of_the_one_vocabulary(one: Effect) -> None:
     assert one.exposed_by | one.needs <= WORDS
     assert one.needs <= CHANNELS
     assert all(parameter.channel == "" or parameter.channel in CHANNELS for parameter in one.parameters)
-    assert one.departs_with <= {"load", "direction", "rate", "time", "memory"}
     assert one.is_flexible or one.separated_by
     for name, words in one.separated_by.items():
         assert name in catalogue()

@@ -43,7 +43,6 @@ class BoucWenHysteresis(Effect):
         "power_law_creep": by("rates"),
         "second_relaxation": by("rates"),
     }
-    departs_with = frozenset({"load", "direction", "memory"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load less friction."""

@@ -34,7 +34,6 @@ class ClockDrift(Effect):
         "delay": by("repeats", "steps"),
         "sensor_lag": by("repeats", "steps"),
     }
-    departs_with = frozenset({"time"})
     is_latency = True
     why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
 

@@ -37,7 +37,6 @@ class ContactArea(Effect):
         "sensor_nonlinearity": by("displacement", "pressure_reference"),
         "wall_hardening": by("rates", "displacement"),
     }
-    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

@@ -24,7 +24,6 @@ class CrossTalk(Effect):
         "zero_drift": by("neighbour"),
     }
     is_seen_at_rest = True
-    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the neighbour's share."""

@@ -41,7 +41,6 @@ class CycleConditioning(Effect):
         "mullins_softening": by("shuffled_loads"),
         "warm_up": by("pauses"),
     }
-    departs_with = frozenset({"memory", "time"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load with the gain so far; ``before["cycles"]`` and ``before["way"]`` count along."""

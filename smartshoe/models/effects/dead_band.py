@@ -42,7 +42,6 @@ class DeadBand(Effect):
         "sensor_nonlinearity": by("low_loads"),
         "zero_offset": by("low_loads"),
     }
-    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

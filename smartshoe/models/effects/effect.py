@@ -17,7 +17,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.models.core import Core
-from smartshoe.models.effects.exposure import Direction, Exposure
+from smartshoe.models.effects.exposure import Exposure
 from smartshoe.models.elements import Arm, Element
 
 Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
@@ -160,7 +160,6 @@ class Effect(ABC):
     ``exposed_by``: what a protocol must hold, in the words of `smartshoe.models.effects.exposure`.
     ``separated_by``: neighbour's name to the words for what tells it from this one, any of them; the neighbour says
     the same of this one.
-    ``departs_with``: what the difference between this equation and others of its kind usually depends on.
     ``is_physical``: False for noise and faults of the data, which are never a cause by their waveform.
     ``is_latency``: True where the reading comes late, or early, and is changed in nothing else.
     ``is_seen_at_rest``: True where the reading without load shows the effect's size.
@@ -185,7 +184,6 @@ class Effect(ABC):
     needs: ClassVar[frozenset[str]] = frozenset()
     exposed_by: ClassVar[frozenset[Exposure]] = frozenset()
     separated_by: ClassVar[Mapping[str, frozenset[Exposure]]] = {}
-    departs_with: ClassVar[frozenset[Direction]] = frozenset()
     is_physical: ClassVar[bool] = True
     is_latency: ClassVar[bool] = False
     is_seen_at_rest: ClassVar[bool] = False

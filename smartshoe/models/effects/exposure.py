@@ -10,9 +10,6 @@ Exposure = Literal[
     "shuffled_loads", "long_hold", "multisine",
     "temperature", "displacement", "neighbour", "command", "pressure_reference",
 ]  # fmt: skip
-Direction = Literal["load", "direction", "rate", "time", "memory"]
-"""What a departure from an equation depends on: the load itself, whether it rises or falls, how fast it moves, the time
-that has gone by, the loads that were before."""
 
 SAYS = MappingProxyType({
     "holds": "loads held for some seconds, at several levels",

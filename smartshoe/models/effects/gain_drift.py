@@ -46,7 +46,6 @@ class GainDrift(Effect):
         "mullins_softening": by("pauses", "shuffled_loads"),
         "zero_drift": by("rests", "peaks"),
     }
-    departs_with = frozenset({"time"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the session's start."""

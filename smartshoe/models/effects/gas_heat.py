@@ -34,7 +34,6 @@ class GasHeat(CoreEffect):
         "rate_gain": by("holds"),
         "second_relaxation": by("holds"),
     }
-    departs_with = frozenset({"time"})
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One heat store for each term of the series."""

@@ -29,7 +29,6 @@ class LinearLeak(CoreEffect):
         "warm_up": by("idle"),
         "zero_drift": by("idle", "long_hold", "temperature"),
     }
-    departs_with = frozenset({"time", "load"})
     air = "leaves"
 
     def elements(self, values: Array) -> tuple[Element, ...]:

@@ -26,7 +26,6 @@ class LoadUnloadAsymmetry(Effect):
         "play_hysteresis": by("minor_loops"),
         "rate_gain": by("rates"),
     }
-    departs_with = frozenset({"load", "direction", "memory"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

@@ -45,7 +45,6 @@ class MullinsSoftening(Effect):
         "gain_drift": by("pauses", "shuffled_loads"),
         "play_hysteresis": by("repeats"),
     }
-    departs_with = frozenset({"memory", "load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without softening would need; ``before["largest_load"]`` counts."""

@@ -33,7 +33,6 @@ class OrificeLeak(Effect):
         "permanent_set": by("rests"),
         "zero_drift": by("idle", "long_hold", "temperature"),
     }
-    departs_with = frozenset({"time", "load"})
     air = "leaves"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

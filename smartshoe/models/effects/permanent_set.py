@@ -34,7 +34,6 @@ class PermanentSet(Effect):
         "warm_up": by("pauses"),
         "zero_drift": by("pauses"),
     }
-    departs_with = frozenset({"time", "load"})
     is_seen_at_rest = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

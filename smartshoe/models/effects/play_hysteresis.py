@@ -53,7 +53,6 @@ class PlayHysteresis(Effect):
         "power_law_creep": by("rates"),
         "second_relaxation": by("rates"),
     }
-    departs_with = frozenset({"load", "direction", "memory"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load less friction."""

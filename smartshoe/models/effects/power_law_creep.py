@@ -42,7 +42,6 @@ class PowerLawCreep(CoreEffect):
         "play_hysteresis": by("rates"),
         "second_relaxation": by("steps", "long_hold"),
     }
-    departs_with = frozenset({"time", "load"})
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """The ladder's arms."""

@@ -36,7 +36,6 @@ class RateGain(Effect):
         "load_unload_asymmetry": by("rates"),
         "sensor_lag": by("rates"),
     }
-    departs_with = frozenset({"rate", "load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that reaches the tube."""

@@ -46,7 +46,6 @@ class Saturation(Effect):
         "sensor_nonlinearity": by("peaks"),
         "wall_hardening": by("peaks"),
     }
-    departs_with = frozenset({"load"})
     why_not_undone = "what was clipped is lost"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

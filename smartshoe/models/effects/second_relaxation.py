@@ -27,7 +27,6 @@ class SecondRelaxation(CoreEffect):
         "power_law_creep": by("steps", "long_hold"),
         "sensor_lag": by("steps"),
     }
-    departs_with = frozenset({"time", "load"})
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One arm."""

@@ -37,7 +37,6 @@ class SensorLag(Effect):
         "rate_gain": by("rates"),
         "second_relaxation": by("steps"),
     }
-    departs_with = frozenset({"rate"})
     is_latency = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

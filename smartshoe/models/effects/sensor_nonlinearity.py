@@ -62,7 +62,6 @@ class SensorNonlinearity(Effect):
         "saturation": by("peaks"),
         "wall_hardening": by("displacement", "pressure_reference"),
     }
-    departs_with = frozenset({"load"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The reading."""

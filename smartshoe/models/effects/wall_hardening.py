@@ -37,7 +37,6 @@ class WallHardening(Effect):
         "saturation": by("peaks"),
         "sensor_nonlinearity": by("displacement", "pressure_reference"),
     }
-    departs_with = frozenset({"load", "rate"})
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without hardening would need."""

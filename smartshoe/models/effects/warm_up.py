@@ -32,7 +32,6 @@ class WarmUp(Effect):
         "zero_drift": by("idle"),
         "zero_offset": by("idle"),
     }
-    departs_with = frozenset({"time"})
     is_seen_at_rest = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

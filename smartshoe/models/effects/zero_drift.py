@@ -44,7 +44,6 @@ class ZeroDrift(Effect):
         "permanent_set": by("pauses"),
         "warm_up": by("idle"),
     }
-    departs_with = frozenset({"time"})
     is_seen_at_rest = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
