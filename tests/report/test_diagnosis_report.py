@@ -20,7 +20,7 @@ from looks import look, unfold
 from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit, Trace
 from smartshoe.diagnosis._result import NextExperiment, Rival, Statement
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects import Conditions, Effect, effect
+from smartshoe.models.effects import Conditions, Effect, blocks, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
@@ -37,6 +37,7 @@ from smartshoe.report.diagnosis._sentences import (
     sure,
     two_numbers,
 )
+from smartshoe.report.diagnosis.grids import ranked
 from smartshoe.report.diagnosis.terminal import print_diagnosis
 from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_at_two_rates, worst_cycle
 
@@ -326,6 +327,18 @@ def test_nothing_is_named_where_nothing_was_found() -> None:
         assert " sure" not in text
         assert "Nothing that matters was added." in text
     assert "none is named" in plain_text(page("unexplained"))
+
+
+def test_a_block_that_stands_for_a_cause_was_chosen() -> None:
+    (block, *_) = blocks()["static_curve"]
+    model = ExtendedModel(1.0, 0.08, 0.22, FULL_LOAD_N, FULL_READING, "mbar")
+    made = replace(
+        case("one cause"),
+        screening=((block.name, 9.0), ("delay", 5.0)),
+        model=model.with_part(block, block.begun(block.shapes[0])),
+    )
+    assert [(bar.name, bar.kind) for bar in ranked(made)] == [(block.name, "cause"), ("delay", "other")]
+    assert [bar.kind for bar in ranked(replace(made, minor=(block.name,)))] == ["other", "other"]
 
 
 def test_names_and_sentences_from_files_are_escaped(tmp_path: Path) -> None:

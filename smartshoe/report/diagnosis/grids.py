@@ -19,7 +19,7 @@ Kind = Literal["cause", "equivalent", "other"]
 MOST_BARS, MOST_ALIKE = 12, 10
 ALIKE = 0.95  # of the likeness: beyond it only a full fit can tell two effects apart, if at all
 SAYS: dict[Kind, str] = {
-    "cause": "named as a cause", "equivalent": "cannot be told from a cause", "other": "not chosen",
+    "cause": "named as a cause, or stands for one", "equivalent": "cannot be told from a cause", "other": "not chosen",
 }  # fmt: skip
 
 
@@ -42,6 +42,9 @@ def ranked(diagnosis: Diagnosis) -> list[Bar]:
     """Effects by what each alone could take off the baseline's error, the strongest first."""
     falls = [(name, fall) for name, fall in diagnosis.screening if np.isfinite(fall) and fall > 0][:MOST_BARS]
     causes = {cause.name for cause in diagnosis.causes}
+    if diagnosis.model is not None:  # a flexible block stands there for the cause that is named by its nearest law
+        flexible = {part.name for part in diagnosis.model.parts if part.effect.is_flexible}
+        causes |= flexible - {*diagnosis.minor}
     alike = {name for cause in diagnosis.causes for name in cause.equivalents}
     most = max((fall for _, fall in falls), default=1.0)
     return [
