@@ -47,7 +47,7 @@ from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine, twins
-from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.integrity.thresholds import Thresholds, decided_by, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.effect import CoreEffect
@@ -87,15 +87,13 @@ def diagnose(
     Raises
     ------
     UsageError
-        Where no recording is given. A diagnosis that the data cannot support comes back with the verdict "refused" and
-        the reason in ``limits``.
+        Where no recording is given, and of numbers to decide by that are none. A diagnosis that the data cannot
+        support comes back with the verdict "refused" and the reason in ``limits``.
     """
     fitted, kept_out = recordings_of(recordings), recordings_of(hold_out, "hold_out")
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
-    decided = thresholds or Thresholds()
-    if material is not None:
-        decided = replace(decided, material=material)
+    decided = decided_by(thresholds, material)
     everything, count = [*fitted, *kept_out], len(fitted)
     integrity = examine(everything, decided)
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.errors import InputError, UsageError
+from smartshoe.errors import InputError
 from smartshoe.integrity._clocks import align, two_clocks
 from smartshoe.integrity._dropouts import dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity
@@ -20,7 +20,7 @@ from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
 from smartshoe.integrity._view import Signal, View
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
 
 OF_RECORDING: tuple[Callable[[Recording, Thresholds], Iterator[Finding]], ...] = (
@@ -57,9 +57,7 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     usable: list[Mask] = []
     offsets: list[tuple[float, float]] = []
     refusals: list[str] = []
-    decided = thresholds or Thresholds()
-    if not isinstance(decided, Thresholds):
-        raise UsageError(f"thresholds is of type {type(decided).__name__}: give Thresholds, or none for the usual ones")
+    decided = decided_by(thresholds)
     examined = [_examined(recording, decided) for recording in recordings]
     dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
     if dropped_to.size and len(recordings) > 1:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from typing import Any
 
@@ -163,6 +163,14 @@ class Thresholds:
     def cycle(self) -> float:
         """Share by which a load rises and falls in a cycle: clear of what is clear of standing still."""
         return self.clear**2 * self.standing
+
+
+def decided_by(given: Thresholds | None, material: float | None = None) -> Thresholds:
+    """``given`` or the usual, with ``material`` where there is one; `UsageError` for what are no thresholds."""
+    if given is not None and not isinstance(given, Thresholds):
+        raise UsageError(f"thresholds is of type {type(given).__name__}: give Thresholds, or none for the usual ones")
+    decided = Thresholds() if given is None else given
+    return decided if material is None else replace(decided, material=material)
 
 
 def described(given: Thresholds) -> list[dict[str, Any]]:

@@ -135,6 +135,8 @@ def test_numbers_to_decide_by_are_numbers(numbers: dict[str, object]) -> None:
         replace(STANDARD, **numbers)
 
 
-def test_thresholds_of_another_type_are_refused() -> None:
-    with pytest.raises(UsageError, match="thresholds is of type int"):
-        diagnose(_pressed(TRIANGLE), thresholds=3)  # type: ignore[arg-type]
+@pytest.mark.parametrize("given", [3, 0, {}])
+@pytest.mark.parametrize("material", [None, 1e-3])
+def test_thresholds_of_another_type_are_refused(given: object, material: float | None) -> None:
+    with pytest.raises(UsageError, match=f"thresholds is of type {type(given).__name__}: give Thresholds"):
+        diagnose(_pressed(TRIANGLE), thresholds=given, material=material)  # type: ignore[arg-type]
