@@ -107,8 +107,9 @@ def infer(
         alone = None if first is None else _judged(first, plain, sessions)
         found = found.with_nothing_but(plain) if alone is None or alone.is_stepped_down else alone
         members = found.members()
-    known = plain, found.fit, found.likelihood, members
-    return Inference(*known, screening, likeness, found.refused, undone=found.undone)
+    return Inference(
+        plain, found.fit, found.likelihood, members, screening, likeness, found.refused, undone=found.undone
+    )
 
 
 @dataclass(frozen=True, eq=False)

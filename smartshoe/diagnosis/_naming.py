@@ -40,20 +40,17 @@ def names_of(
 
     A flexible block is named by the law of its family, and of its stage in the chain, that comes nearest.
     """
-    likely = [
-        _named(one, probability_of_kind(one, left, thresholds), left, thresholds)
-        for one in members
-        if one.size >= thresholds.material
-    ]
+    likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     sure = tuple(one for one in likely if one.is_sure)
     return sure or tuple(one for one in likely if is_followed and one.member.size > left)
 
 
-def _named(one: Member, kind: float, left: float, thresholds: Thresholds) -> Name:
+def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
+    kind = probability_of_kind(one, left, thresholds)
     is_sure = kind >= thresholds.least_confidence
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
-        return Name(one, one.effect, kind, law, equivalents, False, is_sure)
+        return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     family = [e for e in catalogue().values() if e.family == one.effect.family]
     margins = {a.effect: a.margin for a in one.laws}
     # What grows with the load borne is none that goes with the clock; but curves look alike wherever they stand.

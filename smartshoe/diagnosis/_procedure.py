@@ -24,7 +24,7 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
 from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, pastless, prepare, thinning
 from smartshoe.diagnosis._settling import Progress
-from smartshoe.diagnosis._validation import error_of
+from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
     crept_of,
     elsewhere_of,
@@ -207,8 +207,8 @@ def _diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     extended = found.fit.model
-    before = residual_structure(sessions, [residual_of(one, found.baseline.model) for one in sessions], thresholds)
-    residuals = [residual_of(one, extended) for one in sessions]
+    plain, residuals = ([residual_of(one, model) for one in sessions] for model in (found.baseline.model, extended))
+    before = residual_structure(sessions, plain, thresholds)
     after = residual_structure(sessions, residuals, thresholds)
     # What is held out decides over no name; it may be of loads that nothing was learnt of.
     learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
@@ -216,8 +216,7 @@ def _diagnosed(
     within = residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
     everything = max(within.rms, within.size)
     silent = given.is_no_unit or not found.can_validate
-    plain_rms, left_rms = (error_of(sessions, model) for model in (found.baseline.model, extended))
-    is_followed = left_rms <= thresholds.departure * plain_rms
+    is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
     members = [one for one in found.members if one.name not in found.undone]
     names = names_of(members, everything, thresholds, is_followed=is_followed)
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]

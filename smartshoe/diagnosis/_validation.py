@@ -160,12 +160,12 @@ def cancelling(sessions: Sequence[Session], model: ExtendedModel, thresholds: Th
 
 def error_of(sessions: Sequence[Session], model: ExtendedModel) -> float:
     """Rms of what is left of what is fitted."""
-    return _fitted_rms(sessions, lambda session: residual_of(session, model))
+    return fitted_rms(sessions, [residual_of(session, model) for session in sessions])
 
 
 def apart(sessions: Sequence[Session], first: ExtendedModel, second: ExtendedModel) -> float:
     """Rms of the difference of two models' readings over what is fitted, each recording's own offset aside."""
-    return _fitted_rms(sessions, lambda session: residual_of(session, first) - residual_of(session, second))
+    return fitted_rms(sessions, [residual_of(session, first) - residual_of(session, second) for session in sessions])
 
 
 def _moved(sessions: Sequence[Session], whole: Sequence[Array], less: ExtendedModel) -> list[Array]:
@@ -179,12 +179,13 @@ def _spread(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
     return math.sqrt(sum(float(one @ one) for one in parts) / max(sum(one.size for one in parts), 1))
 
 
-def _fitted_rms(sessions: Sequence[Session], signal_of: Callable[[Session], Array]) -> float:
+def fitted_rms(sessions: Sequence[Session], signals: Sequence[Array]) -> float:
+    """Rms of ``signals``, (n,) a session, over what is fitted."""
     square, count = 0.0, 0
-    for session in sessions:
-        signal = signal_of(session)[session.fitted]
-        square += float(signal @ signal)
-        count += signal.size
+    for session, signal in zip(sessions, signals, strict=True):
+        fitted = signal[session.fitted]
+        square += float(fitted @ fitted)
+        count += fitted.size
     return float(np.sqrt(square / max(count, 1)))
 
 

@@ -123,7 +123,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("may_be_none", lambda fit, name: name == "faint")
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
-    answer("error_of", 1.0)
+    answer("fitted_rms", 1.0)
     answer("_cause", cause)
     answer("_zero_cause", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
     answer("_with_offset", "with offset")
@@ -190,7 +190,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
 def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     for left, is_followed in ((STANDARD.departure, True), (1.01 * STANDARD.departure, False)):
         parts.seen.clear()
-        monkeypatch.setattr(_procedure, "error_of", lambda _, model, left=left: left if len(model.parts) else 1.0)
+        monkeypatch.setattr(_procedure, "fitted_rms", lambda _, of, left=left: left if of[0] == "held 2" else 1.0)
         _run_diagnosis(parts)
         assert parts.seen["names_of"][1] == {"is_followed": is_followed}
 
