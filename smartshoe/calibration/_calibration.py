@@ -39,7 +39,8 @@ class Calibration:
     per reading unit; ``load_range_n`` and ``rate_range_n_per_s`` what was seen; ``sources`` name and sha256 of the
     files; ``created`` an ISO date that the caller gives, '' where not known. ``unit`` is where the unit sits
     ("left_toe"), ``serial_number`` which one it is, '' where not known. ``extended`` is the model with effects, whose
-    linear part the coefficients are; where there is one, it gives the force.
+    linear part the coefficients are; where there is one, it gives the force. ``twin`` is the model that simulates the
+    unit forward, where that is not the one whose inverse gives the force.
     """
 
     a1: float
@@ -60,6 +61,7 @@ class Calibration:
     smartshoe_version: str = ""
     serial_number: str = ""
     extended: ExtendedModel | None = None
+    twin: ExtendedModel | None = None
 
     def __post_init__(self) -> None:
         for key in ("a1", "b0", "b1", "offset", "scale", "delay_s", "sample_rate_hz"):
@@ -85,12 +87,13 @@ class Calibration:
         )
 
     def model(self) -> ExtendedModel:
-        """The model that simulates this unit forward: the extended one, or the linear part as one.
+        """The model that simulates this unit forward: its twin, the extended one, or the linear part as one.
 
         Raises `InputError` where the coefficients are no passive solid.
         """
-        if self.extended is not None:
-            return self.extended
+        forward = self.twin or self.extended
+        if forward is not None:
+            return forward
         if not (self.b1 > 0.0 and self.b0 * self.a1 > 0.0):
             raise InputError(
                 f"calibration of {self.unit or 'a unit'}: b0 and b1 must be above 0 to simulate it: identify it anew"
@@ -106,7 +109,7 @@ class Calibration:
     def to_dict(self) -> dict[str, Any]:
         """The file's object, schema smartshoe.calibration/1; no NaN, no infinity.
 
-        The keys ``serial_number`` and ``extended`` stand there only where the calibration has them.
+        The keys ``serial_number``, ``extended`` and ``twin`` stand there only where the calibration has them.
         """
         found: dict[str, Any] = {
             "schema": SCHEMA,
@@ -127,8 +130,9 @@ class Calibration:
         }
         if self.serial_number:
             found["serial_number"] = self.serial_number
-        if self.extended is not None:
-            found["extended"] = self.extended.to_dict()
+        for key, model in (("extended", self.extended), ("twin", self.twin)):
+            if model is not None:
+                found[key] = model.to_dict()
         return found
 
     def save(self, path: Path | str) -> None:
@@ -182,7 +186,8 @@ class Calibration:
                 created=read.text(found, "created"),
                 smartshoe_version=read.text(found, "smartshoe_version"),
                 serial_number=read.text(found, "serial_number") if "serial_number" in found else "",
-                extended=read.extended(found),
+                extended=read.extended(found, "extended"),
+                twin=read.extended(found, "twin"),
             )
         except InputError as error:
             raise error if str(error).startswith(read.path) else InputError(f"{read.path}: {error}") from error

@@ -91,33 +91,33 @@ class Reader:
         low, high = (self.maybe(bound, key + "ci95") for bound in interval)
         return Parameter(self.number(item, "value", key), self.maybe(item.get("sd"), key + "sd"), (low, high), unit)
 
-    def extended(self, found: Mapping[str, Any]) -> ExtendedModel | None:
-        """The model under the key ``extended``, None where there is none."""
-        if "extended" not in found:
+    def extended(self, found: Mapping[str, Any], key: str) -> ExtendedModel | None:
+        """The model under ``key``, None where there is none."""
+        if key not in found:
             return None
-        given = self.mapping(found, "extended")
-        for key in ("gain", "relaxation_rate_per_s", "full_scale_load_n", "wall_ratio"):
-            if not self.number(given, key, "extended.") > 0.0:
-                raise self.fault(f"extended.{key}", f"is {given[key]!r}, it must be above 0")
-        if self.number(given, "full_scale_reading", "extended.") == 0.0:  # negative where readings fall with load
-            raise self.fault("extended.full_scale_reading", "is 0, it must not be")
-        self.number(given, "relaxing_share", "extended.")
-        self.text(given, "reading_unit", "extended.")
-        effects = self.mapping(given, "effects", "extended.")
+        given = self.mapping(found, key)
+        for name in ("gain", "relaxation_rate_per_s", "full_scale_load_n", "wall_ratio"):
+            if not self.number(given, name, f"{key}.") > 0.0:
+                raise self.fault(f"{key}.{name}", f"is {given[name]!r}, it must be above 0")
+        if self.number(given, "full_scale_reading", f"{key}.") == 0.0:  # negative where readings fall with load
+            raise self.fault(f"{key}.full_scale_reading", "is 0, it must not be")
+        self.number(given, "relaxing_share", f"{key}.")
+        self.text(given, "reading_unit", f"{key}.")
+        effects = self.mapping(given, "effects", f"{key}.")
         for name in effects:
-            above = f"extended.effects.{name}."
-            for parameter in self.mapping(effects, name, "extended.effects."):
+            above = f"{key}.effects.{name}."
+            for parameter in self.mapping(effects, name, f"{key}.effects."):
                 self.number(effects[name], parameter, above)
         try:
             model = ExtendedModel.from_dict(given)
         except KeyError as error:
-            raise self.fault(f"extended.effects.*.{error.args[0]}", "is missing") from error
+            raise self.fault(f"{key}.effects.*.{error.args[0]}", "is missing") from error
         except UsageError as error:
-            raise self.fault("extended.effects", f"is not understood ({error})") from error
+            raise self.fault(f"{key}.effects", f"is not understood ({error})") from error
         except TypeError as error:
-            raise self.fault("extended", f"holds a key that is not known ({error})") from error
+            raise self.fault(key, f"holds a key that is not known ({error})") from error
         for part in model.parts:
             surplus = set(effects[part.name]) - {parameter.name for parameter in part.effect.parameters}
             if surplus:
-                raise self.fault(f"extended.effects.{part.name}.{min(surplus)}", "is not known")
+                raise self.fault(f"{key}.effects.{part.name}.{min(surplus)}", "is not known")
         return model

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
-from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._sensitivity import nuisances
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -160,19 +159,3 @@ def _log_ratio(before: Array | float, after: Array | float) -> Array:
 def _percent(log_ratio: Array | float) -> Array:
     """By how much an error falls whose square changes so."""
     return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), MOST))))
-
-
-def force_rmse_n(fine: Sequence[Session], model: ExtendedModel) -> float:
-    """Root mean square error in N of the compensated force against the held-out load; NaN where nothing is held out."""
-    total, count = 0.0, 0
-    for session in fine:
-        judged = session.judged
-        if not judged.any():
-            continue
-        _, own = own_of(session, model, session.reading - model.simulate(session.conditions))
-        compensator = ExtendedCompensator(model, 1.0 / session.conditions.step_s)
-        force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
-        off = (force_n - session.conditions.load * model.full_scale_load_n)[judged]
-        total += float(off @ off)
-        count += off.size
-    return float(np.sqrt(total / count)) if count else float("nan")

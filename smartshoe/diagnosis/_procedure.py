@@ -13,7 +13,8 @@ from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
-from smartshoe.diagnosis._held_out import Errors, Gain, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis._force import force_error, force_of, undoes
+from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
@@ -28,7 +29,6 @@ from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
     crept_of,
     elsewhere_of,
-    force_of,
     known_error,
     moved_of,
     none_of,
@@ -251,7 +251,9 @@ def _diagnosed(
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
     named = {cause.name for cause in causes} | {name.member.name for name in names}
     parameters, covariance = joint_parameters(found.fit, scale)
-    plain_n, force_n = (force_rmse_n(fine, model) for model in (found.baseline.model, extended))
+    plain_force, force = (force_error(fine, model) for model in (found.baseline.model, extended))
+    by_extended = undoes(force, plain_force)
+    told_force = force_of(plain_force, force, thresholds)
     ways = beyond(fine, scale, thresholds) if won.is_loss or elsewhere else None
     return Diagnosis(
         verdict,
@@ -262,8 +264,8 @@ def _diagnosed(
         causes=tuple(causes),
         minor=tuple(part.name for part in extended.parts if part.name not in named),
         data_faults=(*integrity.faults, *noise),
-        baseline=_goodness(baseline, plain_n, before, scale),
-        extended=_goodness(best, force_n, after, scale),
+        baseline=_goodness(baseline, plain_force.held_out_n, before, scale),
+        extended=_goodness(best, (force if by_extended else plain_force).held_out_n, after, scale),
         gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
@@ -275,7 +277,7 @@ def _diagnosed(
             *given.limits,
             *([worse_of(won, ways)] if won.is_loss else []),
             *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
-            *([force_of(plain_n, force_n)] if force_n > (1.0 + thresholds.standing) * plain_n else []),
+            *([told_force] if told_force else []),
             *parted,
             *(said for _, said in unclear),
             *past,
@@ -287,6 +289,7 @@ def _diagnosed(
         likeness=found.likeness,
         model=with_zero,
         baseline_model=found.baseline.model,
+        force_model=None if by_extended else _with_offset(found.baseline.model, zeros, sessions, scale),
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -168,6 +168,8 @@ class Diagnosis(Summarised):
     """What measured data says of its simulation; `to_dict` is what `smartshoe diagnose --json` writes.
 
     ``model`` is the extended model and ``baseline_model`` the plain one, None where the diagnosis was refused.
+    ``force_model`` is the plain one, each with its zero, where its inverse gives the load back and that of ``model``
+    does not; None where that does. ``extended.force_rmse_n`` is of the one that `calibration` compensates by.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
     ``minor``: effects that stay in the model and are no causes: immaterial, unsure, undone by others, at a bound.
     ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
@@ -195,6 +197,7 @@ class Diagnosis(Summarised):
     likeness: Array | None = None
     model: ExtendedModel | None = None
     baseline_model: ExtendedModel | None = None
+    force_model: ExtendedModel | None = None
     traces: tuple[Trace, ...] = field(default=())
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     covariance: tuple[tuple[float, ...], ...] = ()
@@ -203,14 +206,15 @@ class Diagnosis(Summarised):
     def calibration(self, *, unit: str = "", sample_rate_hz: float = 100.0, created: str = "") -> Calibration:
         """The extended model as a calibration, for `compensate`, `export` and a twin.
 
+        With a ``force_model`` that one compensates, and the extended model is the twin.
         Raises `NotIdentifiableError` where the diagnosis was refused.
         """
         from smartshoe.calibration import extended_calibration
 
         if self.model is None:
             raise NotIdentifiableError(f"there is no model to calibrate by: {self.says}")
-        return extended_calibration(
-            self.model,
+        made = extended_calibration(
+            self.force_model or self.model,
             unit=unit,
             parameters=self.parameters,
             covariance=self.covariance,
@@ -218,6 +222,7 @@ class Diagnosis(Summarised):
             sample_rate_hz=sample_rate_hz,
             created=created,
         )
+        return replace(made, twin=self.model) if self.force_model else made
 
     def plot(self) -> Figure:
         """A figure: by recording, what the baseline and the extended model leave of the reading over time.

@@ -180,14 +180,6 @@ def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
     return f"what is held out is off by {100 * off:.2g} % of full scale, what was fitted by {100 * within:.2g} %: {why}"
 
 
-def force_of(plain_n: float, extended_n: float) -> str:
-    """What is said of an extended model that gives the load back worse than the plain one does."""
-    return (
-        f"the force that the extended model gives back is worse than the plain one's ({plain_n:.3g} to {extended_n:.3g}"
-        " N on what was held out), since to undo its effects makes more of what is left: compensate by the plain model"
-    )
-
-
 def past_of(zero: Zero, scale: Scale) -> str:
     """What is said of a zero that may have drifted to where it stands."""
     value = zero.value * scale.reading

@@ -65,6 +65,23 @@ def test_the_file_adds_keys_only_where_they_are_needed() -> None:
     assert set(CALIBRATION.to_dict()["extended"]["effects"]) == set(NAMES)
 
 
+def test_a_twin_simulates_and_does_not_compensate(tmp_path: Path) -> None:
+    twin = chain_of(["play_hysteresis", "second_relaxation"], 3)
+    calibration = replace(CALIBRATION, twin=twin)
+    assert set(calibration.to_dict()) - set(CALIBRATION.to_dict()) == {"twin"}
+    calibration.save(tmp_path / "c.json")
+    back = Calibration.load(tmp_path / "c.json")
+    assert back.to_dict() == calibration.to_dict()
+    assert back.model().names == twin.names
+    readings = _recording(MODEL).sensor.values[:300]
+    assert np.array_equal(back.compensator(100.0).apply(readings), CALIBRATION.compensator(100.0).apply(readings))
+    found = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
+    found["twin"]["gain"] = 0.0
+    (tmp_path / "c.json").write_text(json.dumps(found), encoding="utf-8")
+    with pytest.raises(InputError, match="twin.gain"):
+        Calibration.load(tmp_path / "c.json")
+
+
 def test_the_kind_of_filter_follows_from_the_calibration() -> None:
     filter_ = CALIBRATION.compensator(250.0)
     assert isinstance(filter_, ExtendedCompensator)

@@ -15,7 +15,8 @@ from scipy.stats import t as student
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, with_usual_arm
-from smartshoe.diagnosis._held_out import Errors, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis._force import force_error
+from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
@@ -451,7 +452,8 @@ def test_a_loss_is_of_what_is_material_and_of_more_than_a_few_cycles(count: int,
 def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
     """Of a model without an arm the force is the reading over the gain; its offset is the recording's own."""
     plain = replace(MODEL, relaxing_share=0.0)
-    total, count = 0.0, 0
+    squares = {"fitted": 0.0, "judged": 0.0}
+    counts = {"fitted": 0, "judged": 0}
     held = []
     for seed, size in enumerate((200, 150)):
         load = _load(size, seed)
@@ -459,9 +461,13 @@ def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
         one = _session(load, 1.1 * load + 0.2 + noise, seed, held=np.arange(size) > 0.4 * size)
         held.append(one)
         _, own = own_of(one, plain, one.reading - plain.simulate(one.conditions))
-        off = 800.0 * ((one.reading - own) / 1.1 - load)[one.judged]
-        total += float(off @ off)
-        count += off.size
+        off = 800.0 * ((one.reading - own) / 1.1 - load)
+        for which in squares:
+            part = off[getattr(one, which)]
+            squares[which] += float(part @ part)
+            counts[which] += part.size
     unjudged = _session(_load(80, 1), np.zeros(80))
-    assert force_rmse_n([held[0], unjudged, held[1]], plain) == pytest.approx(math.sqrt(total / count), rel=1e-6)
-    assert math.isnan(force_rmse_n([unjudged], plain))
+    fitted_n, judged_n = (math.sqrt(squares[which] / counts[which]) for which in squares)
+    assert force_error(held, plain).fitted_n == pytest.approx(fitted_n, rel=1e-6)
+    assert force_error([held[0], unjudged, held[1]], plain).held_out_n == pytest.approx(judged_n, rel=1e-6)
+    assert math.isnan(force_error([unjudged], plain).held_out_n)

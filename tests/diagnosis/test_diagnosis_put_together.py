@@ -13,6 +13,7 @@ from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, 
 
 from smartshoe import Recording
 from smartshoe.diagnosis import _procedure
+from smartshoe.diagnosis._force import ForceError
 from smartshoe.diagnosis._procedure import _diagnosed, _prepared
 from smartshoe.diagnosis._zero import Zero, shift_of
 from smartshoe.models.effects import effect
@@ -129,7 +130,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("_with_offset", "with offset")
     answer("noise_kinds", ["noise"])
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
-    answer("force_rmse_n", lambda fine, model: 7.0 if len(model.parts) else 9.0)
+    answer("force_error", lambda fine, model: ForceError(*((6.0, 7.0) if len(model.parts) else (8.0, 9.0))))
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
@@ -299,11 +300,15 @@ def test_what_is_left_beyond_the_error_leaves_no_noise(parts: Any) -> None:
     assert _run_diagnosis(parts).explainable_percent == 100.0
 
 
-def test_a_force_that_comes_back_worse_is_said(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    for worse_n, is_said in ((9.1, False), (9.3, True)):
-        parts.seen.clear()
-        monkeypatch.setattr(
-            _procedure, "force_rmse_n", lambda fine, model, worse_n=worse_n: worse_n if len(model.parts) else 9.0
-        )
-        told = _run_diagnosis(parts)
-        assert any("compensate by the plain model" in limit for limit in told.limits) is is_said
+def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what_was_fitted(
+    parts: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert _run_diagnosis(parts).force_model is None
+    parts.seen.clear()
+    worse = ForceError(8.1, 7.0)
+    monkeypatch.setattr(_procedure, "force_error", lambda fine, model: worse if len(model.parts) else ForceError(8, 9))
+    told = _run_diagnosis(parts)
+    assert told.force_model == "with offset"
+    assert parts.seen["_with_offset"][0][0] is MODEL  # the plain one's
+    assert told.extended.force_rmse_n == 9.0
+    assert any("compensates by the plain model" in limit for limit in told.limits)

@@ -14,7 +14,8 @@ from test_diagnosis_parts import MODEL, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
-from smartshoe.diagnosis._held_out import Errors, errors, force_rmse_n, gain, own_of, residual_of
+from smartshoe.diagnosis._force import ForceError, force_error, force_of, undoes
+from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._noise_kinds import noise_kinds
@@ -124,13 +125,36 @@ def found_scale() -> Scale:
 def test_the_compensated_force_is_off_by_what_the_reading_is(one: Session) -> None:
     everything = np.ones(one.reading.size, dtype=bool)
     judged = replace(one, held_out=everything)
-    assert force_rmse_n([judged], MODEL) == pytest.approx(0.0, abs=1e-3 * 800.0)
+    assert force_error([judged], MODEL).held_out_n == pytest.approx(0.0, abs=1e-3 * 800.0)
     # A reading that is too large by a share makes a force that is so; its offset is the recording's own.
     more = replace(judged, reading=1.02 * one.reading + 0.3)
     rms = 0.02 * float(np.std(one.conditions.load)) * 800.0
-    assert force_rmse_n([more], MODEL) == pytest.approx(rms, rel=0.1)
-    assert force_rmse_n([more, judged], MODEL) == pytest.approx(rms / np.sqrt(2.0), rel=0.1)
-    assert np.isnan(force_rmse_n([one], MODEL))
+    assert force_error([more], MODEL).held_out_n == pytest.approx(rms, rel=0.1)
+    assert force_error([more, judged], MODEL).held_out_n == pytest.approx(rms / np.sqrt(2.0), rel=0.1)
+    fitted = force_error([one], MODEL)
+    assert (fitted.fitted_n, np.isnan(fitted.held_out_n)) == (pytest.approx(0.0, abs=1e-3 * 800.0), True)
+
+
+def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
+    """Its reading, an error of 8 % added, tells no load; a curve that bends a little still tells it."""
+    noise = 0.08 * np.random.default_rng(1).standard_normal(one.reading.size)
+    for slopes, is_run in ((np.linspace(0.0, -0.94, 6), False), (np.linspace(0.0, -0.3, 6), True)):
+        bent = MODEL.with_part("flexible_curve", slopes)
+        seen = replace(one, reading=bent.simulate(one.conditions) + noise)
+        plain, extended = (force_error([seen], model) for model in (MODEL, bent))
+        assert undoes(extended, plain) is is_run
+        said = force_of(plain, extended, STANDARD)
+        assert (said is None) is is_run
+        assert is_run or "its twin has the effects" in str(said)
+
+
+@pytest.mark.parametrize(("held_out_n", "is_said"), [(9.1, False), (9.3, True), (np.nan, False)])
+def test_a_force_that_is_worse_on_what_is_held_out_alone_is_said_and_decides_nothing(
+    held_out_n: float, is_said: bool
+) -> None:
+    extended = ForceError(8.9, held_out_n)
+    assert undoes(extended, ForceError(9.0, 9.0))
+    assert ("compensate by the plain model" in str(force_of(ForceError(9.0, 9.0), extended, STANDARD))) is is_said
 
 
 def test_an_effect_that_is_far_larger_in_what_was_not_fitted_is_beyond_knowledge(one: Session) -> None:

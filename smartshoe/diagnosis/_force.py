@@ -1,0 +1,69 @@
+"""The force that a model's inverse gives back, and which of two models a unit is compensated by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from smartshoe.arrays import Array
+from smartshoe.calibration import ExtendedCompensator
+from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._session import Session
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.extended import ExtendedModel
+
+
+@dataclass(frozen=True, slots=True)
+class ForceError:
+    """Root mean square errors in N of the compensated force against the load; NaN where there is nothing."""
+
+    fitted_n: float
+    held_out_n: float
+
+
+def force_error(fine: Sequence[Session], model: ExtendedModel) -> ForceError:
+    """Of ``model`` run backwards over what was fitted, and over what is held out."""
+    off = [_off_n(session, model) for session in fine]
+    fitted = [one[session.fitted] for one, session in zip(off, fine, strict=True)]
+    judged = [one[session.judged] for one, session in zip(off, fine, strict=True)]
+    return ForceError(_rms(fitted), _rms(judged))
+
+
+def undoes(extended: ForceError, plain: ForceError) -> bool:
+    """Whether the extended model's inverse gives the load of what was fitted back no worse than the plain one's.
+
+    A curve that hardly rises, or a gain that nearly vanishes, follows the reading and tells no load: its inverse makes
+    more of all that is left.
+    """
+    return not extended.fitted_n > plain.fitted_n
+
+
+def force_of(plain: ForceError, extended: ForceError, thresholds: Thresholds) -> str | None:
+    """What is said of an extended model that gives the load back worse than the plain one does."""
+    if not undoes(extended, plain):
+        return (
+            "the extended model follows the reading but does not tell the load: run backwards it makes more of what is"
+            f" left, and its force of what was fitted is off by {extended.fitted_n:.3g} N, the plain model's by"
+            f" {plain.fitted_n:.3g} N; the calibration compensates by the plain model, its twin has the effects"
+        )
+    if extended.held_out_n > (1.0 + thresholds.standing) * plain.held_out_n:
+        return (
+            "the force that the extended model gives back is worse than the plain one's"
+            f" ({plain.held_out_n:.3g} to {extended.held_out_n:.3g} N on what was held out), since to undo its effects"
+            " makes more of what is left: compensate by the plain model"
+        )
+    return None
+
+
+def _off_n(session: Session, model: ExtendedModel) -> Array:
+    """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
+    _, own = own_of(session, model, session.reading - model.simulate(session.conditions))
+    compensator = ExtendedCompensator(model, 1.0 / session.conditions.step_s)
+    force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
+    return force_n - session.conditions.load * model.full_scale_load_n
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    count = sum(one.size for one in parts)
+    return math.sqrt(sum(float(one @ one) for one in parts) / count) if count else math.nan
