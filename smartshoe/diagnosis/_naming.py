@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from smartshoe.arrays import Array
 from smartshoe.diagnosis._members import Member
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
@@ -79,16 +82,18 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, law
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
     """That it is this law of its family, and the laws that this data cannot tell from it.
 
-    No law is exact: another one that explains all but the square of the usual departure, of what this one explains, is
-    as good. So the margin is counted in units of that square, and of one look at noise; of the largest departure that
-    is usual where a law is to be ruled out. It is held against its nearest rival: one half in a dead heat.
+    It is held against its nearest rival: one half in a dead heat.
     """
+    odds = {a.effect: float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws if a.effect is not None}
+    equivalents = tuple(name for name, other in odds.items() if other > thresholds.equivalent_odds)
+    return 1.0 / (1.0 + max(odds.values(), default=0.0)), equivalents
 
-    def odds(margin: float, departure: float) -> float:
-        unit = 2.0 * (1.0 + departure**2 * max(one.fall, 0.0))
-        return math.exp(-max(margin, 0.0) / unit)
 
-    laws = [(a.effect, a.margin) for a in one.laws if a.effect is not None]
-    equivalents = (name for name, margin in laws if odds(margin, thresholds.law_departure) > thresholds.equivalent_odds)
-    nearest = max((odds(margin, thresholds.departure) for _, margin in laws), default=0.0)
-    return 1.0 / (1.0 + nearest), tuple(equivalents)
+def odds_of_law(margin: Array | float, fall: float, thresholds: Thresholds) -> Array:
+    """Odds of another law in the place of one that brings ``fall`` of -2 log likelihood and follows ``margin`` better.
+
+    No law is exact: another one that explains all but the square of the usual departure, of what this one explains, is
+    as good. So the margin is counted in units of that square, and of one look at noise.
+    """
+    unit = 2.0 * (1.0 + thresholds.departure**2 * max(fall, 0.0))
+    return np.exp(-np.maximum(margin, 0.0) / unit)

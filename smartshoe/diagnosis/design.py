@@ -11,6 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._baseline import USUAL
+from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._sensitivity import Linearised, linearised
 from smartshoe.diagnosis._session import Scale, prepare, thinning
 from smartshoe.errors import UsageError
@@ -43,15 +44,12 @@ class Design:
     def cannot_be_told(self, name: str) -> tuple[str, ...]:
         """The effects that this protocol would not tell from ``name``, most alike first.
 
-        Another law that lacks a share u of an effect's evidence is as good as it where u is within the square of a
-        law's usual departure, or the evidence within one look at noise.
+        By the odds that a diagnosis weighs laws with: another one lacks a share of an effect's evidence.
         """
         k = self.names.index(name)
-        limits = self.thresholds
-        unit = 2.0 * (1.0 + limits.law_departure**2 * self.evidence)
-        alike = np.exp(-self.unlike[k] * self.evidence / unit)
+        alike = odds_of_law(self.unlike[k] * self.evidence, self.evidence, self.thresholds)
         order = np.argsort(-alike, kind="stable")
-        return tuple(self.names[j] for j in order if j != k and alike[j] > limits.equivalent_odds)
+        return tuple(self.names[j] for j in order if j != k and alike[j] > self.thresholds.equivalent_odds)
 
     def to_dict(self) -> dict[str, Any]:
         """Schema ``smartshoe.design/1``."""

@@ -78,7 +78,7 @@ def test_a_twin_simulates_and_does_not_compensate(tmp_path: Path) -> None:
     found = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
     found["twin"]["gain"] = 0.0
     (tmp_path / "c.json").write_text(json.dumps(found), encoding="utf-8")
-    with pytest.raises(InputError, match="twin.gain"):
+    with pytest.raises(InputError, match=r"twin\.gain"):
         Calibration.load(tmp_path / "c.json")
 
 

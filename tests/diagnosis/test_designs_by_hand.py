@@ -95,9 +95,9 @@ def _design(evidence: float = 100.0) -> Design:
 
 
 def test_what_cannot_be_told_is_within_departures_and_one_look_at_noise() -> None:
-    """exp(-u E / (2 (1 + 0.16 E))) above 0.3, for the share u of the evidence E."""
+    """exp(-u E / (2 (1 + 0.0625 E))) above 0.3, for the share u of the evidence E."""
     for evidence in (0.5, 5.0, 100.0, 1e6):
-        bound = -math.log(0.3) * 2.0 * (1.0 + 0.16 * evidence) / evidence
+        bound = -math.log(0.3) * 2.0 * (1.0 + 0.0625 * evidence) / evidence
         for by, told in ((0.999, ("b",)), (1.001, ())):
             two = replace(_design(evidence), names=("a", "b"), unlike=np.array([[0.0, by * bound], [9e9, 0.0]]))
             assert two.cannot_be_told("a") == told
@@ -324,13 +324,13 @@ def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
 
 
 def test_a_law_is_as_sure_as_its_nearest_rivals_odds_say() -> None:
-    """Margins in units of twice one and of the squared departure times the fall: 0.25 for odds, 0.4 to rule out."""
+    """Margins in units of twice one and of the squared departure times the fall."""
     found = _member(fall=100.0, laws=((None, 0.0), ("orifice_leak", 12.0), ("zero_drift", 30.0)))
     law, equivalents = probability_of_law(found, STANDARD)
     assert law == pytest.approx(1.0 / (1.0 + math.exp(-12.0 / (2.0 * 7.25))))
-    ruled = {name: math.exp(-by / (2.0 * 17.0)) for name, by in (("orifice_leak", 12.0), ("zero_drift", 30.0))}
+    ruled = {name: math.exp(-by / (2.0 * 7.25)) for name, by in (("orifice_leak", 12.0), ("zero_drift", 30.0))}
     assert equivalents == tuple(name for name, odds in ruled.items() if odds > 0.3)
-    bound = -math.log(0.3) * 34.0
+    bound = -math.log(0.3) * 14.5
     for by, told in ((0.999, ("orifice_leak",)), (1.001, ())):
         assert probability_of_law(_member(laws=(("orifice_leak", by * bound),)), STANDARD)[1] == told
     # What explains nothing departs by nothing; a rival that follows better is as good at the most.

@@ -212,8 +212,8 @@ def test_departure_counts_margins_where_an_effect_brings_much() -> None:
     assert loose < 0.6 < 0.99 < exact
 
 
-@pytest.mark.parametrize(("field", "few", "many"), [("law_departure", 0.02, 0.5), ("equivalent_odds", 0.9, 0.01)])
-def test_laws_are_ruled_out_by_law_departure_and_equivalent_odds(field: str, few: float, many: float) -> None:
+@pytest.mark.parametrize(("field", "few", "many"), [("departure", 0.02, 0.5), ("equivalent_odds", 0.9, 0.01)])
+def test_laws_are_ruled_out_by_departure_and_equivalent_odds(field: str, few: float, many: float) -> None:
     rival = member(fall=10_000.0, laws=(("orifice_leak", 2_000.0),))
     assert probability_of_law(rival, replace(STANDARD, **{field: few}))[1] == ()
     assert probability_of_law(rival, replace(STANDARD, **{field: many}))[1] == ("orifice_leak",)

@@ -13,8 +13,8 @@ from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._force import ForceError, force_error, force_of, undoes
+from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
 from smartshoe.diagnosis._noise import correlated_sd
