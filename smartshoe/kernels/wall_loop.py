@@ -43,28 +43,21 @@ def hardened(load, cubic, fifth, share, decay, now, before, out):  # type: ignor
 def compressed(load, ratio, wall, share, decay, now, before, out):  # type: ignore[no-untyped-def]
     """out (n,) = p under ``load`` (n,), phi = p (1 + wall/(1 + g p))/whole and u = (1 + g) p/(1 + g p).
 
-    ``ratio`` is g, whole = 1 + wall/(1 + g).
+    ``ratio`` is g, whole = 1 + wall/(1 + g). Times 1 + g p the balance is quadratic in p; its other root is a gas of
+    less than no absolute pressure.
     """
     whole = 1.0 + wall / (1.0 + ratio)
-    least = -0.999 / ratio  # of an absolute pressure that is none, where phi has no end
-    arm = held = 0.0
-    p, u, q, known, slope = 0.0, 0.0, 0.0, 0.0, (1.0 + wall) / whole
+    bend = ratio / whole
+    arm = held = u = q = 0.0
     for k in range(load.size):
         last, f = u, load[k] + held
-        p += (f - known) / slope  # moved along with the load
-        for _ in range(STEPS):
-            p = max(p, least)
-            thinner = 1.0 / (1.0 + ratio * p)
-            u = (1.0 + ratio) * p * thinner
-            slope = (1.0 + wall * thinner * thinner) / whole + arm * (1.0 + ratio) * thinner * thinner
-            step = (f - p * (1.0 + wall * thinner) / whole - arm * u) / slope
-            p += step
-            if abs(step) <= CLOSE:
-                break
+        half = 0.5 * ((1.0 + wall) / whole + arm * (1.0 + ratio) - ratio * f)
+        root = math.sqrt(max(half * half + bend * f, 0.0))
+        p = f / (half + root) if half > 0.0 else (root - half) / bend
         u = (1.0 + ratio) * p / (1.0 + ratio * p)
         q = decay * q + now * u + before * last if k else u
         out[k] = p
-        arm, known = share * (1.0 - now), f
+        arm = share * (1.0 - now)
         held = share * (decay * q + before * u)
 
 
@@ -105,7 +98,7 @@ def softened(load, strength, width, raised, largest, dead_zone, share, decay, no
                 if bend > 0.0:
                     slope += 2.0 * strength / width * u * u * (1.0 - bend * bend)
                 u, low, high, step = newton(u, off, slope, low, high)
-                if bound * step * step <= 1e-12:
+                if bound * step * step <= 1e-10:
                     break
             slope /= more
         largest = max(largest, f - arm * u)
