@@ -53,7 +53,7 @@ class ExtendedCompensator(ForceFilter):
         self.core = CoreInverse(model.core, self.step_s)
         self._blocks: list[tuple[str, Inverse]] = []
         self._passed_over: dict[str, str] = {}
-        leaks = (part for part in model.parts if part.effect.air == "leaves")
+        leaks = (part for part in model.parts if part.effect.is_leak)
         self._cautions = {part.name: LEAK_CAUTION for part in leaks if not part.effect.is_null(part.values)}
         for part in reversed(model.chain):
             if part is None:

@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects import coloured_noise, heteroscedastic_noise, hum, timing_jitter
+from smartshoe.models.effects.coloured_noise import ColouredNoise
+from smartshoe.models.effects.coloured_noise import evidence as wandering
+from smartshoe.models.effects.heteroscedastic_noise import HeteroscedasticNoise
+from smartshoe.models.effects.heteroscedastic_noise import evidence as growing
+from smartshoe.models.effects.hum import Hum
+from smartshoe.models.effects.hum import evidence as humming
+from smartshoe.models.effects.timing_jitter import TimingJitter
+from smartshoe.models.effects.timing_jitter import evidence as jittering
 from smartshoe.models.extended import ExtendedModel
 
-KINDS = {
-    "hum": hum.evidence,
-    "timing_jitter": timing_jitter.evidence,
-    "heteroscedastic_noise": heteroscedastic_noise.evidence,
-    "coloured_noise": coloured_noise.evidence,
-}
+KINDS = {Hum: humming, TimingJitter: jittering, HeteroscedasticNoise: growing, ColouredNoise: wandering}
 # A sample that repeats the one before it lags like jitter; a dropout or a spike makes the variance follow the load.
 IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"})
 
@@ -41,20 +43,20 @@ def noise_kinds(
         conditions = session.conditions
         prediction = model.simulate(conditions)
         residual = session.reading - prediction
-        for kind, evidence in KINDS.items():
-            if kind in faults or (kind == "coloured_noise" and not explained):
+        for noise, evidence in KINDS.items():
+            if noise.name in faults or (noise is ColouredNoise and not explained):
                 continue
             one = evidence(residual, conditions, prediction, conditions.step_s)
             if one is not None and one.strength >= material:
-                found.append(_throughout(session, kind, one.says))
-    told = {fault.recording for fault in found if fault.kind == "coloured_noise"}
+                found.append(_throughout(session, noise.name, one.says))
+    told = {fault.recording for fault in found if fault.kind == ColouredNoise.name}
     if memory is not None and memory.is_noise and memory.rms >= material:
         says = (
             f"what is left is correlated over about {memory.tau_s:.2g} s, under any load alike: coloured noise of"
             f" {100 * memory.rms:.2g} % of full scale"
         )
         found += [
-            _throughout(session, "coloured_noise", says)
+            _throughout(session, ColouredNoise.name, says)
             for session in fine
             if session.fitted.any() and session.index not in told
         ]

@@ -341,10 +341,11 @@ def _kinds(monkeypatch: pytest.MonkeyPatch, sessions: list[Any], **given: Any) -
         return told
 
     strengths = {"hum": 0.5, "timing_jitter": 0.1, "heteroscedastic_noise": 0.0999, "coloured_noise": 0.3}
-    monkeypatch.setattr(_noise_kinds, "KINDS", {kind: evidence(kind, by) for kind, by in strengths.items()})
+    told = {noise: evidence(noise.name, strengths[noise.name]) for noise in _noise_kinds.KINDS}
+    monkeypatch.setattr(_noise_kinds, "KINDS", told)
     model: Any = SimpleNamespace(simulate=lambda conditions: np.full(20, 1.0))
-    told = {"known": [], "explained": True, "material": 0.1, "memory": None, **given}
-    found = noise_kinds(sessions, model, **told)
+    asked_with = {"known": [], "explained": True, "material": 0.1, "memory": None, **given}
+    found = noise_kinds(sessions, model, **asked_with)
     assert set(asked) <= {(2.0, 1.0, 0.1)}
     return found
 

@@ -34,7 +34,6 @@ class GasCompression(Effect):
         "sensor_nonlinearity": by("displacement", "pressure_reference"),
         "wall_hardening": by("peaks", "displacement"),
     }
-    air = "stiffens"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure of the stiffer gas."""

@@ -29,7 +29,7 @@ class LinearLeak(CoreEffect):
         "warm_up": by("idle"),
         "zero_drift": by("idle", "long_hold", "temperature"),
     }
-    air = "leaves"
+    is_leak = True
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One leak."""

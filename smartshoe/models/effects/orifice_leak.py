@@ -33,7 +33,7 @@ class OrificeLeak(Effect):
         "permanent_set": by("rests"),
         "zero_drift": by("idle", "long_hold", "temperature"),
     }
-    air = "leaves"
+    is_leak = True
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """What is left of the pressure."""
