@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._session import Session
+from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
@@ -218,6 +219,7 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
         target = session.reading - reading + sum(within, np.zeros(reading.size))
         rows.append(np.column_stack([target, slopes[:, :3], *within, *beside]))
     power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(rows, fitted, strict=True))
+    _refuse_endless(power, candidates)
     count = sum(int(s.fitted.sum()) for s in fitted)
     scales = np.sqrt(np.asarray(power) / count)
     scales[0] = 1.0
@@ -231,6 +233,17 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
         tuple(candidates),
         thresholds,
     )
+
+
+def _refuse_endless(power: Array, candidates: Sequence[Candidate]) -> None:
+    """Raises `UsageError` for a candidate whose columns, of ``power`` (m,), hold no number: no search would end."""
+    for one in candidates:
+        if not np.isfinite(power[list(one.columns)]).all():
+            at = ", ".join(f"{name} = {value:g}" for name, value in one.shape.items())
+            raise UsageError(
+                f"effect {one.name!r} gives readings that are no finite numbers{' at ' + at if at else ''}: mend its"
+                " apply, or uninstall the package that offers it"
+            )
 
 
 def _shape_of(effect: Effect, values: Array) -> dict[str, float]:

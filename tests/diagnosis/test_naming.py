@@ -22,6 +22,7 @@ from smartshoe.diagnosis._laws import likelier_laws
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law
+from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -295,6 +296,17 @@ def test_without_that_package_another_name_is_given_or_none(breathing: Effect) -
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(catalogue_module, "entry_points", lambda group: ())
         assert "breathing" not in {cause.name for cause in diagnose(runs[:2], hold_out=runs[2:]).causes}
+
+
+def test_an_effect_of_another_package_that_gives_no_numbers_is_told(
+    breathing: Effect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(self: Effect, signal: Array, conditions: Conditions, values: Array) -> Array:
+        return np.where(signal > 0.9, np.nan, signal)
+
+    monkeypatch.setattr(Breathing, "apply", broken)
+    with pytest.raises(UsageError, match=r"'breathing' gives readings that are no finite numbers at period = 10"):
+        diagnosed(MODEL)
 
 
 CURVED = MODEL.with_part(effect("gas_compression"), np.array([0.15]))
