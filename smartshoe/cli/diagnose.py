@@ -100,15 +100,16 @@ def command(
             progress=with_what_is_left(step, folder is not None),
         )
         title = _title(recordings, unit)
+        fitted, judges = _used(found, recordings, others)
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
             from smartshoe.report.diagnosis.folder import publish_diagnosis
 
-            written = publish_diagnosis(folder, found, title, _facts(recordings, others), figures)
+            written = publish_diagnosis(folder, found, title, _facts(fitted, judges), figures)
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
-        _save_calibration(calibration_path, found, recordings, unit)
+        _save_calibration(calibration_path, found, fitted, unit)
     taken = emit_json(found.to_dict(), json_path)
     if refused:
         for said in found.limits[1:]:
@@ -184,6 +185,18 @@ def _check(files: tuple[str, ...], held_out: tuple[str, ...]) -> None:
 def _title(recordings: list[Recording], unit: str | None) -> str:
     names = dict.fromkeys(recording.unit for recording in recordings if recording.unit)
     return unit or ", ".join(names) or recordings[0].name
+
+
+def _used(
+    found: Diagnosis, recordings: list[Recording], others: list[Recording]
+) -> tuple[list[Recording], list[Recording]]:
+    """Those that were fitted and those that judged, without what was left out; all of them where it was refused."""
+    if not found.traces:
+        return recordings, others
+    used = {trace.recording for trace in found.traces}
+    kept = [one for k, one in enumerate([*recordings, *others]) if k in used]
+    count = sum(k < len(recordings) for k in used)
+    return kept[:count], kept[count:]
 
 
 def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, str]:

@@ -134,6 +134,18 @@ def _dead(path: Path) -> Path:
     return path
 
 
+def test_what_was_left_out_is_listed_neither_in_the_page_nor_in_the_calibration(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out, calibration, dead = tmp_path / "out", tmp_path / "c.json", _dead(tmp_path / "dead.csv")
+    words = ["diagnose", str(files[0]), str(dead), "--hold-out", str(files[1]), "--out", str(out)]
+    assert run_command([*words, "--calibration", str(calibration)]) == 0
+    assert any("dead" in limit for limit in json.loads((out / "diagnosis.json").read_text())["limits"])
+    assert [source["name"] for source in json.loads(calibration.read_text())["sources"]] == [str(files[0])]
+    first, second = (smartshoe.read(file).name for file in files)
+    assert f"fitted: {first} · judged on: {second} ·" in (out / "diagnosis.html").read_text(encoding="utf-8")
+
+
 def test_hopeless_data_is_refused_in_one_sentence_and_the_json_says_so_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
