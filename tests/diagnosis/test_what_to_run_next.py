@@ -1,0 +1,217 @@
+"""What an experiment shows, what it lacks, and what is proposed next, against what is known beforehand."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from courses import STANDARD, STEP_S, prepared, pressed, triangles
+from numpy.typing import NDArray
+from test_diagnosis_parts import MODEL, likelihood_of, recording, sessions_of
+
+from smartshoe import Protocol, Recording
+from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._likelihood import fit
+from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
+from smartshoe.diagnosis._ranges import ranges_of
+from smartshoe.models.effects import effect
+
+Array = NDArray[np.float64]
+
+
+# -- what an experiment shows -------------------------------------------------------------------------------------
+def _shown(load: Array, step_s: float = STEP_S) -> Excitation:
+    return excitation_of(prepared(pressed(load, step_s=step_s))[0], STANDARD)
+
+
+def _course(*corners: tuple[float, float]) -> Array:
+    """A load that goes in a straight line for each (seconds, share)."""
+    parts, at = [np.zeros(1)], 0.0
+    for seconds, share in corners:
+        parts.append(np.linspace(at, share, round(seconds / STEP_S) + 1)[1:])
+        at = share
+    return np.concatenate(parts)
+
+
+RISE = ((2.0, 1.0), (2.0, 0.0), (2.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("word", "without", "corners"),
+    [
+        ("rates", RISE * 3, RISE * 2 + ((6.0, 1.0), (6.0, 0.0), (2.0, 0.0)) * 2),
+        ("peaks", RISE * 3, RISE * 2 + ((1.0, 0.5), (1.0, 0.0), (2.0, 0.0)) * 2),
+        ("steps", RISE * 3, ((2.0, 0.0), (0.2, 1.0), (4.0, 1.0), (0.2, 0.0), (4.0, 0.0)) * 3),
+        ("holds", RISE * 3, ((2.0, 1.0), (6.0, 1.0), (2.0, 0.0), (2.0, 0.0)) * 2),
+        ("idle", RISE * 3, (*RISE, (90.0, 0.0), *RISE)),
+        ("pauses", RISE * 4, (*RISE, (20.0, 0.0), *RISE, *RISE, *RISE)),
+        ("repeats", ((2.0, 1.0), (2.0, 0.0), (2.0, 0.0), (9.0, 0.5), (2.0, 0.0), (2.0, 0.0)), RISE * 3),
+        ("minor_loops", RISE * 3, (*RISE, (2.0, 1.0), (1.0, 0.5), (1.0, 1.0), (2.0, 0.0), (2.0, 0.0))),
+        ("rests", ((2.0, 1.0), (2.0, 0.3)) * 4, RISE * 3),
+    ],
+)
+def test_what_an_experiment_shows(
+    word: str, without: tuple[tuple[float, float], ...], corners: tuple[tuple[float, float], ...]
+) -> None:
+    assert word not in _shown(_course((2.0, without[-1][1]), *without)).present
+    assert word in _shown(_course((2.0, corners[-1][1]), *corners)).present
+
+
+def test_rates_peaks_and_repeats_are_those_of_the_rises() -> None:
+    found = _shown(_course((2.0, 0.0), *RISE * 3, *((4.0, 0.5), (4.0, 0.0), (2.0, 0.0)) * 2))
+    assert found.rates_per_s == pytest.approx([0.125, 0.5], rel=0.05)
+    assert found.peaks == pytest.approx([0.5, 1.0], abs=0.04)
+    assert found.repeats == 3
+    # A stray first ramp makes no second rate.
+    many = _shown(_course((2.0, 0.0), (4.0, 1.0), (2.0, 0.0), (2.0, 0.0), *RISE * 8))
+    assert many.rates_per_s == pytest.approx([0.5], rel=0.05)
+
+
+def test_what_is_lacking_is_said_and_nothing_else() -> None:
+    poor = _shown(_course((2.0, 0.3), (2.0, 1.0), (2.0, 0.3)))
+    said = " | ".join(poor.limits())
+    for words in ("one loading rate only", "no hold longer", "never seen unloaded", "no load cycle is repeated"):
+        assert words in said
+    rich = Excitation((0.1, 0.5), (0.5, 1.0), 3, frozenset({"holds", "rests", "repeats"}), STANDARD)
+    assert rich.limits() == []
+    assert len(replace(rich, peaks=(1.0,)).limits()) == 1
+    assert "one peak load only" in replace(rich, peaks=(1.0,)).limits()[0]
+
+
+# -- narrow ranges ------------------------------------------------------------------------------------------------
+def _ranges(load: Array, reading: Array) -> Any:
+    sessions, scale = prepared(pressed(load, reading))
+    return ranges_of(sessions, scale, STANDARD)
+
+
+def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None:
+    load = 0.7 + 0.2 * triangles()
+    (said,) = _ranges(load, 0.5 * load).says
+    low, high = map(float, re.findall(r"\(([\d.]+) to ([\d.]+) N", said)[0])
+    assert (low, high) == (pytest.approx(560.0, abs=3.0), pytest.approx(716.0, abs=6.0))
+    gain, inverse = float(re.findall(r"by ([\d.]+) mbar/N", said)[0]), float(re.findall(r"\(([\d.]+) N/mbar", said)[0])
+    assert gain == pytest.approx(0.5 * 140.0 / 800.0, rel=0.01)
+    assert inverse == pytest.approx(800.0 / 70.0, rel=0.01)
+    assert "extrapolated" in said
+    trap = _ranges(load, 0.1 * load + 2.0)
+    assert trap.is_trap
+    through = float(re.findall(r"reading over load is ([\d.]+) mbar/N", trap.says[0])[0])
+    assert through == pytest.approx(float(np.mean(0.1 * load + 2.0) / np.mean(load)) * 140.0 / 800.0, rel=0.02)
+
+
+# -- what to run next ---------------------------------------------------------------------------------------------
+def _lacking(*words: str) -> Excitation:
+    every = {"rates", "holds", "rests", "minor_loops", "peaks", "pauses", "steps"}
+    return Excitation((0.1,), (1.0,), 1, frozenset(every - set(words)), STANDARD)
+
+
+@pytest.mark.parametrize(
+    ("word", "protocol"),
+    [
+        ("rates", "rates"),
+        ("holds", "long_hold"),
+        ("rests", "idle"),
+        ("minor_loops", "minor_loops"),
+        ("peaks", "shuffled_loads"),
+        ("pauses", "pauses"),
+        ("steps", "steps"),
+    ],
+)
+def test_what_was_never_shown_is_run_next(word: str, protocol: str) -> None:
+    found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
+    told = _unseen(found, (), _lacking(word))
+    assert told.protocol == protocol
+    assert told.steps is not None
+    assert (told.steps.name, told.steps.peak_load_n) == (protocol, pytest.approx(800.0, rel=0.06))
+    assert f"holds no {word.replace('_', ' ')}" in told.says
+    assert _unseen(found, (), _lacking()).protocol == "repeat"
+    # It shows what it is run for.
+    step_s = 0.01 if word == "steps" else STEP_S
+    load = told.steps.load_at(np.arange(0.0, told.steps.duration_s, step_s)) / 800.0
+    assert word in _shown(load, step_s).present
+
+
+@pytest.mark.parametrize(
+    ("channel", "pair", "logged"),
+    [
+        ("temperature", ("gain_drift", "cycle_conditioning"), {"temperature_k": 300.0}),
+        ("displacement", ("contact_area", "gas_compression"), {"displacement_mm": 1.0}),
+    ],
+)
+def test_a_channel_that_tells_two_apart_is_asked_for_unless_it_is_logged(
+    channel: str, pair: tuple[str, str], logged: dict[str, float]
+) -> None:
+    load = triangles()
+    plain, _ = prepared(pressed(load))
+    assert _channel(*pair, plain) == channel
+    assert _channel("delay", "sensor_lag", plain) is None
+    columns = {name: value + 0.0 * load for name, value in logged.items()}
+    more = Recording.from_arrays(
+        time_s=STEP_S * np.arange(load.size), force_n=800.0 * load, pressure_mbar=140.0 * load, **columns
+    )
+    assert _channel(*pair, prepared(more)[0]) is None
+
+
+def test_a_rival_is_fitted_in_the_place_of_an_effect() -> None:
+    truth = MODEL.with_part(effect("sensor_lag"), np.array([0.05, 0.0]))
+    sessions, _ = sessions_of(recording(truth))
+    likelihood = likelihood_of(sessions)
+    found: Any = type("Found", (), {"fit": fit(likelihood, truth), "likelihood": likelihood})
+    rival = _in_place_of(found, "sensor_lag", "delay")
+    assert rival.model.names == ("delay",)
+    assert rival.model.parts[0].values[0] == pytest.approx(0.05, rel=0.2)  # late by as much
+
+
+# -- protocols ----------------------------------------------------------------------------------------------------
+def _holds(protocol: Protocol, kind: str = "hold") -> list[tuple[float, float]]:
+    found, at = [], 0.0
+    for segment in protocol.segments:
+        if segment.kind == kind or (kind == "hold" and segment.load_n == at > 0.0):
+            found.append((segment.load_n, segment.duration_s))
+        at = segment.load_n
+    return found
+
+
+def _peaks(protocol: Protocol) -> list[float]:
+    loads = [0.0, *(segment.load_n for segment in protocol.segments if segment.kind == "ramp"), 0.0]
+    return [b for a, b, c in zip(loads, loads[1:], loads[2:], strict=False) if a < b > c]
+
+
+def _rates(protocol: Protocol) -> set[float]:
+    """Of all ramps, full scales of 800 N a second."""
+    found, at = set(), 0.0
+    for segment in protocol.segments:
+        if segment.kind == "ramp":
+            found.add(round(abs(segment.load_n - at) / segment.duration_s / 800.0, 6))
+        at = segment.load_n
+    return found
+
+
+def test_protocols_are_what_they_say() -> None:
+    made = {name: make(800.0) for name, make in EXPERIMENTS.items()}
+    assert _holds(made["long_hold"]) == [(600.0, 300.0)]
+    assert max(seconds for _, seconds in _holds(made["long_hold"], "rest")) == 300.0
+    assert _holds(made["holds_at_several_loads"]) == [(200.0, 90.0), (800.0, 90.0), (400.0, 90.0), (600.0, 90.0)]
+    assert [s for _, s in _holds(made["holds_at_several_loads"], "rest") if s > 3.0] == [30.0] * 4
+    assert _peaks(made["idle"]) == [800.0] * 6
+    assert max(seconds for _, seconds in _holds(made["idle"], "rest")) == 600.0
+    assert [s for _, s in _holds(made["pauses"], "rest") if s != 2.0] == [5.0, 120.0, 20.0, 300.0, 5.0]
+    assert _peaks(made["pauses"]) == [800.0] * 15
+    assert {seconds for _, seconds in _holds(made["steps"])} == {4.0}
+    assert _rates(made["rates"]) == {0.0625, 0.125, 0.25, 0.5, 1.0}
+    assert _peaks(made["rates"]) == [800.0] * 15
+    assert _rates(made["minor_loops"]) == {0.1, 0.4}
+    assert len(_rates(made["shuffled_loads"])) == 1
+    assert _rates(made["long_hold"]) == {0.25, round(1 / 3, 6)}
+
+
+def test_a_protocol_goes_with_its_load() -> None:
+    """The same in time, and so many times the load."""
+    for make in EXPERIMENTS.values():
+        one, two = make(400.0), make(800.0)
+        assert [s.duration_s for s in one.segments] == pytest.approx([s.duration_s for s in two.segments])
+        assert [2.0 * s.load_n for s in one.segments] == pytest.approx([s.load_n for s in two.segments])
