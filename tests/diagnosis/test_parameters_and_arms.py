@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from courses import STANDARD, prepared, pressed, triangles
-from numpy.typing import NDArray
 from test_diagnosis_parts import MODEL, likelihood_of, recording, sessions_of
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_another_pole, with_arm
@@ -19,8 +18,6 @@ from smartshoe.diagnosis._state import state_at
 from smartshoe.models.effects import effect
 from smartshoe.models.elements import Arm
 from smartshoe.units import MILLIBAR
-
-Array = NDArray[np.float64]
 
 
 # -- parameters in units ------------------------------------------------------------------------------------------
