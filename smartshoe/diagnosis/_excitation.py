@@ -31,6 +31,11 @@ class Excitation:
     thresholds: Thresholds
     is_judged: bool = True
 
+    @property
+    def goes_with_the_clock(self) -> bool:
+        """Whether peak loads differ, and grow or fall with time in every recording."""
+        return "peaks" in self.present and "shuffled_loads" not in self.present
+
     def limits(self) -> list[str]:
         """A sentence for each thing of which this data says nothing."""
         said = []
@@ -51,6 +56,11 @@ class Excitation:
             )
         if "rests" not in self.present:
             said.append("the unit is never seen unloaded: zero, tare and what lies near zero load cannot be judged")
+        if self.goes_with_the_clock:
+            said.append(
+                "peak loads grow, or fall, with the clock, so that a drift, a leak or a set may do what the curve of"
+                " reading against load does, and each what the others do (shuffle the loads)"
+            )
         if "repeats" not in self.present:
             said.append("no load cycle is repeated: what repeats cannot be told from noise without a model")
         if len(self.peaks) <= 1 and len(self.rates_per_s) >= 1:
@@ -84,6 +94,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), thresholds.settled_s),
         "repeats": repeats > 1,
         "minor_loops": any(rise.is_minor for rise in rises),
+        "shuffled_loads": len(peaks) > 1 and _are_shuffled(sessions, thresholds),
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
@@ -116,6 +127,17 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
         above = float(load[first]) - float(load.min()) > thresholds.clear * thresholds.cycle * span
         yield _Rise(rate, samples * min(1.0, session.thinned / LEAST_WINDOW), float(load[last]), above)
+
+
+def _are_shuffled(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
+    """Whether several peak loads do not all go with the clock, which begins anew in each recording."""
+    trends = []
+    for session in sessions:
+        peaks = np.array([rise.peak for rise in _rises(session, thresholds)])
+        if peaks.size > 1:
+            varies = np.ptp(peaks) > thresholds.same * np.max(peaks)
+            trends.append(abs(float(np.corrcoef(np.arange(peaks.size), peaks)[0, 1])) if varies else 0.0)
+    return not trends or min(trends) < 1.0 - thresholds.same
 
 
 def _held(session: Session, thresholds: Thresholds) -> Mask:

@@ -29,7 +29,7 @@ from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._settling import Progress, better_from, listed, score_of, settled, simpler
+from smartshoe.diagnosis._settling import Progress, better_from, law_or_block, listed, score_of, settled, simpler
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
@@ -86,10 +86,12 @@ def infer(
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
     with_blocks, lawful = state, with_laws(state, plain.model, sessions)
-    state = state if lawful is state else settled(lawful, sessions, progress)
+    if lawful is not state:
+        state = law_or_block(settled(lawful, sessions, progress), state, sessions)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
-    if {*found.refused} & ({*lawful.fit.model.names} - {*with_blocks.fit.model.names}):
+    replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
+    if state is not with_blocks and (found.is_stepped_down or replaced & {*found.refused}):
         # A law that is not the same in each recording is not that law: the block stays.
         other = _judged(with_blocks, plain, sessions)
         if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
@@ -207,11 +209,16 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
 def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
     fitted = [session for session in sessions if session.fitted.any()]
-    if len(fitted) > 1:
-        return len(fitted)
-    load = fitted[0].conditions.load
-    points = turning_points(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9))
-    return sum(load[b] > load[a] for a, b in pairwise(points))
+    return len(fitted) if len(fitted) > 1 else load_cycles(fitted, thresholds)
+
+
+def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
+    """How often the load rises in recordings of which anything is fitted."""
+    count = 0
+    for load in (session.conditions.load for session in sessions if session.fitted.any()):
+        points = turning_points(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9))
+        count += sum(bool(load[b] > load[a]) for a, b in pairwise(points))
+    return count
 
 
 def _screening(evidence: Evidence) -> tuple[tuple[tuple[str, float], ...], Array]:

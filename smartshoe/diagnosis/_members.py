@@ -18,11 +18,12 @@ from smartshoe.models.extended import ExtendedModel
 class Alternative:
     """Another explanation of what one member explains: ``effect``, None for nothing at all.
 
-    ``margin`` is by how much -2 log of its evidence is worse.
+    ``margin`` is by how much -2 log of its evidence is worse. ``fit``: of a law that was fitted in a member's place.
     """
 
     effect: str | None
     margin: float
+    fit: Fit | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +65,17 @@ def members_of(
 
 
 def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:
-    """The other laws of a member's family, each fitted in its place, nearest first."""
+    """The other laws of a member's family, each fitted in its place, nearest first; of a flexible curve all curves."""
     channels = {e.name for e in available(likelihood.sessions)}
     found = []
     for law in catalogue().values():
-        if law.family != one.effect.family or law.name == one.name or law.name not in channels:
+        is_curve = one.effect.is_flexible and one.effect.is_memoryless
+        is_other = law.is_memoryless if is_curve else law.family == one.effect.family
+        if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         start = begun_with(law, less.model, likelihood)
-        found.append(Alternative(law.name, fit(likelihood, start, FEW_STEPS).cost - extended.cost))
+        fitted = fit(likelihood, start, FEW_STEPS)
+        found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
     return tuple(sorted(found, key=lambda a: a.margin))
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._members import Member
+from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 
@@ -20,7 +20,8 @@ class Name:
 
     ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
     family is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this
-    family.
+    family. ``by``: the law as it was fitted in the place of a flexible block, which stays in the model, since the law
+    departs by more than a little and by no more than laws do.
     """
 
     member: Member
@@ -30,20 +31,30 @@ class Name:
     equivalents: tuple[str, ...]
     kind_only: bool = False
     is_sure: bool = True
+    by: Alternative | None = None
 
 
 def names_of(
-    members: Sequence[Member], left: float, thresholds: Thresholds, *, is_followed: bool = False
+    members: Sequence[Member],
+    left: float,
+    thresholds: Thresholds,
+    *,
+    is_followed: bool = False,
+    is_clocked: bool = False,
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
-    are.
+    are. ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does,
+    or a curve: none of these is more than half sure.
 
-    A flexible block is named by the law of its family, and of its stage in the chain, that comes nearest.
+    A flexible block is named by the law of its family, and of its stage in the chain, that comes nearest; a curve by
+    any law that is one, where that departs by no more than laws do.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
+    if is_clocked:
+        likely = [_doubted(name) if name.effect.goes_with_the_clock else name for name in likely]
     sure = tuple(one for one in likely if one.is_sure)
     return sure or tuple(one for one in likely if is_followed and one.member.size > left)
 
@@ -60,9 +71,21 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     alike = [e for e in family if e.stage == one.effect.stage and not one.effect.is_memoryless]
     nearest = min(alike or family, key=lambda e: margins.get(e.name, math.inf))
     others = tuple(e.name for e in family if e is not nearest)
+    by = next((a for a in one.laws if one.effect.is_memoryless or a.effect == nearest.name), None)
+    if by is not None and by.margin <= thresholds.departure**2 * one.fall:
+        # The block is how that law departs: the others are weighed against it.
+        nearest = catalogue()[str(by.effect)]
+        kin = (a for a in one.laws if a is not by and catalogue()[str(a.effect)].family == nearest.family)
+        beside = tuple(replace(a, margin=a.margin - by.margin) for a in kin)
+        as_law = replace(one, laws=beside, fall=one.fall - by.margin)
+        return Name(one, nearest, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
     # Of a family of one law nothing follows better or worse than another.
     sure = probability_of_kind(one, left, thresholds, lawless=bool(others))
     return Name(one, nearest, sure, 1.0 / len(family), others, True, is_sure)
+
+
+def _doubted(name: Name) -> Name:
+    return replace(name, confidence=min(name.confidence, 0.5), is_sure=False)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:

@@ -14,6 +14,7 @@ from smartshoe.diagnosis._likelihood import Fit, fit
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 
 SHOWN_BY = {
@@ -52,19 +53,21 @@ def next_experiment(
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
-    doubtful = [cause for cause in causes if cause.equivalents and cause.name in found.fit.model.names]
+    standing = {cause.name: _standing_for(cause.name, found.fit.model) for cause in causes}
+    doubtful = [cause for cause in causes if cause.equivalents and standing[cause.name]]
     if not doubtful:
         is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)
         return _unseen(found, causes, excitation) if is_open else None
     cause = max(doubtful, key=lambda one: one.size)
     rival = cause.equivalents[0]
-    other = _in_place_of(found, cause.name, rival)
+    part = str(standing[cause.name])
+    truth = found.fit if part == cause.name else _in_place_of(found, part, cause.name)
+    other = _in_place_of(found, part, rival)
     margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
     peak_n = found.fit.model.full_scale_load_n
     noise_sd = found.likelihood.noise_sd
     expected = {
-        name: expected_margin(found.fit, other, made(peak_n), noise_sd, sessions[0])
-        for name, made in EXPERIMENTS.items()
+        name: expected_margin(truth, other, made(peak_n), noise_sd, sessions[0]) for name, made in EXPERIMENTS.items()
     }
     best = max(expected, key=lambda name: expected[name])
     names = (cause.name, *cause.equivalents)
@@ -93,6 +96,17 @@ def next_experiment(
         f" where this data does by {max(margin, 0.0):,.0f}"
     )
     return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
+
+
+def _standing_for(name: str, model: ExtendedModel) -> str | None:
+    """The effect of the model that a cause is, or the flexible block that follows what its law departs by."""
+    if name in model.names:
+        return name
+    named = effect(name)
+    blocks = [part for part in model.parts if part.effect.is_flexible]
+    kin = [one.name for one in blocks if one.effect.family == named.family]
+    curves = [one.name for one in blocks if one.effect.is_memoryless and named.is_memoryless]
+    return next(iter((*kin, *curves)), None)
 
 
 def _in_place_of(found: Inference, name: str, rival: str) -> Fit:

@@ -15,7 +15,7 @@ from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._force import force_error, force_of, undoes
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
-from smartshoe.diagnosis._inference import Inference, infer
+from smartshoe.diagnosis._inference import Inference, infer, load_cycles
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
@@ -29,6 +29,7 @@ from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
     crept_of,
     elsewhere_of,
+    few_cycles_of,
     known_error,
     moved_of,
     none_of,
@@ -218,10 +219,14 @@ def _diagnosed(
     silent = given.is_no_unit or not found.can_validate
     is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
     members = [one for one in found.members if one.name not in found.undone]
-    names = names_of(members, everything, thresholds, is_followed=is_followed)
+    names = names_of(
+        members, everything, thresholds, is_followed=is_followed, is_clocked=given.excitation.goes_with_the_clock
+    )
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
+    cycles, clear = load_cycles(sessions, thresholds), [one for one in names if one not in [it for it, _ in unclear]]
+    unclear += [(one, few_cycles_of(one, cycles)) for one in clear[cycles:]]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
@@ -349,13 +354,25 @@ def _cause(
                 "kind", 1.0, 1.0, "the kind is sure, the law is not: no equation of it follows better than others"
             )
         )
+    if name.by is not None:
+        missed = name.by.margin / member.fall
+        evidence.append(
+            Statement(
+                "share of its kind that the law misses in percent",
+                100 * missed,
+                100 * thresholds.departure**2,
+                f"the law misses {100 * missed:.2g} % of what a flexible block of its kind explains, no more than laws"
+                " do: the block stays in the extended model, the parameters are the law's in its place",
+            )
+        )
     lacking = name.effect.exposed_by - given.excitation.present
     if lacking:
         said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
         evidence.append(
             Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")
         )
-    values = parameters_of(found.fit, member.name, given.scale)
+    by = None if name.by is None else name.by.fit
+    values = parameters_of(by or found.fit, name.effect.name if by else member.name, given.scale)
     sure = name.confidence, name.law
     return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals)
 

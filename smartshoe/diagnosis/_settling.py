@@ -65,6 +65,18 @@ def simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
     return other if _is_simpler(other.fit, state, sessions) else state
 
 
+def law_or_block(lawful: State, state: State, sessions: Sequence[Session]) -> State:
+    """A law in the place of a flexible block, unless there is more evidence for the block and what goes with it.
+
+    What a law misses beyond what laws depart by would be taken for other effects.
+    """
+    alike = _read_alike(lawful.fit.model, state.fit.model, state.likelihood(sessions), state.thresholds)
+    if alike and effect_count(lawful.fit.model) <= effect_count(state.fit.model):
+        return lawful
+    by_law = evidence_about(lawful.fit.model, sessions, state.evidence)[1]
+    return lawful if by_law.score <= state.evidence.posterior(state.start).score else state
+
+
 def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
     """Whether ``other`` is likelier than the fit of ``state``, odds against effects counted; or has fewer of them.
 

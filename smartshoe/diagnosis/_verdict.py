@@ -63,6 +63,14 @@ def moved_of(name: Name) -> str:
     )
 
 
+def few_cycles_of(name: Name, cycles: int) -> str:
+    """What is said of an effect beside as many larger ones as there are load cycles to tell them by."""
+    return (
+        f"{name.effect.name.replace('_', ' ')} fits, but {cycles} load cycles show no more than {cycles} causes, so"
+        " that it is not named (repeat the cycles)"
+    )
+
+
 def none_of(name: Name) -> str:
     """What is said of an effect whose strength may be none, beside all else that moves with it."""
     return (

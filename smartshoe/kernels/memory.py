@@ -423,8 +423,10 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def softened_undone(signal, strength, width, raised, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u (1 - strength tanh((M^2 rise^2 - u^2)/width))/rise of the ``signal`` u (n,), M the largest out.
+def softened_undone(signal, strength, width, widening, raised, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u (1 - strength tanh((M^2 rise^2 - u^2)/(width + widening M^2)))/rise of the ``signal`` u (n,).
+
+    M is the largest out.
 
     ``state`` (1,): that largest, less ``dead_zone``.
     """
@@ -435,7 +437,7 @@ def softened_undone(signal, strength, width, raised, dead_zone, state, out):  # 
             f = first_loading(u, raised, width, 0.0, 1.0, u)[0]
         else:
             below = max(largest * largest * more * more - u * u, 0.0)
-            f = u * (1.0 - strength * math.tanh(below / width)) / more
+            f = u * (1.0 - strength * math.tanh(below / (width + widening * largest * largest))) / more
         largest = max(largest, f - dead_zone)
         out[k] = f
     state[0] = largest

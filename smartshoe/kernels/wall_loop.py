@@ -62,10 +62,11 @@ def compressed(load, ratio, wall, share, decay, now, before, out):  # type: igno
 
 
 @njit(cache=True)
-def softened(load, strength, width, raised, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi r(M) = u (1 - strength tanh((M^2 r(M)^2 - u^2)/width)).
+def softened(load, strength, width, widening, raised, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi r(M) = u (1 - strength tanh((M^2 r(M)^2 - u^2)/wide)).
 
-    M is the largest phi so far, ``largest`` before the record; it counts less ``dead_zone``. r is `rise`.
+    wide = ``width`` + ``widening`` M^2; M is the largest phi so far, ``largest`` before the record, and counts less
+    ``dead_zone``; r is `rise`.
     """
     # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
     bound = strength / width * (3.0 + 2.0 / width)
@@ -73,12 +74,12 @@ def softened(load, strength, width, raised, largest, dead_zone, share, decay, no
     u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
     if share < 0.0:  # an arm that pushes leaves a tenth of the wall's own stiffness, at least
         raised = min(raised, max(-0.9 / share - 1.0, 0.0))
-    most, more = 0.0, 1.0
+    most, more, wide = 0.0, 1.0, width
     for k in range(load.size):
         last, f = u, load[k] + held
         reached = max(largest - dead_zone, 0.0)
         if reached != most:
-            most, more = reached, rise(reached, raised, width)
+            most, more, wide = reached, rise(reached, raised, width), width + widening * reached * reached
         if f >= most * (1.0 + arm * more):
             phi, slope = first_loading(f, raised, width, 1.0, arm, phi)
             u = phi * rise(phi, raised, width)
@@ -88,15 +89,15 @@ def softened(load, strength, width, raised, largest, dead_zone, share, decay, no
             straight = given / (1.0 + beside)
             low, high = straight, most * more
             if f <= 0.0:
-                lost = min(strength * math.tanh(high * high / width), 0.95)  # more leaves nothing that could pull
+                lost = min(strength * math.tanh(high * high / wide), 0.95)  # more leaves nothing that could pull
                 low, high = given / (1.0 - lost + beside), straight
             u = min(max(u + (f - known) / slope, low), high)
             for _ in range(STEPS):
-                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most * more * more - u * u, 0.0) / width) + 1.0)  # tanh
+                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most * more * more - u * u, 0.0) / wide) + 1.0)  # tanh
                 slope = 1.0 - strength * bend + beside
                 off = u * slope - given
                 if bend > 0.0:
-                    slope += 2.0 * strength / width * u * u * (1.0 - bend * bend)
+                    slope += 2.0 * strength / wide * u * u * (1.0 - bend * bend)
                 u, low, high, step = newton(u, off, slope, low, high)
                 if bound * step * step <= 1e-10:
                     break

@@ -300,6 +300,35 @@ def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytes
     assert _next(monkeypatch, [], {}) is None
 
 
+def test_a_law_that_a_block_stands_for_is_parted_from_its_rival_in_the_blocks_place(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fitted: list[tuple[str, str]] = []
+
+    def in_place(found: Any, part: str, law: str) -> str:
+        fitted.append((part, law))
+        return law
+
+    seen: list[tuple[Any, Any]] = []
+    monkeypatch.setattr(_next_experiment, "_in_place_of", in_place)
+    monkeypatch.setattr(_next_experiment, "expected_margin", lambda *given: seen.append(given[:2]) or 1e3)
+    found: Any = SimpleNamespace(
+        fit=SimpleNamespace(model=MODEL.with_part("flexible_curve")), likelihood=SimpleNamespace(noise_sd=0.01)
+    )
+    for law, rival in (("contact_area", "wall_hardening"), ("dead_band", "saturation")):
+        fitted.clear()
+        seen.clear()
+        told = next_experiment(
+            found, [_cause(law, 0.02, (rival,))], [SimpleNamespace(recording=SimpleNamespace(channels=()))],  # type: ignore[arg-type]
+            Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD), open_=False,
+        )  # fmt: skip
+        assert told is not None
+        assert told.separates == (law, rival)
+        assert {*fitted} == {("flexible_curve", law), ("flexible_curve", rival)}
+        assert {*seen} == {(law, rival)}
+    assert _next_experiment._standing_for("linear_leak", found.fit.model) is None
+
+
 # -- names ------------------------------------------------------------------------------------------------------------
 def _member(size: float = 0.01, departed: float = 0.5, margin: float | None = 40.0, fall: float = 100.0,
             laws: tuple[tuple[str | None, float], ...] = ()) -> Any:  # fmt: skip

@@ -84,8 +84,8 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Every step of a diagnosis by what it is told to answer."""
     fitted, held = _Session("fitted", 0, np.array([True, True, False])), _Session("held", 1, np.zeros(3, dtype=bool))
     given = SimpleNamespace(
-        sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start", excitation="excitation",
-        is_no_unit=False, clocks=(), is_moved=False,
+        sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start",
+        excitation=SimpleNamespace(goes_with_the_clock=False), is_no_unit=False, clocks=(), is_moved=False,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
@@ -135,6 +135,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
     answer("off_elsewhere", 0.0)
+    answer("load_cycles", 9)
     return made
 
 
@@ -180,7 +181,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
         [("fitted", [True, True, False])],  # a cycle that is held out decides over no name
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
-    assert seen["names_of"][1] == {"is_followed": False}
+    assert seen["names_of"][1] == {"is_followed": False, "is_clocked": False}
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
@@ -192,8 +193,9 @@ def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch:
     for left, is_followed in ((STANDARD.departure, True), (1.01 * STANDARD.departure, False)):
         parts.seen.clear()
         monkeypatch.setattr(_procedure, "fitted_rms", lambda _, of, left=left: left if of[0] == "held 2" else 1.0)
+        parts.given.excitation.goes_with_the_clock = is_followed
         _run_diagnosis(parts)
-        assert parts.seen["names_of"][1] == {"is_followed": is_followed}
+        assert parts.seen["names_of"][1] == {"is_followed": is_followed, "is_clocked": is_followed}
 
 
 def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -> None:
@@ -211,6 +213,16 @@ def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts
     assert ([one.name for one in told.causes], told.minor) == (["linear_leak"], ("delay",))
     (_, said) = told.limits
     assert said.startswith("delay fits, but readings were moved to the load's clock before")
+
+
+def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    parts.names = [_name("turned"), _name("linear_leak"), _name("delay")]  # the first is none for a reason of its own
+    for cycles, named in ((1, ["linear_leak"]), (2, ["delay", "linear_leak"])):
+        parts.seen.clear()
+        monkeypatch.setattr(_procedure, "load_cycles", lambda sessions, thresholds, cycles=cycles: cycles)
+        told = _run_diagnosis(parts)
+        assert [one.name for one in told.causes] == named
+        assert any("delay fits, but 1 load cycles show no more" in said for said in told.limits) is (cycles == 1)
 
 
 def test_a_block_whose_kind_is_a_cause_is_not_listed_beside_it(parts: Any) -> None:

@@ -44,7 +44,7 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={},
-        names={}, refused={}, errors={}, stepped=(),
+        names={}, refused={}, errors={}, stepped=(), is_law=True,
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -95,6 +95,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
     monkeypatch.setattr(_inference, "with_an_arm_that_creeps", named("creeping"))
     monkeypatch.setattr(_inference, "with_laws", lambda one, model, sessions: told.lawful or one)
+    monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one, sessions: lawful if told.is_law else one)
     monkeypatch.setattr(_inference, "_judged", judged)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
@@ -132,6 +133,8 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     assert flow.infer().fit.model == "settled first"
     flow.lawful = flow.state("lawful")
     assert flow.infer().fit.model == "settled lawful"
+    flow.is_law = False
+    assert flow.infer().fit.model == "settled first"
     flow.lawful, flow.laws = None, [{"a": "b"}, {"c": "d"}]
     assert flow.infer().fit.model == "law law settled first"
 
@@ -152,6 +155,7 @@ def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(
         ("law", (), 1.1, "settled lawful"),  # the block follows no better
         ("law", ("settled first",), 0.9, "settled lawful"),  # nor does it stand
         ("other", (), 0.9, "settled lawful"),
+        ("other", ("settled lawful",), 0.9, "settled first"),  # what stands, for what does not
     ],
 )
 def test_where_a_law_is_not_the_same_in_each_recording_its_block_stays(

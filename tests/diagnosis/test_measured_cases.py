@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from smartshoe.diagnosis import Diagnosis, diagnose
+from smartshoe.diagnosis import Diagnosis, Thresholds, diagnose
 from smartshoe.diagnosis.decay import Decay, decay_of
 from smartshoe.files.logs import read
 from smartshoe.recording import Recording
@@ -217,6 +218,18 @@ def _files(measured: Path, pattern: str, column: str) -> list[Recording]:
     return [read(path, force="force_n", sensors=[column]) for path in paths]
 
 
+def _shaken(recordings: list[Recording], seed: int) -> list[Recording]:
+    """With noise of a hundred-thousandth of the reading's spread; as they are for seed 0."""
+    noise = np.random.default_rng(seed)
+
+    def moved(one: Recording) -> Recording:
+        values = one.sensor.values
+        by = (1e-5 if seed else 0.0) * np.nanstd(values) * noise.standard_normal(values.size)
+        return one.with_channel(replace(one.sensor, values=values + by))
+
+    return [moved(one) for one in recordings]
+
+
 @cache
 def _sensor(measured: Path, name: str) -> Diagnosis:
     fit, hold, column = SENSORS[name]
@@ -273,14 +286,31 @@ class TestSensors:
         assert "no cause can be told" in _limit(found, "one load cycle")
 
     @pytest.mark.bank
-    def test_a_gain_that_drifts_only_with_a_load_that_grows_is_not_named(self, measured: Path) -> None:
-        """In the whole record of the air channel the peaks grow with the clock, so that it follows the curve.
+    def test_two_cycles_tell_two_causes(self, measured: Path) -> None:
+        found = _sensor(measured, "vhb_two_rates")
+        assert {cause.effect.family for cause in found.causes} == KINDS["vhb_two_rates"]
+        assert "show no more than 2 causes" in _limit(found, "load cycles show")
 
-        The curve and the falling zero are named, neither of them sure, since each does a part of what others do.
-        """
-        found = diagnose(_files(measured, "air_whole", "pressure_v"))
-        assert {cause.effect.family for cause in found.causes} == {"static_curve", "zero"}
-        assert all(cause.confidence < 0.5 for cause in found.causes)
+    @pytest.mark.bank
+    @pytest.mark.parametrize("seed", [1, 2])
+    @pytest.mark.parametrize("name", ["air", "velostat", "vhb_two_rates"])
+    def test_the_first_cause_does_not_hang_on_last_digits(self, measured: Path, name: str, seed: int) -> None:
+        """Of the microfluidic sensor, which no equation follows, it does: the curve is hardly sure there."""
+        fit, hold, column = SENSORS[name]
+        judges = _files(measured, hold, column)
+        found = diagnose(_shaken(_files(measured, fit, column), seed), hold_out=_shaken(judges, seed + 10))
+        assert found.causes
+        assert found.causes[0].effect.family in KINDS[name]
+
+    @pytest.mark.bank
+    @pytest.mark.parametrize("seed", [0, 1])
+    def test_where_loads_grow_with_the_clock_nothing_that_goes_with_it_is_sure(self, measured: Path, seed: int) -> None:
+        """In the whole record of the air channel the peaks do, so that a drift of the gain follows the curve."""
+        found = diagnose(_shaken(_files(measured, "air_whole", "pressure_v"), seed))
+        assert "static_curve" in {cause.effect.family for cause in found.causes}
+        for cause in found.causes:
+            assert cause.confidence <= (0.5 if cause.effect.goes_with_the_clock else Thresholds().least_confidence)
+        assert "shuffle the loads" in _limit(found, "with the clock")
         assert found.verdict == "partly_explained"
         assert found.extended is not None
         assert found.extended.variance_explained_percent > 99.0

@@ -122,7 +122,7 @@ def test_confidence_falls_with_what_is_left_and_with_departure(
 def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it() -> None:
     (block, *_) = blocks()["static_curve"]
     margins = (("contact_area", 3.0), ("gas_compression", 900.0), ("wall_hardening", 40.0))
-    name = only(names_of([member(block, laws=margins)], 0.0, STANDARD))
+    name = only(names_of([member(block, laws=margins, fall=47.0)], 0.0, STANDARD))
     family = {one.name for one in catalogue().values() if one.family == "static_curve"}
     assert name.kind_only
     assert name.effect.name == "contact_area"
@@ -132,11 +132,32 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.law == pytest.approx(1.0 / len(family))
 
 
+@pytest.mark.parametrize(("of", "law"), [("static_curve", "dead_band"), ("zero", "permanent_set")])
+def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_against_it(of: str, law: str) -> None:
+    """Of a curve any law that is one, of another family too."""
+    (block, *_) = blocks()[of]
+    least = STANDARD.departure**2 * 1000.0
+    kin = "zero_drift" if of == "zero" else "saturation"
+    rivals = ((kin, 80.0), ("wall_hardening", 90.0))
+    for margin, is_law in ((0.999 * least, True), (1.001 * least, False)):
+        one = member(block, laws=((law, margin), *((name, margin + by) for name, by in rivals)))
+        name = only(names_of([one], 0.0, STANDARD))
+        assert name.kind_only is not is_law
+        if is_law:
+            assert (name.effect.name, name.by, name.member) == (law, one.laws[0], one)
+            assert name.confidence == probability_of_kind(one, 0.0, STANDARD)
+            as_law = member(law, laws=rivals[:1] if of == "zero" else (), fall=1000.0 - margin)
+            assert (name.law, name.equivalents) == probability_of_law(as_law, STANDARD)
+            assert name.equivalents == (("zero_drift",) if of == "zero" else ())
+        else:
+            assert name.by is None
+
+
 def test_a_block_is_named_by_a_law_of_its_own_stage() -> None:
     """A set grows with what the wall has borne: a drift by the clock may come near, and is none of a wall."""
     (block,) = blocks()["zero"]
     name = only(names_of([member(block, laws=(("zero_drift", 3.0), ("permanent_set", 90.0)))], 0.0, STANDARD))
-    assert name.effect.name == "permanent_set"
+    assert (name.effect.name, name.kind_only) == ("permanent_set", True)  # which departs too far to be the law
     assert "zero_drift" in name.equivalents
 
 
@@ -146,6 +167,17 @@ def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
     name = only(names_of([member(block)], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == ("gain_drift", (), True)
     assert name.confidence == probability_of_kind(name.member, 0.0, STANDARD)
+
+
+def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:
+    """A leak or a drift may do what the other does, or a curve; a fast effect is none of these."""
+    fast, slow, doubted = member("play_hysteresis"), member("zero_drift"), member("linear_leak", departed=7.0)
+    assert [one.member for one in names_of([fast, slow], 0.0, STANDARD)] == [fast, slow]
+    assert [one.member for one in names_of([fast, slow], 0.0, STANDARD, is_clocked=True)] == [fast]
+    told = names_of([slow, doubted], 0.0, STANDARD, is_clocked=True, is_followed=True)
+    assert [(one.member, one.is_sure) for one in told] == [(slow, False), (doubted, False)]
+    assert told[0].confidence == 0.5
+    assert told[1].confidence == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
 
 
 def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_what_is_left() -> None:

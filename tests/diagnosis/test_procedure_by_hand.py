@@ -190,6 +190,7 @@ def _told(
     kind_only: bool = False,
     laws: Any = (),
     is_sure: bool = True,
+    by: Any = None,
 ) -> Any:
     asked: list[Any] = []
 
@@ -204,7 +205,8 @@ def _told(
         size=0.0123,
         without=SimpleNamespace(model="without"),
         alternatives=(SimpleNamespace(effect=None, margin=55.0), SimpleNamespace(effect="delay", margin=90.0)),
-        laws=tuple(SimpleNamespace(effect=name, margin=by) for name, by in laws),
+        laws=tuple(SimpleNamespace(effect=name, margin=margin) for name, margin in laws),
+        fall=400.0,
     )
     one = effect("linear_leak")
     name: Any = SimpleNamespace(
@@ -215,12 +217,14 @@ def _told(
         equivalents=("orifice_leak",),
         kind_only=kind_only,
         is_sure=is_sure,
+        by=by,
     )
     given: Any = SimpleNamespace(scale=SCALE, excitation=SimpleNamespace(present=present))
     found: Any = SimpleNamespace(fit="fit")
     cause = _cause(name, found, "fine", AFTER, given, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]
-    assert cause.parameters == {"of": ("fit", "static_curve_block", SCALE)}
+    fitted = ("fit", "static_curve_block") if by is None else (by.fit, "linear_leak")
+    assert cause.parameters == {"of": (*fitted, SCALE)}
     assert (cause.effect, cause.confidence, cause.law_confidence) == (one, 0.9, 0.6)
     assert (cause.equivalents, cause.size) == (("orifice_leak",), 0.0123)
     assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
@@ -250,6 +254,13 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
     assert "not sure" in doubt.says
+
+
+def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    by = SimpleNamespace(fit="the law's", margin=10.0)
+    told = _told(monkeypatch, effect("linear_leak").exposed_by, by=by).evidence[-1]
+    assert (told.value, told.threshold) == (2.5, 100.0 * STANDARD.departure**2)
+    assert "the law misses 2.5 %" in told.says
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])

@@ -151,6 +151,37 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
         assert _settling._is_simpler(new, state, []) is told
 
 
+@pytest.mark.parametrize(
+    ("law", "near", "far"),
+    [
+        (told_fit(99.0, "a"), (True, True, True), (True, True, False)),
+        (told_fit(99.0, "a", "b"), (True, True, False), (True, True, False)),  # a law that needs company
+    ],
+)
+def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
+    monkeypatch: pytest.MonkeyPatch, law: Any, near: tuple[bool, ...], far: tuple[bool, ...]
+) -> None:
+    """Not where both hardly read differently, and no more effects are needed."""
+    evidence = SimpleNamespace(posterior=lambda members: SimpleNamespace(score=7.0))
+    state: Any = SimpleNamespace(
+        thresholds=STANDARD,
+        likelihood=lambda sessions: SimpleNamespace(sessions=()),
+        evidence=evidence,
+        fit=told_fit(1.0, "c"),
+        start=(),
+    )
+    lawful: Any = SimpleNamespace(fit=law)
+    bound = STANDARD.alike * STANDARD.material
+    for by, told in ((0.999, near), (1.001, far)):
+        monkeypatch.setattr(_settling, "apart", lambda *given, by=by: by * bound)
+        for score, is_law in zip((6.9, 7.0, 7.1), told, strict=True):
+            monkeypatch.setattr(
+                _settling, "evidence_about", lambda *given, score=score: (None, SimpleNamespace(score=score))
+            )
+            found = _settling.law_or_block(lawful, state, [])
+            assert (found is lawful) is is_law
+
+
 def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
     candidates = [
         candidate("a", "x"), candidate("b"), candidate("c"), candidate("d"),

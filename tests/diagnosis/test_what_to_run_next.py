@@ -40,6 +40,10 @@ def _course(*corners: tuple[float, float]) -> Array:
 RISE = ((2.0, 1.0), (2.0, 0.0), (2.0, 0.0))
 
 
+def _heights(*peaks: float) -> tuple[tuple[float, float], ...]:
+    return tuple(corner for peak in peaks for corner in ((2.0, peak), (2.0, 0.0), (2.0, 0.0)))
+
+
 @pytest.mark.parametrize(
     ("word", "without", "corners"),
     [
@@ -52,6 +56,7 @@ RISE = ((2.0, 1.0), (2.0, 0.0), (2.0, 0.0))
         ("repeats", ((2.0, 1.0), (2.0, 0.0), (2.0, 0.0), (9.0, 0.5), (2.0, 0.0), (2.0, 0.0)), RISE * 3),
         ("minor_loops", RISE * 3, (*RISE, (2.0, 1.0), (1.0, 0.5), (1.0, 1.0), (2.0, 0.0), (2.0, 0.0))),
         ("rests", ((2.0, 1.0), (2.0, 0.3)) * 4, RISE * 3),
+        ("shuffled_loads", _heights(0.25, 0.5, 0.75, 1.0), _heights(0.5, 1.0, 0.25, 0.75)),
     ],
 )
 def test_what_an_experiment_shows(
@@ -76,10 +81,20 @@ def test_what_is_lacking_is_said_and_nothing_else() -> None:
     said = " | ".join(poor.limits())
     for words in ("one loading rate only", "no hold longer", "never seen unloaded", "no load cycle is repeated"):
         assert words in said
-    rich = Excitation((0.1, 0.5), (0.5, 1.0), 3, frozenset({"holds", "rests", "repeats"}), STANDARD)
+    shown = frozenset({"holds", "rests", "repeats", "peaks", "shuffled_loads"})
+    rich = Excitation((0.1, 0.5), (0.5, 1.0), 3, shown, STANDARD)
     assert rich.limits() == []
     assert len(replace(rich, peaks=(1.0,)).limits()) == 1
     assert "one peak load only" in replace(rich, peaks=(1.0,)).limits()[0]
+
+
+def test_loads_that_grow_with_the_clock_are_told_unless_it_begins_anew_with_each() -> None:
+    growing = _course((2.0, 0.0), *_heights(0.25, 0.5, 0.75, 1.0))
+    assert any("with the clock" in limit for limit in _shown(growing).limits())
+    apart = [_course((2.0, 0.0), *_heights(*[peak] * 3)) for peak in (0.25, 0.5, 1.0)]
+    each = excitation_of(prepared(*(pressed(load) for load in apart))[0], STANDARD)
+    assert "peaks" in each.present
+    assert not any("with the clock" in limit for limit in each.limits())
 
 
 # -- narrow ranges ------------------------------------------------------------------------------------------------

@@ -53,6 +53,8 @@ def drawn(made: Effect, seed: int) -> Array:
     if made.name == "bouc_wen_hysteresis":  # more friction than this lets no load through after a reversal
         values[4] = generator.uniform(0.0, 1.0)
         values[0] = min(values[0], 0.5 * values[1] / (1.0 + values[3]))
+    if made.name == "mullins_softening":  # its grid has no width that grows
+        values[3] = generator.uniform(0.0, 2.0)
     return values
 
 

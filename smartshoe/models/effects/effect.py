@@ -17,7 +17,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.models.core import Core
-from smartshoe.models.effects.exposure import Exposure
+from smartshoe.models.effects.exposure import CLOCK, Exposure
 from smartshoe.models.elements import Arm, Element
 
 Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
@@ -208,6 +208,11 @@ class Effect(ABC):
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse | None:
         """The same in a chain whose wall has the relaxing ``arm``, for a spring that bends beside it."""
         return self.inverse(values, step_s)
+
+    @property
+    def goes_with_the_clock(self) -> bool:
+        """Whether it goes with time, or with what was borne so far, by what its neighbours are told from it."""
+        return any(words & CLOCK for words in self.separated_by.values())
 
     def delay_s(self, values: Array) -> float:
         """The constant time by which it makes a reading late, and which a whole recording can be shifted back by."""

@@ -35,6 +35,8 @@ SAYS = MappingProxyType({
 
 CHANNELS: frozenset[Exposure] = frozenset({"temperature", "displacement", "neighbour", "command", "pressure_reference"})
 """Words that ask for a channel and not for a load history."""
+CLOCK: frozenset[Exposure] = frozenset({"idle", "pauses", "shuffled_loads"})
+"""What tells an effect that goes with time, or with what was borne so far, from one that goes with the load."""
 WORDS: frozenset[str] = frozenset(get_args(Exposure))
 
 

@@ -18,10 +18,11 @@ from smartshoe.models.elements import Arm
 
 
 class MullinsSoftening(Effect):
-    """f r(M) = u (1 - c tanh((M^2 r(M)^2 - u^2)/width)), r(M) = 1 + a tanh(M^2/width), M the largest load so far.
+    """f r(M) = u (1 - c tanh((M^2 r(M)^2 - u^2)/(width + beta M^2))), r(M) = 1 + a tanh(M^2/width), M the largest load.
 
-    c makes the first loading follow the stiff curve and all below it softer (Ogden and Roxburgh 1999), a makes the wall
-    softer by what it has borne, the first loading included (damage, Simo 1987): ``at_once`` is the share of the latter.
+    c makes the first loading follow the stiff curve and all below it softer (Ogden and Roxburgh 1999; with beta, as
+    Mars 2004 and finite-element codes have it), a makes the wall softer by what it has borne, the first loading
+    included (damage, Simo 1987): ``at_once`` is the share of the latter.
     ``gained`` is what the gain rises at half of full scale after full scale, for a share of 0.
     """
 
@@ -37,8 +38,12 @@ class MullinsSoftening(Effect):
         ),
         EffectParameter("at_once", "1", "share of it that the first loading bears", None, 0.0, 1.0, 0.5,
                         absent=0.0, natural="both"),
+        EffectParameter("widening", "1", "beta: by how much the width grows with M^2", None, 0.0, 3.0, 0.5,
+                        absent=0.0, natural="lower"),
     )  # fmt: skip
-    shapes = tuple({"width": width, "at_once": at_once} for width, at_once in ((0.1, 0.0), (0.5, 0.0), (0.5, 1.0)))
+    shapes = tuple(
+        {"width": width, "at_once": at_once, "widening": 0.0} for width, at_once in ((0.1, 0.0), (0.5, 0.0), (0.5, 1.0))
+    )
     exposed_by = by("peaks", "repeats")
     separated_by = {
         "cycle_conditioning": by("shuffled_loads"),
@@ -65,7 +70,7 @@ class MullinsSoftening(Effect):
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
         from smartshoe.kernels.memory import CLOSE, STEPS, softened_undone
 
-        strength, width, raised = _amounts(values)
+        strength, width, widening, raised = _amounts(values)
 
         def body(of: Mapping[str, str]) -> str:
             most, per_width, a = of["largest"], c_number(1.0 / width), c_number(raised)
@@ -73,7 +78,8 @@ class MullinsSoftening(Effect):
     const double rise = 1.0 + {a} * tanh({most} * {most} * {per_width}), highest = {most} * rise;
     if (x < highest) {{
         const double below = highest * highest - x * x;
-        x *= (1.0 - {c_number(strength)} * tanh((below > 0.0 ? below : 0.0) * {per_width})) / rise;
+        const double wide = {c_number(width)} + {c_number(widening)} * {most} * {most};
+        x *= (1.0 - {c_number(strength)} * tanh((below > 0.0 ? below : 0.0) / wide)) / rise;
     }} else {{
         const double u = x;
         double low = u / (1.0 + {a}), high = u;
@@ -99,12 +105,13 @@ class MullinsSoftening(Effect):
     }}
 }}"""
 
-        constants = (strength, width, raised, LEAST_DEAD_ZONE)
+        constants = (strength, width, widening, raised, LEAST_DEAD_ZONE)
         return Undone(softened_undone, constants, np.zeros(1), ("largest",), body)
 
 
-def _amounts(values: Array) -> tuple[float, float, float]:
-    """What is lost below the largest load, its width, and by how much the first loading rises at most."""
-    gained, width, at_once = (float(value) for value in values)
-    below, whole = (1.0 - at_once) * gained, math.tanh(0.75 / width)
-    return below / (1.0 + below) / whole, width, at_once * gained / whole
+def _amounts(values: Array) -> tuple[float, float, float, float]:
+    """What is lost below the largest load, its width, what that grows by, and the most that a first loading rises."""
+    gained, width, at_once, widening = (float(value) for value in values)
+    below = (1.0 - at_once) * gained
+    lost = below / (1.0 + below) / math.tanh(0.75 / (width + widening))
+    return lost, width, widening, at_once * gained / math.tanh(0.75 / width)
