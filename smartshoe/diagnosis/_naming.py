@@ -49,8 +49,7 @@ def names_of(
     are. ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does,
     or a curve: none of these is more than half sure.
 
-    A flexible block is named by the law of its family, and of its stage in the chain, that comes nearest; a curve by
-    any law that is one, where that departs by no more than laws do.
+    A flexible block is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     if is_clocked:
@@ -65,23 +64,32 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
-    family = [e for e in catalogue().values() if e.family == one.effect.family]
-    margins = {a.effect: a.margin for a in one.laws}
-    # What grows with the load borne is none that goes with the clock; but curves look alike wherever they stand.
-    alike = [e for e in family if e.stage == one.effect.stage and not one.effect.is_memoryless]
-    nearest = min(alike or family, key=lambda e: margins.get(e.name, math.inf))
-    others = tuple(e.name for e in family if e is not nearest)
-    by = next((a for a in one.laws if one.effect.is_memoryless or a.effect == nearest.name), None)
+    nearest = _nearest_law(one)
+    by = next((a for a in one.laws if a.effect == nearest.name), None)
+    kin = [e.name for e in catalogue().values() if e.family == nearest.family and e is not nearest]
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
-        nearest = catalogue()[str(by.effect)]
-        kin = (a for a in one.laws if a is not by and catalogue()[str(a.effect)].family == nearest.family)
-        beside = tuple(replace(a, margin=a.margin - by.margin) for a in kin)
+        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
         as_law = replace(one, laws=beside, fall=one.fall - by.margin)
         return Name(one, nearest, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
-    # Of a family of one law nothing follows better or worse than another.
+    # Of a family of one law nothing follows better or worse than another; curves of other families follow too.
+    others = max(len(kin), len(one.laws) - 1 if one.effect.is_memoryless else 0)
     sure = probability_of_kind(one, left, thresholds, lawless=bool(others))
-    return Name(one, nearest, sure, 1.0 / len(family), others, True, is_sure)
+    return Name(one, nearest, sure, 1.0 / (1.0 + others), tuple(kin), True, is_sure)
+
+
+def _nearest_law(block: Member) -> Effect:
+    """Of a curve any law that is one; else of its family, and of its stage where there is one.
+
+    What grows with the load borne is none that goes with the clock.
+    """
+    laws = catalogue()
+    if block.effect.is_memoryless and block.laws:
+        return laws[str(block.laws[0].effect)]
+    family = [e for e in laws.values() if e.family == block.effect.family]
+    alike = [e for e in family if e.stage == block.effect.stage and not block.effect.is_memoryless]
+    margins = {a.effect: a.margin for a in block.laws}
+    return min(alike or family, key=lambda e: margins.get(e.name, math.inf))
 
 
 def _doubted(name: Name) -> Name:

@@ -153,6 +153,16 @@ def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_
             assert name.by is None
 
 
+def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> None:
+    (block, *_) = blocks()["static_curve"]
+    margins = (("dead_band", 90.0), ("contact_area", 95.0), ("saturation", 900.0))
+    one = member(block, laws=margins, fall=1000.0)
+    name = only(names_of([one], 0.0, STANDARD))
+    assert (name.effect.name, name.equivalents, name.kind_only) == ("dead_band", (), True)
+    assert name.confidence == probability_of_kind(one, 0.0, STANDARD, lawless=True)
+    assert name.law == pytest.approx(1.0 / 3.0)
+
+
 def test_a_block_is_named_by_a_law_of_its_own_stage() -> None:
     """A set grows with what the wall has borne: a drift by the clock may come near, and is none of a wall."""
     (block,) = blocks()["zero"]
