@@ -12,7 +12,7 @@ from smartshoe.diagnosis._search import MOST_MEMBERS, additions
 from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
-from smartshoe.diagnosis._validation import apart
+from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -68,10 +68,11 @@ def simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
 def law_or_block(lawful: State, state: State, sessions: Sequence[Session]) -> State:
     """A law in the place of a flexible block, unless there is more evidence for the block and what goes with it.
 
-    What a law misses beyond what laws depart by would be taken for other effects.
+    What a law misses beyond what laws depart by would be taken for other effects. Where it leaves no more than a good
+    unit's imperfections do beside what the block leaves, and needs no more effects, it is the law all the same.
     """
-    alike = _read_alike(lawful.fit.model, state.fit.model, state.likelihood(sessions), state.thresholds)
-    if alike and effect_count(lawful.fit.model) <= effect_count(state.fit.model):
+    missed = error_of(sessions, lawful.fit.model) ** 2 - error_of(sessions, state.fit.model) ** 2
+    if missed <= state.thresholds.tolerable**2 and effect_count(lawful.fit.model) <= effect_count(state.fit.model):
         return lawful
     by_law = evidence_about(lawful.fit.model, sessions, state.evidence)[1]
     return lawful if by_law.score <= state.evidence.posterior(state.start).score else state

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from told_evidence import STANDARD, ToldEvidence, candidate, told_fit, worth
 
@@ -161,19 +162,13 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
 def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
     monkeypatch: pytest.MonkeyPatch, law: Any, near: tuple[bool, ...], far: tuple[bool, ...]
 ) -> None:
-    """Not where both hardly read differently, and no more effects are needed."""
+    """Not where a law with no more effects leaves no more beside it than a good unit's imperfections do."""
     evidence = SimpleNamespace(posterior=lambda members: SimpleNamespace(score=7.0))
-    state: Any = SimpleNamespace(
-        thresholds=STANDARD,
-        likelihood=lambda sessions: SimpleNamespace(sessions=()),
-        evidence=evidence,
-        fit=told_fit(1.0, "c"),
-        start=(),
-    )
+    state: Any = SimpleNamespace(thresholds=STANDARD, evidence=evidence, fit=told_fit(1.0, "c"), start=())
     lawful: Any = SimpleNamespace(fit=law)
-    bound = STANDARD.alike * STANDARD.material
     for by, told in ((0.999, near), (1.001, far)):
-        monkeypatch.setattr(_settling, "apart", lambda *given, by=by: by * bound)
+        left = {law.model.names: np.hypot(0.01, by * STANDARD.tolerable), ("c",): 0.01}
+        monkeypatch.setattr(_settling, "error_of", lambda sessions, model, left=left: left[model.names])
         for score, is_law in zip((6.9, 7.0, 7.1), told, strict=True):
             monkeypatch.setattr(
                 _settling, "evidence_about", lambda *given, score=score: (None, SimpleNamespace(score=score))
