@@ -225,9 +225,10 @@ def _diagnosed(
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
-    cycles, clear = load_cycles(sessions, thresholds), [one for one in names if one not in [it for it, _ in unclear]]
-    unclear += [(one, few_cycles_of(one, cycles)) for one in clear[cycles:]]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
+    cycles = load_cycles(sessions, thresholds)
+    unclear += [(one, few_cycles_of(one, cycles)) for one in names[cycles:]]
+    names = names[:cycles]
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
@@ -355,7 +356,7 @@ def _cause(
             )
         )
     if name.by is not None:
-        missed = name.by.margin / member.fall
+        missed = max(name.by.margin, 0.0) / max(member.fall, 1.0)  # of -2 log likelihood
         evidence.append(
             Statement(
                 "share of its kind that the law misses in percent",
