@@ -315,10 +315,14 @@ def _cause(
 ) -> Cause:
     member = name.member
     won = gain(errors(fine, member.without.model), best, given.scale, thresholds)
-    near = {
-        a.effect: a.margin for a in (*member.alternatives, *member.laws) if a.effect not in (None, name.effect.name)
-    }
-    rivals = tuple(Rival(effect, margin) for effect, margin in sorted(near.items(), key=lambda one: one[1]))
+    near = {a.effect: a.margin for a in member.alternatives}
+    # Laws are weighed against the one that is named, which is not the best fit where a block stands for it.
+    near |= {a.effect: a.margin - (name.by.margin if name.by is not None else 0.0) for a in member.laws}
+    rivals = tuple(
+        Rival(effect, margin)
+        for effect, margin in sorted(near.items(), key=lambda one: one[1])
+        if effect not in (None, name.effect.name)
+    )
     nothing = next((a.margin for a in member.alternatives if a.effect is None), 0.0)
     evidence = [
         Statement(

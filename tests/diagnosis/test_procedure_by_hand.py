@@ -258,7 +258,9 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
 
 def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
     by = SimpleNamespace(fit="the law's", margin=10.0)
-    told = _told(monkeypatch, effect("linear_leak").exposed_by, by=by).evidence[-1]
+    cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", 25.0),), by=by)
+    assert [(one.effect, one.margin) for one in cause.rivals] == [("orifice_leak", 15.0), ("delay", 90.0)]
+    told = cause.evidence[-1]
     assert (told.value, told.threshold) == (2.5, 100.0 * STANDARD.departure**2)
     assert "the law misses 2.5 %" in told.says
 
