@@ -136,7 +136,7 @@ def show_command(
             f"loads {found.load_range_n[0]:.4g} to {found.load_range_n[1]:.4g} N"
             + (f", rates {rates[0]:.4g} to {rates[1]:.4g} N/s" if rates else "")
             + (f"; effects: {', '.join(found.extended.names)}" if found.extended and found.extended.names else "")
-            + (f"; effects of its twin alone: {', '.join(found.twin.names)}" if found.twin and found.twin.names else "")
+            + (f"; effects of its twin: {', '.join(found.twin.names)}" if found.twin and found.twin.names else "")
         )
     console.print(says, soft_wrap=True)
     if out_path is not None:

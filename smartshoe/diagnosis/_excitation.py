@@ -72,7 +72,8 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     """What all sessions of which anything is fitted hold together: of the others nothing is learnt."""
     is_judged = any(one.judged.any() for one in sessions)
     sessions = [one for one in sessions if not one.held_out.all()]
-    rises = [rise for session in sessions for rise in _rises(session, thresholds)]
+    each = [list(_rises(session, thresholds)) for session in sessions]
+    rises = [rise for own in each for rise in own]
     alike = float(np.log1p(thresholds.same))
     kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rises)
     hold_s = max(
@@ -94,7 +95,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), thresholds.settled_s),
         "repeats": repeats > 1,
         "minor_loops": any(rise.is_minor for rise in rises),
-        "shuffled_loads": len(peaks) > 1 and _are_shuffled(sessions, thresholds),
+        "shuffled_loads": len(peaks) > 1 and _are_shuffled(each, thresholds),
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
@@ -129,11 +130,11 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
         yield _Rise(rate, samples * min(1.0, session.thinned / LEAST_WINDOW), float(load[last]), above)
 
 
-def _are_shuffled(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
-    """Whether several peak loads do not all go with the clock, which begins anew in each recording."""
+def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bool:
+    """Whether peak loads of ``each`` recording's rises do not all go with the clock, which begins anew in each."""
     trends = []
-    for session in sessions:
-        peaks = np.array([rise.peak for rise in _rises(session, thresholds)])
+    for rises in each:
+        peaks = np.array([rise.peak for rise in rises])
         if peaks.size > 1:
             varies = np.ptp(peaks) > thresholds.same * np.max(peaks)
             trends.append(abs(float(np.corrcoef(np.arange(peaks.size), peaks)[0, 1])) if varies else 0.0)
