@@ -20,8 +20,7 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import finite_or_none
 
-LEAST = 1e-300  # squared error, so that none has a logarithm
-MOST = 300.0  # logarithm of an error's growth, so that it is a number
+LEAST = float(np.finfo(float).tiny)  # squared error, so that none has a logarithm
 
 
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
@@ -157,5 +156,6 @@ def _log_ratio(before: Array | float, after: Array | float) -> Array:
 
 
 def _percent(log_ratio: Array | float) -> Array:
-    """By how much an error falls whose square changes so."""
-    return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), MOST))))
+    """By how much an error falls whose square changes so; the interval of few cycles may be beyond any number."""
+    most = -0.5 * math.log(LEAST)
+    return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), most))))

@@ -14,7 +14,6 @@ from smartshoe.diagnosis._likelihood import Fit, fit
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
-from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 
 SHOWN_BY = {
@@ -53,14 +52,12 @@ def next_experiment(
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
-    standing = {cause.name: _standing_for(cause.name, found.fit.model) for cause in causes}
-    doubtful = [cause for cause in causes if cause.equivalents and standing[cause.name]]
+    doubtful = [(cause, cause.part) for cause in causes if cause.equivalents and cause.part is not None]
     if not doubtful:
         is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)
         return _unseen(found, causes, excitation) if is_open else None
-    cause = max(doubtful, key=lambda one: one.size)
+    cause, part = max(doubtful, key=lambda one: one[0].size)
     rival = cause.equivalents[0]
-    part = str(standing[cause.name])
     truth = found.fit if part == cause.name else _in_place_of(found, part, cause.name)
     other = _in_place_of(found, part, rival)
     margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
@@ -96,17 +93,6 @@ def next_experiment(
         f" where this data does by {max(margin, 0.0):,.0f}"
     )
     return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
-
-
-def _standing_for(name: str, model: ExtendedModel) -> str | None:
-    """The effect of the model that a cause is, or the flexible block that follows what its law departs by."""
-    if name in model.names:
-        return name
-    named = effect(name)
-    blocks = [part for part in model.parts if part.effect.is_flexible]
-    kin = [one.name for one in blocks if one.effect.family == named.family]
-    curves = [one.name for one in blocks if one.effect.is_memoryless and named.is_memoryless]
-    return next(iter((*kin, *curves)), None)
 
 
 def _in_place_of(found: Inference, name: str, rival: str) -> Fit:

@@ -379,7 +379,7 @@ def _cause(
     by = None if name.by is None else name.by.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, given.scale)
     sure = name.confidence, name.law
-    return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals)
+    return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals, member.name)
 
 
 def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:

@@ -59,7 +59,8 @@ class Cause:
     """One named effect. ``size`` is how far it moves the reading, rms, in shares of full scale.
 
     ``confidence`` that it is this effect or one of its ``equivalents``, which this data cannot tell from it;
-    ``law_confidence`` that, if so, it is this one and not its nearest rival: one half in a dead heat.
+    ``law_confidence`` that, if so, it is this one and not its nearest rival: one half in a dead heat. ``part``: the
+    effect of the fitted model that it is, itself or the flexible block that stands for it; None of an offset at rest.
     """
 
     effect: Effect
@@ -71,6 +72,7 @@ class Cause:
     held_out: Gain
     size: float
     rivals: tuple[Rival, ...] = ()
+    part: str | None = None
 
     @property
     def name(self) -> str:

@@ -322,8 +322,10 @@ def conditioned_undone(signal, strength, per_cycle, by_way, least, width, rounds
 
 
 @njit(cache=True)
-def rate_undone(signal, strength, exponent, softness, dead_zone, step_s, keep, state, out):  # type: ignore[no-untyped-def]
+def rate_undone(signal, strength, exponent, least, softness, dead_zone, step_s, keep, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out (1 + strength s(r)) = ``signal`` (n,), r the rate that raised the signal's own smoothed rate.
+
+    The factor is no less than ``least``.
 
     s(r) = (r^2 + softness^2)^(exponent/2) - softness^exponent; the signal's rate r (1 + strength s(r)), as on a ramp,
     is a first-order mean with ``keep`` a step of its way through a play of ``dead_zone``. (From the rate of what comes
@@ -339,6 +341,7 @@ def rate_undone(signal, strength, exponent, softness, dead_zone, step_s, keep, s
         gain = 1.0
         for _ in range(8):
             gain = 1.0 + strength * (((seen / gain) ** 2 + softness * softness) ** (0.5 * exponent) - floor)
+            gain = max(gain, least)
         out[k] = signal[k] / gain
     state[0], state[1] = last, seen
 

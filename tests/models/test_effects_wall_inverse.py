@@ -106,6 +106,22 @@ def test_rate_gain_gives_back_triangles_but_for_their_corners(seed: int, rate_pe
     assert np.max(np.abs(left[far])) <= 0.01 * abs(values[0])
 
 
+@given(seed=seeds, share=st.floats(-0.5, 1.0), exponent=st.floats(0.4, 2.0))
+@settings(max_examples=20)
+def test_rate_gain_takes_no_more_than_half_and_gives_no_more_than_twice(
+    seed: int, share: float, exponent: float
+) -> None:
+    made, given_ = effect("rate_gain"), loading(seed)
+    fast = Conditions(given_.time_s / 10.0, given_.load, STEP_S / 10.0)  # up to 30 full scales a second
+    values = np.array([share, exponent])
+    out = made.apply(fast.load, fast, values)
+    inverse = made.inverse(values, fast.step_s)
+    assert inverse is not None
+    back = inverse.push(out, fast.time_s)
+    assert np.all(out >= 0.5 * fast.load)
+    assert np.all((back >= 0.0) & (back <= 2.0 * out))
+
+
 @pytest.mark.parametrize("name", INVERTED)
 @given(seed=seeds, cuts=st.lists(st.floats(0.0, 1.0), max_size=6))
 @settings(max_examples=6)
@@ -139,6 +155,7 @@ def test_the_linear_network_is_inverted_as_a_whole() -> None:
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or cc) on the path")
 def test_c_agrees_with_push() -> None:
     cases = {name: drawn(effect(name), 11) for name in INVERTED}
+    cases["rate_gain"] = np.array([-0.5, 2.0])  # the fastest ramps meet its bound
     given_ = loading(7)
     outs = {name: effect(name).apply(given_.load, given_, values) for name, values in cases.items()}
     source = ["#include <math.h>"]

@@ -331,14 +331,11 @@ def test_nothing_is_named_where_nothing_was_found() -> None:
 
 def test_a_block_that_stands_for_a_cause_was_chosen() -> None:
     (block, *_) = blocks()["static_curve"]
-    model = ExtendedModel(1.0, 0.08, 0.22, FULL_LOAD_N, FULL_READING, "mbar")
-    made = replace(
-        case("one cause"),
-        screening=((block.name, 9.0), ("delay", 5.0)),
-        model=model.with_part(block, block.begun(block.shapes[0])),
-    )
+    made = replace(case("one cause"), screening=((block.name, 9.0), ("delay", 5.0)))
+    assert [bar.kind for bar in ranked(made)] == ["other", "other"]
+    stood_for = tuple(replace(cause, part=block.name) for cause in made.causes)
+    made = replace(made, causes=stood_for)
     assert [(bar.name, bar.kind) for bar in ranked(made)] == [(block.name, "cause"), ("delay", "other")]
-    assert [bar.kind for bar in ranked(replace(made, minor=(block.name,)))] == ["other", "other"]
 
 
 def test_names_and_sentences_from_files_are_escaped(tmp_path: Path) -> None:

@@ -15,10 +15,11 @@ from smartshoe.models.effects.exposure import by
 
 HALF_WINDOW_S = 0.04
 SLOW_PER_S = 0.01  # below this rate the power is rounded off
+LEAST_GAIN = 0.5  # of that at rest: what fast loads may lose, so that no rate makes a reading without a load
 
 
 class RateGain(Effect):
-    """f (1 + g r^m), r = |f'| over 1 FS/s: the way gone within 0.08 s, small reversals taken out."""
+    """f max(1 + g r^m, 1/2), r = |f'| over 1 FS/s: the way gone within 0.08 s, small reversals taken out."""
 
     name, family, stage, place = "rate_gain", "rate", "wall", "wall"
     is_steep_undone = True
@@ -46,7 +47,7 @@ class RateGain(Effect):
         if square is None:
             square = conditions.cache["rate_gain"] = np.log(_rate(conditions) ** 2 + SLOW_PER_S**2)
         factor: Array = 1.0 - gain * SLOW_PER_S**exponent + gain * np.exp((0.5 * exponent) * square)
-        return signal * factor
+        return signal * np.maximum(factor, LEAST_GAIN)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Divide by the gain at the output's own smoothed rate: exact on ramps, late by the window after corners."""
@@ -73,11 +74,12 @@ class RateGain(Effect):
         const double rate = {of["rate"]} / ratio;
         ratio = 1.0 + {c_number(gain)} * (pow(rate * rate + {c_number(SLOW_PER_S**2)}, {c_number(0.5 * exponent)})
             - {c_number(SLOW_PER_S**exponent)});
+        ratio = ratio < {c_number(LEAST_GAIN)} ? {c_number(LEAST_GAIN)} : ratio;
     }}
     x /= ratio;
 }}"""
 
-        constants = (gain, exponent, SLOW_PER_S, LEAST_DEAD_ZONE, step_s, keep)
+        constants = (gain, exponent, LEAST_GAIN, SLOW_PER_S, LEAST_DEAD_ZONE, step_s, keep)
         return Undone(rate_undone, constants, np.array([NO_LOAD, 0.0]), ("last", "rate"), body)
 
 

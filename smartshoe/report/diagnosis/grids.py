@@ -41,10 +41,7 @@ class Bar:
 def ranked(diagnosis: Diagnosis) -> list[Bar]:
     """Effects by what each alone could take off the baseline's error, the strongest first."""
     falls = [(name, fall) for name, fall in diagnosis.screening if np.isfinite(fall) and fall > 0][:MOST_BARS]
-    causes = {cause.name for cause in diagnosis.causes}
-    if diagnosis.model is not None:  # a flexible block stands there for the cause that is named by its nearest law
-        flexible = {part.name for part in diagnosis.model.parts if part.effect.is_flexible}
-        causes |= flexible - {*diagnosis.minor}
+    causes = {cause.name for cause in diagnosis.causes} | {cause.part for cause in diagnosis.causes}
     alike = {name for cause in diagnosis.causes for name in cause.equivalents}
     most = max((fall for _, fall in falls), default=1.0)
     return [
