@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Posterior
+from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
-from smartshoe.diagnosis._validation import apart
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
@@ -33,7 +36,9 @@ class Member:
     ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
     ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
     ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
-    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
+    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood. ``others_depart``: rms by
+    which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
+    with what another member adds, 0 where all pull against it.
     """
 
     effect: Effect
@@ -43,6 +48,8 @@ class Member:
     without: Fit
     laws: tuple[Alternative, ...]
     fall: float
+    others_depart: float = 0.0
+    likeness: float = 0.0
 
     @property
     def name(self) -> str:
@@ -53,15 +60,37 @@ class Member:
 def members_of(
     evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
 ) -> tuple[Member, ...]:
+    chosen = [evidence.given.candidates[member] for member in best.members]
+    less = [fit(likelihood, extended.model.without(one.name), FEW_STEPS) for one in chosen]
+    whole = _left(likelihood, extended)
+    added = np.array([_left(likelihood, one) - whole for one in less]).reshape(len(less), whole.size)
+    inner = added @ added.T
+    sizes = np.sqrt(np.diag(inner) / max(whole.size, 1))
+    likeness = inner / np.maximum(np.sqrt(np.outer(np.diag(inner), np.diag(inner))), 1e-300)
+    np.fill_diagonal(likeness, 0.0)
+    departures = evidence.thresholds.departure * np.array(best.departed) * sizes
     made = []
-    for member, departed in zip(best.members, best.departed, strict=True):
-        one = evidence.given.candidates[member]
-        less = fit(likelihood, extended.model.without(one.name), FEW_STEPS)
-        size = apart(likelihood.sessions, less.model, extended.model)
-        others = _other_laws(one, less, likelihood, extended) if size > evidence.thresholds.material else ()
-        near = alternatives(evidence, best, member, refused)
-        made.append(Member(one.effect, size, departed, near, less, others, less.cost - extended.cost))
+    for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
+        material = sizes[k] > evidence.thresholds.material
+        made.append(
+            Member(
+                one.effect,
+                float(sizes[k]),
+                best.departed[k],
+                alternatives(evidence, best, member, refused),
+                less[k],
+                _other_laws(one, less[k], likelihood, extended) if material else (),
+                less[k].cost - extended.cost,
+                float(np.linalg.norm(np.delete(departures, k))),
+                float(likeness[k].max()),
+            )
+        )
     return tuple(sorted(made, key=lambda one: -one.size))
+
+
+def _left(likelihood: Likelihood, found: Fit) -> Array:
+    """(n,) of all that is fitted: what a model leaves, each recording's own offset aside."""
+    return np.concatenate([residual_of(one, found.model)[one.fitted] for one in likelihood.sessions])
 
 
 def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:

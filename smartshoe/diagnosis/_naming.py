@@ -46,16 +46,22 @@ def names_of(
 
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
-    are. ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does,
-    or a curve: none of these is more than half sure.
+    are. Where much is left beside the largest, that one alone is named if it is likelier there than not, as half sure.
+    ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
+    curve: none of these is more than half sure.
 
     A flexible block is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     if is_clocked:
         likely = [_doubted(name) if name.effect.goes_with_the_clock else name for name in likely]
-    sure = tuple(one for one in likely if one.is_sure)
-    return sure or tuple(one for one in likely if is_followed and one.member.size > left)
+    if sure := tuple(one for one in likely if one.is_sure):
+        return sure
+    larger = tuple(one for one in likely if one.member.size > left)
+    if is_followed or not larger:
+        return larger
+    largest = max(larger, key=lambda one: one.member.size)
+    return (_doubted(largest),) if probability_of_kind(largest.member, left, thresholds) > 0.5 else ()
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
@@ -97,15 +103,17 @@ def _doubted(name: Name) -> Name:
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
-    """That an effect of this family is there: a logistic of two ratios, each without a unit, and the evidence for it.
+    """That an effect of this family is there: a logistic of three ratios, each without a unit, and the evidence for it.
 
-    What is left over the effect's size (an effect that leaves as much as it explains is likely another's shadow), and
-    how far its equation is asked to depart. ``lawless``: no law of the family follows it better than another, which
-    speaks for a law, or a kind, that the catalogue does not have.
+    What no equation follows over the effect's size: structure that is ``left``, and what the other effects' equations
+    are asked to depart by (one that is as small as that is likely another's shadow). How far its own equation is asked
+    to depart. How alike what it adds is to what another effect adds. ``lawless``: no law of the family follows it
+    better than another, which speaks for a law, or a kind, that the catalogue does not have.
     """
-    intercept, per_left, per_departed, without_law = thresholds.kind_odds
-    ratio = (left + thresholds.material) / (one.size + thresholds.material)
-    score = intercept + per_left * math.log(ratio) + per_departed * one.departed + without_law * lawless
+    intercept, per_left, per_departed, without_law, per_likeness = thresholds.kind_odds
+    ratio = (math.hypot(left, one.others_depart) + thresholds.material) / (one.size + thresholds.material)
+    score = intercept + per_left * math.log(ratio) + per_departed * one.departed
+    score += without_law * lawless + per_likeness * one.likeness
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 

@@ -349,8 +349,8 @@ def _cause(
                 "confidence of its kind",
                 name.confidence,
                 thresholds.least_confidence,
-                "it is not sure, since others may do what it does: it is named because all of them together follow the"
-                " data, and it moves more than all that is left",
+                "it is not sure, since others may do what it does: it is named because it moves more than all that is"
+                " left",
             )
         )
     elif name.kind_only:

@@ -337,24 +337,33 @@ def test_a_law_that_a_block_stands_for_is_parted_from_its_rival_in_the_blocks_pl
 
 
 # -- names ------------------------------------------------------------------------------------------------------------
-def _member(size: float = 0.01, departed: float = 0.5, margin: float | None = 40.0, fall: float = 100.0,
-            laws: tuple[tuple[str | None, float], ...] = ()) -> Any:  # fmt: skip
+def _member(
+    size: float = 0.01,
+    departed: float = 0.5,
+    margin: float | None = 40.0,
+    fall: float = 100.0,
+    laws: tuple[tuple[str | None, float], ...] = (),
+    others: float = 0.0,
+    likeness: float = 0.0,
+) -> Any:
     near = () if margin is None else (SimpleNamespace(effect="delay", margin=1.0), Alternative(None, margin))
     return SimpleNamespace(
         effect=effect("linear_leak"), size=size, departed=departed, alternatives=near, fall=fall,
-        laws=tuple(Alternative(name, by) for name, by in laws),
+        laws=tuple(Alternative(name, by) for name, by in laws), others_depart=others, likeness=likeness,
     )  # fmt: skip
 
 
 def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
-    """Intercept 1.92; -1.04 per log of (left + material) over (size + material); -0.9 per deviation; -1 lawless."""
-    for size, departed, left, margin, lawless in (
-        (0.01, 0.5, 0.002, 40.0, False), (0.001, 2.0, 0.01, 3.0, True), (0.05, 0.0, 0.0, 0.5, False),
+    """2.77; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -1.09; -2.22 a likeness."""
+    for size, departed, left, margin, lawless, others, likeness in (
+        (0.01, 0.5, 0.002, 40.0, False, 0.003, 0.4), (0.001, 2.0, 0.01, 3.0, True, 0.0, 0.0),
+        (0.05, 0.0, 0.0, 0.5, False, 0.01, 0.9),
     ):  # fmt: skip
-        score = 1.92 - 1.04 * math.log((left + 2e-4) / (size + 2e-4)) - 0.9 * departed - 1.0 * lawless
+        ratio = (math.hypot(left, others) + 2e-4) / (size + 2e-4)
+        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departed - 1.09 * lawless - 2.22 * likeness
         expected = 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-margin / 2.0))
-        found = probability_of_kind(_member(size, departed, margin), left, STANDARD, lawless=lawless)
-        assert found == pytest.approx(expected)
+        one = _member(size, departed, margin, others=others, likeness=likeness)
+        assert probability_of_kind(one, left, STANDARD, lawless=lawless) == pytest.approx(expected)
     worse = probability_of_kind(_member(margin=-5.0), 0.002, STANDARD)
     assert worse == pytest.approx(0.5 * probability_of_kind(_member(margin=None), 0.002, STANDARD))
 
@@ -380,5 +389,6 @@ def test_a_member_is_named_from_what_is_material_and_sure_on() -> None:
     assert names_of([_member(size=STANDARD.material, departed=0.0)], 0.0, STANDARD) != ()
     assert names_of([_member(size=0.999 * STANDARD.material, departed=0.0)], 0.0, STANDARD) == ()
     sure = probability_of_kind(_member(), 0.002, STANDARD)
-    assert names_of([_member()], 0.002, replace(STANDARD, least_confidence=sure)) != ()
-    assert names_of([_member()], 0.002, replace(STANDARD, least_confidence=sure + 1e-9)) == ()
+    for least, is_sure in ((sure, True), (sure + 1e-9, False)):
+        (name,) = names_of([_member()], 0.002, replace(STANDARD, least_confidence=least))
+        assert (name.is_sure, name.confidence) == (is_sure, sure if is_sure else 0.5)

@@ -289,7 +289,7 @@ class TestSensors:
     def test_two_cycles_tell_two_causes(self, measured: Path) -> None:
         found = _sensor(measured, "vhb_two_rates")
         assert {cause.effect.family for cause in found.causes} == KINDS["vhb_two_rates"]
-        assert "show no more than 2 causes" in _limit(found, "load cycles show")
+        assert len(found.causes) == 2
 
     @pytest.mark.bank
     @pytest.mark.parametrize("seed", [1, 2])

@@ -119,6 +119,19 @@ def test_confidence_falls_with_what_is_left_and_with_departure(
     assert probability_of_kind(member(departed=departed + further), left, STANDARD) <= sure
 
 
+@given(st.floats(0.0, 0.05), st.floats(0.0, 0.05), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_confidence_falls_with_what_others_depart_by_and_with_likeness_to_them(
+    departs: float, more: float, likeness: float, further: float
+) -> None:
+    """What is left and what others depart by are the same to it: what no equation follows."""
+    one = replace(member(), others_depart=departs, likeness=likeness)
+    sure = probability_of_kind(one, 0.001, STANDARD)
+    assert probability_of_kind(replace(one, others_depart=departs + more), 0.001, STANDARD) <= sure
+    assert probability_of_kind(replace(one, likeness=likeness + further), 0.001, STANDARD) <= sure
+    swapped = replace(one, others_depart=0.001)
+    assert probability_of_kind(swapped, departs, STANDARD) == pytest.approx(sure)
+
+
 def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it() -> None:
     (block, *_) = blocks()["static_curve"]
     margins = (("contact_area", 3.0), ("gas_compression", 900.0), ("wall_hardening", 40.0))
@@ -181,7 +194,7 @@ def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
 
 def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:
     """A leak or a drift may do what the other does, or a curve; a fast effect is none of these."""
-    fast, slow, doubted = member("play_hysteresis"), member("zero_drift"), member("linear_leak", departed=7.0)
+    fast, slow, doubted = member("play_hysteresis"), member("zero_drift"), member("linear_leak", departed=9.0)
     assert [one.member for one in names_of([fast, slow], 0.0, STANDARD)] == [fast, slow]
     assert [one.member for one in names_of([fast, slow], 0.0, STANDARD, is_clocked=True)] == [fast]
     told = names_of([slow, doubted], 0.0, STANDARD, is_clocked=True, is_followed=True)
@@ -199,6 +212,17 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
     assert name.confidence == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
 
 
+def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_is_likelier_than_not() -> None:
+    likely, less, small = (
+        member(size=0.05, departed=2.5), member("rate_gain", size=0.04, departed=2.5), member(size=0.05, departed=4.0)
+    )  # fmt: skip
+    assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
+    name = only(names_of([less, likely], 0.03, STANDARD))
+    assert (name.member, name.confidence, name.is_sure) == (likely, 0.5, False)
+    assert not names_of([small, less], 0.03, STANDARD)  # the largest is less likely than not
+    assert not names_of([likely], 0.051, STANDARD)  # and more is left than it explains
+
+
 def test_beside_a_sure_name_no_other_is_named_that_is_not() -> None:
     sure, doubted = member("rate_gain", size=0.04), member(size=0.05, departed=4.0)
     name = only(names_of([doubted, sure], 0.03, STANDARD, is_followed=True))
@@ -212,18 +236,20 @@ def test_material_is_the_size_from_which_on_a_member_is_named() -> None:
     assert not names_of(small, 0.0, replace(STANDARD, material=2e-3))
 
 
-def test_least_confidence_is_of_the_kind_below_which_nothing_is_named() -> None:
+def test_least_confidence_is_of_the_kind_below_which_nothing_is_sure() -> None:
     sure = probability_of_kind(member(), 1e-3, STANDARD)
-    assert names_of([member()], 1e-3, replace(STANDARD, least_confidence=sure - 0.01))
-    assert not names_of([member()], 1e-3, replace(STANDARD, least_confidence=sure + 0.01))
+    assert only(names_of([member()], 1e-3, replace(STANDARD, least_confidence=sure - 0.01))).is_sure
+    assert not only(names_of([member()], 1e-3, replace(STANDARD, least_confidence=sure + 0.01))).is_sure
 
 
 def test_kind_odds_are_the_logistics_coefficients() -> None:
     for intercept in (-2.0, 0.0, 3.0):
-        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0, -1.0))
+        plain = replace(STANDARD, kind_odds=(intercept, 0.0, 0.0, -1.0, -2.0))
         assert probability_of_kind(member(), 0.002, plain) == pytest.approx(1 / (1 + math.exp(-intercept)))
         lawless = probability_of_kind(member(), 0.002, plain, lawless=True)
         assert lawless == pytest.approx(1 / (1 + math.exp(1.0 - intercept)))
+        alike = probability_of_kind(replace(member(), likeness=0.5), 0.002, plain)
+        assert alike == pytest.approx(1 / (1 + math.exp(1.0 - intercept)))
 
 
 @given(st.floats(0.0, 60.0))

@@ -188,7 +188,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     one, two = effect("linear_leak"), effect("dead_band")
     candidates = [SimpleNamespace(name=e.name, effect=e, columns=(k,), slot=e.family) for k, e in enumerate((one, two))]
     evidence: Any = SimpleNamespace(given=SimpleNamespace(candidates=candidates), thresholds=STANDARD)
-    sizes = {"linear_leak": STANDARD.material, "dead_band": 2.0 * STANDARD.material}
+    sizes = {"linear_leak": 0.999 * STANDARD.material, "dead_band": 2.0 * STANDARD.material}
     costs = {(): 500.0, ("dead_band",): 130.0, ("linear_leak",): 170.0}
     asked: list[Any] = []
 
@@ -197,9 +197,13 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
         return SimpleNamespace(model=model, cost=costs.get(model.names, 103.0 + len(model.names[-1])))
 
     monkeypatch.setattr(_members, "fit", fitted)
-    monkeypatch.setattr(
-        _members, "apart", lambda sessions, less, whole: sizes[next(n for n in whole.names if n not in less.names)]
-    )
+    ways = {"linear_leak": np.ones(2), "dead_band": np.array([math.sqrt(2.0), 0.0])}  # 45 degrees apart
+
+    def left(likelihood: Any, found: Any) -> Array:
+        missing = [name for name in sizes if name not in found.model.names]
+        return np.array([3.0, 7.0]) + sum((sizes[name] * ways[name] for name in missing), np.zeros(2))
+
+    monkeypatch.setattr(_members, "_left", left)
     monkeypatch.setattr(_members, "alternatives", lambda *given: given[2:])
     monkeypatch.setattr(_members, "begun_with", lambda law, model, likelihood: model.with_part(law))
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
@@ -208,17 +212,22 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     likelihood: Any = SimpleNamespace(sessions=())
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
     found = members_of(evidence, best, ("z",), likelihood, extended)
-    assert [(m.name, m.size, m.departed, m.fall) for m in found] == [
-        ("dead_band", 2.0 * STANDARD.material, 0.7, 70.0), ("linear_leak", STANDARD.material, 0.3, 30.0),
-    ]  # fmt: skip
+    assert [(m.name, m.departed, m.fall) for m in found] == [("dead_band", 0.7, 70.0), ("linear_leak", 0.3, 30.0)]
+    assert [m.size for m in found] == pytest.approx([sizes["dead_band"], sizes["linear_leak"]])
+    assert [m.likeness for m in found] == pytest.approx([math.sqrt(0.5)] * 2)
+    assert [m.others_depart for m in found] == pytest.approx(
+        [0.25 * 0.3 * sizes["linear_leak"], 0.25 * 0.7 * sizes["dead_band"]]
+    )
     assert found[1].alternatives == (0, ("z",))
     assert found[1].laws == ()  # what is hardly there has no other law
     others = [law.name for law in laws if law.family == two.family and law.name != two.name]
     assert [law.effect for law in found[0].laws] == others
     assert set(asked) == {4}
     sizes["linear_leak"] *= 3.0
+    ways["linear_leak"] *= -1.0
     (leak, _) = members_of(evidence, best, (), likelihood, extended)
     assert [(law.effect, law.margin) for law in leak.laws] == [("orifice_leak", 15.0)]
+    assert leak.likeness == 0.0  # the other pulls against it
 
 
 def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
