@@ -30,7 +30,6 @@ SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
 LEAST_WINDOW = 3  # samples on either side of the average
 MOST_SAMPLES = 12_000
 MOST_COARSENED = 6.0  # times, beyond what keeps the fastest ramp
-LEAST_SPAN = 0.02  # of the widest: a load that moves by less has no ramp but its noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +133,10 @@ def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
     return np.asarray(load_n <= low + thresholds.standing * (high - low))
 
 
-def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
+def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> int:
     """By how much the samples may be thinned so that the fastest ramp keeps its shape."""
     factors = []
-    for recording, span in zip(recordings, _spans(recordings, scale), strict=True):
+    for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
         step_s = recording.sample_time_s
         load = recording.force_n / scale.load_n
         window = max(1, round(0.05 / step_s))
@@ -153,10 +152,10 @@ def thinning(recordings: Sequence[Recording], scale: Scale) -> int:
     return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))
 
 
-def _spans(recordings: Sequence[Recording], scale: Scale) -> Array:
-    """By how much each load moves, in full scales; one where that is nearly all, or so little that it has no ramp."""
+def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:
+    """By how much each load moves, in full scales; one where that is nearly all, or where it stands still."""
     spans = np.array([np.ptp(np.percentile(one.force_n, [0.1, 99.9])) for one in recordings]) / scale.load_n
-    is_part = (spans > LEAST_SPAN * spans.max()) & (spans < 1.0 - LEAST_SPAN)
+    is_part = (spans > standing * spans.max()) & (spans < 1.0 - standing)
     return np.where(is_part, spans, 1.0)
 
 

@@ -114,7 +114,7 @@ def design(
     recordings = [_commanded(protocol, unit, peak_n, sample_rate_hz) for protocol in protocols]
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     usable = [np.ones(len(one), dtype=bool) for one in recordings]
-    factor = thinning(recordings, scale)
+    factor = thinning(recordings, scale, limits)
     sessions = prepare(recordings, usable, [False] * len(recordings), scale, factor, limits)
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.

@@ -46,7 +46,7 @@ def recording(
 def sessions_of(*recordings: Recording) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in recordings]
     scale = full_scale(recordings, usable, Thresholds())
-    return prepare(recordings, usable, None, scale, thinning(recordings, scale), Thresholds()), scale
+    return prepare(recordings, usable, None, scale, thinning(recordings, scale, Thresholds()), Thresholds()), scale
 
 
 def likelihood_of(sessions: list[Session], like: ExtendedModel = MODEL) -> Likelihood:

@@ -74,20 +74,20 @@ def test_samples_are_thinned_to_some_twenty_on_the_fastest_ramp(ramp_s: float, r
     time_s = np.arange(0.0, 20.0, 1.0 / rate_hz)
     load = np.abs((time_s / ramp_s + 1.0) % 2.0 - 1.0)
     run = Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * load)
-    factor = thinning([run], Scale(800.0, 140.0, MILLIBAR))
+    factor = thinning([run], Scale(800.0, 140.0, MILLIBAR), STANDARD)
     assert 20 <= 0.8 * ramp_s * rate_hz / factor < 32
     slower = Recording.from_arrays(time_s=2.0 * time_s, force_n=800.0 * load, pressure_mbar=140.0 * load)
-    assert thinning([run, slower], Scale(800.0, 140.0, MILLIBAR)) == factor  # that of the fastest
+    assert thinning([run, slower], Scale(800.0, 140.0, MILLIBAR), STANDARD) == factor  # that of the fastest
 
 
 def test_a_long_recording_is_thinned_further_and_a_short_one_not_at_all() -> None:
     scale = Scale(800.0, 140.0, MILLIBAR)
     long = triangles(400, 2.0, 1.0)
-    factor = thinning([pressed(long)], scale)
-    shape = thinning([pressed(long[:2000])], scale)
+    factor = thinning([pressed(long)], scale, STANDARD)
+    shape = thinning([pressed(long[:2000])], scale, STANDARD)
     assert factor > shape
     assert long.size / factor < 1.05 * max(12_000, long.size / (6 * shape))
-    assert thinning([pressed(np.linspace(0.0, 1.0, 4))], scale) == 1
+    assert thinning([pressed(np.linspace(0.0, 1.0, 4))], scale, STANDARD) == 1
 
 
 # -- sessions -----------------------------------------------------------------------------------------------------

@@ -134,24 +134,24 @@ def test_the_fastest_ramp_keeps_so_many_samples() -> None:
     for ramp_s, factor in ((2.41, 4), (2.99, 4), (3.01, 5), (0.5, 1), (0.61, 1), (1.21, 2)):
         steps = round(ramp_s / STEP_S * 1e3) / 1e3
         load = np.minimum(np.arange(800) / steps, 1.0)
-        assert thinning([_run(load)], SCALE) == factor
+        assert thinning([_run(load)], SCALE, STANDARD) == factor
     # Of more than one that of the fastest; of one of a few samples none is taken away.
     slow, fast = (_run(np.minimum(np.arange(800) / n, 1.0)) for n in (300, 100))
-    assert thinning([slow, fast], SCALE) == thinning([fast], SCALE) == 3
+    assert thinning([slow, fast], SCALE, STANDARD) == thinning([fast], SCALE, STANDARD) == 3
     # Of a fiftieth of a second in a sample a window is two; of a load that never moves the whole of 9.6 s is one.
-    assert thinning([slow, _run(np.linspace(0.0, 1.0, 4))], SCALE) == 1
-    assert thinning([_run(np.linspace(0.0, 1.0, 5))], SCALE) == 1
-    assert thinning([_run(np.full(481, 0.5), np.linspace(0.0, 1.0, 481))], SCALE) == 19
+    assert thinning([slow, _run(np.linspace(0.0, 1.0, 4))], SCALE, STANDARD) == 1
+    assert thinning([_run(np.linspace(0.0, 1.0, 5))], SCALE, STANDARD) == 1
+    assert thinning([_run(np.full(481, 0.5), np.linspace(0.0, 1.0, 481))], SCALE, STANDARD) == 19
     falling = _run(1.0 - np.minimum(np.arange(800) / 155.0, 1.0))
-    assert thinning([falling], SCALE) == 5
+    assert thinning([falling], SCALE, STANDARD) == 5
 
 
 @pytest.mark.parametrize(("count", "factor"), [(12_000, 1), (12_001, 2), (60_001, 6), (100_000, 6)])
 def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(count: int, factor: int) -> None:
     load = np.resize(course((10, 1.0), (10, 0.0)), count)
-    assert thinning([_run(load)], SCALE) == factor
+    assert thinning([_run(load)], SCALE, STANDARD) == factor
     half = count // 2
-    assert thinning([_run(load[:half]), _run(load[half:])], SCALE) == factor
+    assert thinning([_run(load[:half]), _run(load[half:])], SCALE, STANDARD) == factor
 
 
 @pytest.mark.parametrize("low", [0.9, 0.5, 0.1, 0.0])
@@ -160,10 +160,10 @@ def test_a_ramp_keeps_its_samples_whatever_part_of_the_full_scale_it_spans(low: 
     time_s = np.arange(0.0, 80.0, 0.01)
     part = low + (1.0 - low) * np.abs((time_s / 4.0 + 1.0) % 2.0 - 1.0)
     pressed = _run(part, step_s=0.01)
-    assert thinning([pressed], SCALE) == 13
+    assert thinning([pressed], SCALE, STANDARD) == 13
     # A load that stands still beside it has no ramp, however its noise slopes.
     still = _run(0.5 + 1e-3 * (1.0 - low) * np.random.default_rng(1).standard_normal(8000), step_s=0.01)
-    assert thinning([pressed, still], SCALE) == 13
+    assert thinning([pressed, still], SCALE, STANDARD) == 13
 
 
 def test_what_is_held_out_thins_nothing() -> None:
