@@ -172,7 +172,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
         refused.append(beyond)
         extended = fit(likelihood, extended.model.without(beyond))
     extra = [name for name in extended.model.names if name not in plain.model.names]
-    followed = extended
+    following = len(extra)
     while extra and (error_of(sessions, extended.model) >= most or not left_out.stands(extended.model, plain.model)):
         less = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
         worst = min(extra, key=lambda name: float(left_out.errors(less[name].model).sum()))
@@ -186,7 +186,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     else:
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     left = tuple(name for name in undone if name in kept)
-    is_stepped_down = bool(extra) and extended is not followed
+    is_stepped_down = len(extra) < following
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)
 
 
