@@ -39,6 +39,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis._sensitivity import (
     Linearised,
+    cosines,
     departures,
     directions,
     nuisance_precision,
@@ -162,9 +163,7 @@ class Evidence:
         made = np.zeros((self.raw.shape[0], len(alone)))
         for k, member in enumerate(alone):
             made[list(self.given.candidates[member].columns), k] = self.posterior((member,)).strengths[0]
-        inner = made.T @ self.raw @ made
-        norm = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-        return np.asarray(np.minimum(np.abs(inner) / np.outer(norm, norm), 1.0))
+        return np.asarray(np.minimum(np.abs(cosines(made.T @ self.raw @ made)), 1.0))
 
     def _departures_of(self, members: Members) -> list[range]:
         """Where the columns of members' departures stand, made when they are first asked for."""

@@ -12,7 +12,7 @@ from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
-from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
+from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
@@ -66,12 +66,12 @@ def members_of(
     added = np.array([_left(likelihood, one) - whole for one in less]).reshape(len(less), whole.size)
     inner = added @ added.T
     sizes = np.sqrt(np.diag(inner) / max(whole.size, 1))
-    likeness = inner / np.maximum(np.sqrt(np.outer(np.diag(inner), np.diag(inner))), 1e-300)
+    likeness = cosines(inner)
     np.fill_diagonal(likeness, 0.0)
     departures = evidence.thresholds.departure * np.array(best.departed) * sizes
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
-        material = sizes[k] > evidence.thresholds.material
+        is_material = sizes[k] > evidence.thresholds.material
         made.append(
             Member(
                 one.effect,
@@ -79,7 +79,7 @@ def members_of(
                 best.departed[k],
                 alternatives(evidence, best, member, refused),
                 less[k],
-                _other_laws(one, less[k], likelihood, extended) if material else (),
+                _other_laws(one, less[k], likelihood, extended) if is_material else (),
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),

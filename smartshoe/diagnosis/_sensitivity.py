@@ -192,6 +192,12 @@ def ridged(inner: Array) -> Array:
     return inner + 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(inner.shape[0])
 
 
+def cosines(inner: Array) -> Array:
+    """(k, k) cosines of the columns whose inner products (k, k) are given; 0 with a column of nothing."""
+    norm = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    return np.asarray(inner / np.outer(norm, norm))
+
+
 def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Linearised:
     """The columns about ``model``."""
     fitted = tuple(session for session in sessions if session.fitted.any())
