@@ -352,3 +352,31 @@ def test_softened_rubber_beside_any_arm_stays_within_bounds(
     given_ = conditions(corners(seed)).within(share, 0.3)
     out = effect("mullins_softening").apply(given_.load, given_, np.array([1.0, width, at_once, widening]))
     assert np.max(np.abs(out)) < 1e3 * np.max(np.abs(given_.load))
+
+
+@pytest.mark.parametrize("name", ["gas_compression", "mullins_softening", "wall_hardening"])
+@given(
+    share=st.floats(-0.9, 5.0),
+    at=st.lists(st.sampled_from([0.0, 0.5, 1.0]), min_size=5, max_size=5),
+    loads=st.lists(st.floats(-0.5, 1.5), min_size=3, max_size=12),
+)
+def test_a_spring_beside_any_arm_gives_numbers_under_any_load(
+    name: str, share: float, at: list[float], loads: list[float]
+) -> None:
+    made = effect(name)
+    values = np.array([p.lower + k * (p.upper - p.lower) for p, k in zip(made.parameters, at, strict=False)])
+    beside = conditions(np.array(loads)).within(share, 0.5)
+    assert np.isfinite(made.apply(beside.load, beside, values)).all()
+
+
+def test_beside_an_arm_that_pushes_no_gas_is_asked_for_less_than_a_vacuum() -> None:
+    made, step_s = effect("gas_compression"), 0.04
+    load = np.interp(step_s * np.arange(5000), [0.0, 0.4], [0.0, -1.0])
+    for share in (-0.05, -0.1, -0.2, -0.5, -0.9):
+        beside = Conditions(step_s * np.arange(load.size), load, step_s).within(share, 0.23)
+        pressure = made.apply(load, beside, np.array([5.0]))
+        assert pressure.max() <= 0.0
+        assert pressure.min() >= -1.0
+        back = made.inverse_beside(Arm(share, 0.23), np.array([5.0]), step_s)
+        back.reset()
+        assert back.push(pressure, beside.time_s) == pytest.approx(load, abs=5e-4)

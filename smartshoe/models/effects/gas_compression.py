@@ -39,7 +39,7 @@ class GasCompression(Effect):
         """The pressure of the stiffer gas."""
         from smartshoe.kernels.wall_loop import compressed
 
-        ratio = float(values[0])
+        ratio = _beside(float(values[0]), (conditions.relaxing or (0.0, 0.0))[0])
         if ratio == 0.0:
             return signal.copy()
         # The load of which the linear core made the signal.
@@ -49,7 +49,8 @@ class GasCompression(Effect):
 
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
-        return GasBesideArm(self.inverse(values, step_s), float(values[0]), arm, step_s)
+        ratio = _beside(float(values[0]), arm.share)
+        return GasBesideArm(self.inverse(np.array([ratio]), step_s), ratio, arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from p, in closed form."""
@@ -59,6 +60,18 @@ class GasCompression(Effect):
             lambda signal, time_s: signal * (1.0 + wall / (1.0 + ratio * signal)) / whole,
             f"x *= (1.0 + {c_number(wall)} / (1.0 + {c_number(ratio)} * x)) / {c_number(whole)};",
         )
+
+
+def _beside(ratio: float, share: float) -> float:
+    """The largest ratio up to this one beside an arm of ``share``.
+
+    An arm that pushes, as a creeping unit's does, leaves a tenth of the wall's own stiffness, at least: a gas that
+    stiffens as much as it would otherwise ask for less than no absolute pressure (`kernels.wall_loop.compressed`).
+    """
+    from smartshoe.models.core import USUAL_WALL_RATIO
+
+    wall = USUAL_WALL_RATIO - 1.0
+    return ratio if share >= 0.0 else min(ratio, max(-wall * (0.9 / share + 1.0) - 1.0, 0.0))
 
 
 def _stiffness(ratio: float) -> tuple[float, float]:
