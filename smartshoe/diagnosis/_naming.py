@@ -44,6 +44,9 @@ def names_of(
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
+    Beside one that is sure, and has a law, those are named, too, that are likelier there than not and move the reading
+    by more than all small imperfections of a good unit together: a shadow of another effect is seldom so large.
+
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
     are. Where much is left beside the largest, that one alone is named if it is likelier there than not, as half sure.
@@ -55,8 +58,10 @@ def names_of(
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     if is_clocked:
         likely = [_doubted(name) if name.effect.goes_with_the_clock else name for name in likely]
-    if sure := tuple(one for one in likely if one.is_sure):
-        return sure
+    if any(one.is_sure for one in likely):
+        is_firm = any(one.confidence >= thresholds.least_confidence for one in likely)  # none that no law follows
+        large = [one for one in likely if is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable]
+        return tuple(one for one in likely if one.is_sure or one in large)
     larger = tuple(one for one in likely if one.member.size > left)
     if is_followed or not larger:
         return larger

@@ -349,8 +349,8 @@ def _cause(
                 "confidence of its kind",
                 name.confidence,
                 thresholds.least_confidence,
-                "it is not sure, since others may do what it does: it is named because it moves more than all that is"
-                " left",
+                "it is not sure, since others may do what it does: it is named for its size, which is more than all"
+                " that is left, or than small imperfections add up to",
             )
         )
     elif name.kind_only:

@@ -223,10 +223,29 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_is_l
     assert not names_of([likely], 0.051, STANDARD)  # and more is left than it explains
 
 
-def test_beside_a_sure_name_no_other_is_named_that_is_not() -> None:
-    sure, doubted = member("rate_gain", size=0.04), member(size=0.05, departed=4.0)
-    name = only(names_of([doubted, sure], 0.03, STANDARD, is_followed=True))
-    assert (name.effect.name, name.is_sure) == ("rate_gain", True)
+def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_than_not() -> None:
+    sure = member("rate_gain", size=0.04)
+    likely, less = member(size=0.05, departed=2.5), member(size=0.05, departed=4.0)
+    assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
+    told = names_of([likely, sure], 0.03, STANDARD)
+    assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
+    assert told[0].confidence == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
+    assert only(names_of([less, sure], 0.03, STANDARD, is_followed=True)).member is sure
+    # One that moves no more than a good unit's imperfections do may be another's shadow.
+    assert only(names_of([likely, sure], 0.03, replace(STANDARD, tolerable=0.051))).member is sure
+    assert len(names_of([likely, sure], 0.03, replace(STANDARD, tolerable=0.049))) == 2
+
+
+def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> None:
+    (block, *_) = blocks()["static_curve"]
+    curve = member(block, size=0.06, departed=1.5, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
+    likely = member(size=0.05, departed=2.5)
+    assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
+    for size, count in ((0.06, 1), (0.6, 2)):  # the larger, the surer also without a law
+        named = names_of([replace(curve, size=size), likely], 0.03, STANDARD)
+        assert named[0].is_sure
+        assert (named[0].confidence >= STANDARD.least_confidence) == (count == 2)
+        assert len(named) == count
 
 
 # -- what each number decides -----------------------------------------------------------------------------------
