@@ -53,7 +53,8 @@ class Thresholds:
     tolerable: float = threshold(
         1.5e-3,
         "share of full scale",
-        "structure that small imperfections of a good unit add up to",
+        "structure that small imperfections of a good unit add up to; beside a sure cause one that is larger and"
+        " likelier than not is named",
         "three effects of 0.08 % each: 0.14 %",
     )
     extrapolates: float = threshold(
@@ -91,7 +92,7 @@ class Thresholds:
     least_confidence: float = threshold(
         0.75,
         "probability",
-        "of the kind; below it no cause is named beside one above it; of a zero that is never seen",
+        "of the kind; below it a cause is named for its size alone; of a zero that is never seen",
         "three to one for being right",
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
