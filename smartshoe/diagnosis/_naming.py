@@ -51,7 +51,7 @@ def names_of(
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
     are. Where much is left beside the largest, that one alone is named if it is likelier there than not, as half sure.
     ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
-    curve: none of these is more than half sure.
+    curve: none of these is more than half sure, and nothing is named for its size.
 
     A flexible block is named by the law that comes nearest.
     """
@@ -59,7 +59,8 @@ def names_of(
     if is_clocked:
         likely = [_doubted(name) if name.effect.goes_with_the_clock else name for name in likely]
     if any(one.is_sure for one in likely):
-        is_firm = any(one.confidence >= thresholds.least_confidence for one in likely)  # none that no law follows
+        # Not beside a kind that no law follows, nor where one may do what another does.
+        is_firm = not is_clocked and any(one.confidence >= thresholds.least_confidence for one in likely)
         large = [one for one in likely if is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable]
         return tuple(one for one in likely if one.is_sure or one in large)
     larger = tuple(one for one in likely if one.member.size > left)

@@ -173,7 +173,7 @@ def test_readings_far_beyond_full_scale_give_finite_forces(name: str) -> None:
 
 
 def test_a_missing_reading_repeats_the_last_one_and_time_goes_on() -> None:
-    model = BASELINE.with_part(effect("zero_drift"), np.array([1e-3, 0.0, 60.0]))
+    model = BASELINE.with_part(effect("zero_drift"), np.array([1e-3, 0.0, 60.0, 1.0]))
     readings = np.full(500, 90.0)
     gappy = readings.copy()
     gappy[[3, 4, 5, 200]] = np.nan
@@ -223,7 +223,7 @@ def test_what_cannot_be_undone_is_passed_over_and_said(name: str, why: str) -> N
 
 
 def test_a_drift_with_the_temperature_is_passed_over_and_said() -> None:
-    filter_ = ExtendedCompensator(BASELINE.with_part(effect("zero_drift"), np.array([1e-5, 1e-3, 60.0])), 100.0)
+    filter_ = ExtendedCompensator(BASELINE.with_part(effect("zero_drift"), np.array([1e-5, 1e-3, 60.0, 1.0])), 100.0)
     assert "temperature" in filter_.not_inverted["zero_drift"]
 
 

@@ -189,9 +189,9 @@ def test_effects_that_fit_by_their_difference_undo_one_another(reverse: float) -
     drift, warm, gain = effect("zero_drift"), effect("warm_up"), effect("gain_drift")
     slow = np.array([-reverse * 0.009 * 300.0 / TIME_S[-1], 300.0, 1.0])  # a line with the other sign, nearly
     along = slow * np.array([-1.0, 1.0, 1.0])
-    against = MODEL.with_part(drift, np.array([per_s, 0.0])).with_part(warm, slow)
+    against = MODEL.with_part(drift, np.array([per_s, 0.0, 0.0, 1.0])).with_part(warm, slow)
     assert cancelling(sessions, against, STANDARD) == ["zero_drift", "warm_up"]
-    together = MODEL.with_part(drift, np.array([per_s, 0.0])).with_part(warm, along)
+    together = MODEL.with_part(drift, np.array([per_s, 0.0, 0.0, 1.0])).with_part(warm, along)
     assert cancelling(sessions, together, STANDARD) == []
     # A small one beside them has no part in it.
     beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0]))
@@ -203,7 +203,7 @@ def test_effects_that_fit_by_their_difference_undo_one_another(reverse: float) -
 def test_they_do_where_their_powers_are_clear_of_that_of_all_together() -> None:
     sessions = _sessions([MODEL] * 2)
     drift, warm = effect("zero_drift"), effect("warm_up")
-    first, other = (np.array([1e-4, 0.0]), np.array([-1e-4 * 300.0, 300.0, 1.0]))
+    first, other = (np.array([1e-4, 0.0, 0.0, 1.0]), np.array([-1e-4 * 300.0, 300.0, 1.0]))
 
     def size(model: ExtendedModel) -> float:
         """Rms of a drift, each recording's mean aside."""

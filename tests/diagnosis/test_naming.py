@@ -231,6 +231,7 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_t
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
     assert told[0].confidence == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     assert only(names_of([less, sure], 0.03, STANDARD, is_followed=True)).member is sure
+    assert only(names_of([likely, sure], 0.03, STANDARD, is_clocked=True)).member is sure
     # One that moves no more than a good unit's imperfections do may be another's shadow.
     assert only(names_of([likely, sure], 0.03, replace(STANDARD, tolerable=0.051))).member is sure
     assert len(names_of([likely, sure], 0.03, replace(STANDARD, tolerable=0.049))) == 2

@@ -26,8 +26,8 @@ from smartshoe.units import MILLIBAR
     [
         ("dead_band", (0.05, 0.2, 0.0), "lost_load", 0.05 * 600.0, "N"),
         ("sensor_nonlinearity", (0.02, 0.0, 0.0), "bow", 0.02 * 1.5 * -200.0, "mbar"),
-        ("zero_drift", (1e-4, 0.0, 60.0), "drift_rate", 1e-4 * 1.5 * -200.0, "mbar/s"),
-        ("zero_drift", (1e-4, 2e-3, 60.0), "temperature_coefficient", 2e-3 * 1.5 * -200.0, "mbar/K"),
+        ("zero_drift", (1e-4, 0.0, 60.0, 1.0), "drift_rate", 1e-4 * 1.5 * -200.0, "mbar/s"),
+        ("zero_drift", (1e-4, 2e-3, 60.0, 1.0), "temperature_coefficient", 2e-3 * 1.5 * -200.0, "mbar/K"),
         ("delay", (0.03,), "delay", 0.03, "s"),
     ],
 )

@@ -136,7 +136,7 @@ def test_a_load_of_which_a_gauge_reads_nothing_is_its_cells_tare_however_large()
 
 def test_what_has_drifted_by_the_first_rest_is_no_zero() -> None:
     sessions, _ = _sessions(_run())
-    drifting = MODEL.with_part(effect("zero_drift"), np.array([0.002, 0.0, 60.0]))
+    drifting = MODEL.with_part(effect("zero_drift"), np.array([0.002, 0.0, 60.0, 1.0]))
     (rest,) = first_rests(sessions, drifting, STANDARD)
     kept = STANDARD.hold_s > TIME_S
     assert rest[2] == pytest.approx(0.002 * float(np.mean(TIME_S[kept])), rel=0.05)
@@ -149,7 +149,7 @@ def test_an_offset_that_a_drift_of_the_zero_may_have_come_by_is_its_past(sign: f
     duration_s = float(TIME_S[-1])
     sessions, scale = _sessions(_run(offset=0.03 * sign, seed=1), _run(offset=0.03 * sign, seed=2))
     for moved, is_past in ((0.006, True), (0.0015, False), (0.0, False), (-0.006, False)):
-        drift = np.array([sign * moved / duration_s, 0.0])
+        drift = np.array([sign * moved / duration_s, 0.0, 0.0, 1.0])
         drifting = baseline_of(sessions, scale).with_part(effect("zero_drift"), drift)
         (found,) = zeros_of(sessions, drifting, scale, 0.0, 0.0, STANDARD)
         assert found.effect.name == "zero_offset"

@@ -225,7 +225,7 @@ def test_a_first_rest_at_a_tare_ends_where_the_load_leaves_it() -> None:
 
 
 def test_what_has_drifted_at_rest_is_taken_out_of_a_first_rest() -> None:
-    drifting = MODEL.with_part("dead_band").with_part("zero_drift", np.array([0.002, 0.0, 60.0]))
+    drifting = MODEL.with_part("dead_band").with_part("zero_drift", np.array([0.002, 0.0, 60.0, 1.0]))
     one = _rested(25)
     moved = _drifted(one, drifting)
     expected = drifting.simulate(one.conditions) - drifting.without("zero_drift").simulate(one.conditions)
@@ -408,11 +408,11 @@ def test_shares_come_to_units(unit: str, expected: tuple[float, str]) -> None:
 
 
 def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> None:
-    model = MODEL.with_part("zero_drift", np.array([1e-4, 2e-3, 60.0])).with_part(
+    model = MODEL.with_part("zero_drift", np.array([1e-4, 2e-3, 60.0, 1.0])).with_part(
         "dead_band", np.array([0.05, 0.2, 0.0])
     )
     rng = np.random.default_rng(1)
-    root = 1e-3 * rng.standard_normal((9, 9))
+    root = 1e-3 * rng.standard_normal((10, 10))
     covariance = root @ root.T
     covariance[4, 4] = -1e-9  # by rounding
     logged = SimpleNamespace(conditions=Conditions(np.zeros(1), np.zeros(1), 0.01, temperature_k=np.zeros(1)))
@@ -420,20 +420,32 @@ def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> 
     fit: Any = SimpleNamespace(
         model=model, covariance=covariance, likelihood=SimpleNamespace(sessions=[logged, unlogged])
     )
-    assert list(joint_parameters(fit, SCALE)[0]) == ["zero_drift.drift_rate", "dead_band.lost_load",
-                                                     "dead_band.softness", "dead_band.onset"]  # fmt: skip
-    without = np.array([3, 6, 7, 8])
-    factors = np.array([0.8 * 140.0, 800.0, 1.0, 1.0])
+    assert list(joint_parameters(fit, SCALE)[0]) == [
+        "zero_drift.drift_rate",
+        "zero_drift.exponent",
+        "dead_band.lost_load",
+        "dead_band.softness",
+        "dead_band.onset",
+    ]
+    without = np.array([3, 6, 7, 8, 9])
+    factors = np.array([0.8 * 140.0, 1.0, 800.0, 1.0, 1.0])
     expected = covariance[np.ix_(without, without)] * np.outer(factors, factors)
     assert np.array(joint_parameters(fit, SCALE)[1]) == pytest.approx(expected)
     fit.likelihood = SimpleNamespace(sessions=[logged])
     found, joint = joint_parameters(fit, SCALE)
-    assert list(found) == ["zero_drift.drift_rate", "zero_drift.temperature_coefficient", "zero_drift.temperature_lag",
-                           "dead_band.lost_load", "dead_band.softness", "dead_band.onset"]  # fmt: skip
-    factors = np.array([0.8 * 140.0, 0.8 * 140.0, 1.0, 800.0, 1.0, 1.0])
+    assert list(found) == [
+        "zero_drift.drift_rate",
+        "zero_drift.temperature_coefficient",
+        "zero_drift.temperature_lag",
+        "zero_drift.exponent",
+        "dead_band.lost_load",
+        "dead_band.softness",
+        "dead_band.onset",
+    ]
+    factors = np.array([0.8 * 140.0, 0.8 * 140.0, 1.0, 1.0, 800.0, 1.0, 1.0])
     assert np.array(joint) == pytest.approx(covariance[3:, 3:] * np.outer(factors, factors))
     drift = parameters_of(fit, "zero_drift", SCALE)
-    assert list(drift) == ["drift_rate", "temperature_coefficient", "temperature_lag"]
+    assert list(drift) == ["drift_rate", "temperature_coefficient", "temperature_lag", "exponent"]
     one = drift["drift_rate"]
     sd = math.sqrt(covariance[3, 3])
     assert (one.value, one.sd) == (pytest.approx(112.0 * 1e-4), pytest.approx(112.0 * sd))
@@ -442,12 +454,12 @@ def test_parameters_come_with_their_covariance_in_the_same_units_and_order() -> 
     assert one.ci95 == pytest.approx((112.0 * low, 112.0 * high))
     assert drift["temperature_coefficient"].sd == 0.0
     falling, told = joint_parameters(fit, replace(SCALE, reading=-140.0))
-    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     assert np.array(told) == pytest.approx(np.array(joint) * np.outer(signs, signs))
     turned = falling["zero_drift.drift_rate"]
     assert (turned.value, turned.sd) == (-one.value, one.sd)
     assert turned.ci95 == (-one.ci95[1], -one.ci95[0])
-    covariance[6, 6] = 1e6
+    covariance[7, 7] = 1e6
     limits = effect("dead_band").parameters[0]
     wide = parameters_of(fit, "dead_band", SCALE)["lost_load"]
     assert wide.ci95 == pytest.approx((800.0 * limits.lower, 800.0 * limits.upper))

@@ -147,7 +147,7 @@ def _sign(name: str, values: list[float], *, at: float = 0.5, channels: bool = T
 def test_signs_are_those_of_the_documentation() -> None:
     assert _sign("zero_offset", [0.01]) > 0
     assert _sign("load_cell_tare", [0.01]) > 0
-    assert _sign("zero_drift", [1e-3, 0.0, 0.0]) > 0
+    assert _sign("zero_drift", [1e-3, 0.0, 0.0, 1.0]) > 0
     assert _sign("gain_drift", [1e-3, 0.0, 0.0]) > 0
     assert _sign("gain_drift", [1e-3, 0.0, 0.0], at=0.0) == 0
     assert _sign("warm_up", [0.01, 5.0, 1.0]) > 0
@@ -214,7 +214,8 @@ def test_a_lag_of_a_smoothed_and_thinned_load_is_that_of_the_load() -> None:
 @pytest.mark.parametrize("name", ["gain_drift", "zero_drift"])
 def test_a_temperature_coefficient_needs_a_temperature(name: str) -> None:
     one, p = effect(name), np.full(500, 0.5)
-    coefficient, rate = np.array([0.0, 0.01, 0.0]), np.array([1e-3, 0.0, 0.0])
+    coefficient, rate = one.start(), one.start()
+    coefficient[1:3], rate[0] = (0.01, 0.0), 1e-3
     still = np.array_equal(one.apply(p, _conditions(500, channels=False), coefficient), p)
     assert still
     time_s = STEP_S * np.arange(500)
@@ -238,11 +239,25 @@ def test_a_recording_that_continues_another_carries_the_clock_on(name: str) -> N
     assert np.allclose(whole[300:], later, rtol=0, atol=1e-15)
 
 
+@given(rate=st.floats(-1e-3, 1e-3), exponent=st.floats(0.4, 2.0), time_s=st.floats(0.0, 1e4))
+def test_a_zero_drifts_by_a_power_of_the_time(rate: float, exponent: float, time_s: float) -> None:
+    """Of all exponents alike a hundred times the rate in 100 s; of the root of time twice in four times as long."""
+    drift = effect("zero_drift")
+
+    def moved(at_s: float) -> float:
+        times_s = np.array([0.0, at_s])
+        values = np.array([rate, 0.0, 0.0, exponent])
+        return float(drift.apply(np.zeros(2), Conditions(times_s, np.zeros(2), 1.0), values)[1])
+
+    assert moved(100.0) == pytest.approx(100.0 * rate)
+    assert moved(4.0 * time_s) == pytest.approx(4.0**exponent * moved(time_s))
+
+
 def test_a_thermometers_noise_is_not_added_to_the_reading() -> None:
     time_s = STEP_S * np.arange(5000)
     warmer_k = 2.0 * np.sin(time_s / 15.0)
     noisy_k = warmer_k + 0.1 * np.random.default_rng(1).standard_normal(time_s.size)
-    p, values = np.zeros(time_s.size), np.array([0.0, 0.01, 0.0])
+    p, values = np.zeros(time_s.size), np.array([0.0, 0.01, 0.0, 1.0])
     moved = effect("zero_drift").apply(p, Conditions(time_s, p, STEP_S, temperature_k=noisy_k), values)
     assert np.std(moved - 0.01 * warmer_k) < 0.2 * 0.01 * 0.1
 
@@ -260,20 +275,24 @@ def test_a_sensors_body_follows_a_temperature_by_its_time_constant(tau_s: float,
     p = np.zeros(time_s.size)
     conditions = Conditions(time_s, p, 0.05, temperature_k=4.0 * np.sin(omega * time_s))
     for name, signal in (("zero_drift", p), ("gain_drift", p + 1.0)):
-        moved = effect(name).apply(signal, conditions, np.array([0.0, 0.01, tau_s])) - signal
+        values = effect(name).start()
+        values[1:3] = 0.01, tau_s
+        moved = effect(name).apply(signal, conditions, values) - signal
         # The thermometer is smoothed over three seconds, so that the corner where it begins is.
         assert np.max(np.abs(moved - 0.04 * body_k)) < 0.04 * 2.0 * omega
 
 
 def test_shapes_that_differ_by_what_is_not_logged_are_one() -> None:
     drift, lag = effect("zero_drift"), effect("sensor_lag")
-    assert [dict(one) for one in drift.shapes_with({"neighbour"})] == [{"temperature_lag": 3.0}]
+    assert [dict(one) for one in drift.shapes_with({"neighbour"})] == [
+        {"temperature_lag": 3.0, "exponent": 1.0}, {"temperature_lag": 3.0, "exponent": 0.5},
+    ]  # fmt: skip
     assert drift.shapes_with({"temperature"}) == drift.shapes
     assert lag.shapes_with(()) == lag.shapes
 
 
-def test_a_file_from_before_sensors_lagged_behind_a_temperature_has_no_such_lag() -> None:
-    now = ExtendedModel(1.0, 0.1, 0.5, 800.0, 140.0, "mbar").with_part("zero_drift", np.array([1e-5, 2e-3, 0.0]))
+def test_a_file_from_before_sensors_lagged_behind_a_temperature_has_no_such_lag_and_a_steady_drift() -> None:
+    now = ExtendedModel(1.0, 0.1, 0.5, 800.0, 140.0, "mbar").with_part("zero_drift", np.array([1e-5, 2e-3, 0.0, 1.0]))
     stored = now.to_dict()
     before = {**stored, "effects": {"zero_drift": {"drift_rate": 1e-5, "temperature_coefficient": 2e-3}}}
     assert ExtendedModel.from_dict(before).to_dict() == stored

@@ -24,7 +24,7 @@ BASELINE = ExtendedModel(0.9, 0.15, 0.3, 800.0, 180.0, "mbar")
 WITH_MEMORY = (
     BASELINE.with_part(effect("play_hysteresis"), _strong("play_hysteresis", 0.02))
     .with_part(effect("linear_leak"), np.array([0.02]))
-    .with_part(effect("zero_drift"), np.array([1e-4, 0.0, 60.0]))
+    .with_part(effect("zero_drift"), np.array([1e-4, 0.0, 60.0, 1.0]))
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -35,9 +36,10 @@ def running_time_s(conditions: Conditions) -> Array:
     return conditions.kept("running_time_s", (), lambda: conditions.time_s + conditions.before.get("time_s", 0.0))
 
 
-def drift(conditions: Conditions, values: Array) -> Array:
+def drift(conditions: Conditions, values: Array, grown: Callable[[Array], Array] | None = None) -> Array:
     """(n,) a rate ``values[0]`` in 1/s times the time and a coefficient ``values[1]`` in 1/K times the temperature.
 
+    ``grown`` (n,) of the time stands for it where the drift is none of a steady pace.
     The sensor's body follows the temperature that was logged by a first-order lag of ``values[2]`` s, and is as warm as
     that where the recording begins. The coefficient does nothing without a temperature that moves, the rate nothing
     where that temperature rises as evenly as a clock.
@@ -47,7 +49,8 @@ def drift(conditions: Conditions, values: Array) -> Array:
     if warmer_k.size and values[1] != 0.0:
         moved += values[1] * (lag(warmer_k, 1.0 / values[2], float(conditions.step_s)) if values[2] > 0.0 else warmer_k)
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
-        moved += values[0] * running_time_s(conditions)
+        time_s = running_time_s(conditions)
+        moved += values[0] * (time_s if grown is None else grown(time_s))
     return moved
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_clock import TEMPERATURE_LAG, TEMPERATURE_LAGS, drift
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
+FIRST_S = 100.0  # over which the rate is the mean one, whatever the exponent
+
 
 class ZeroDrift(Effect):
-    """+ d t; with the temperature logged, + d t + b_T dT.
+    """+ d T (t/T)^m, T = 100 s; with the temperature logged, + b_T dT.
 
-    dT is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead
-    of a die in its package. b_T is inert without a temperature that moves, d where the temperature is a straight line
-    in time.
+    What diffuses into a sensor comes with the root of time (Crank 1975, ch. 4), what creeps under its own stress with a
+    lower power, and a drift that grows with a higher one. dT is of the sensor's body, which follows the logged
+    temperature by a first-order lag: a probe in the air is ahead of a die in its package. b_T is inert without a
+    temperature that moves, d where the temperature is a straight line in time.
     """
 
     name, family, stage, place = "zero_drift", "zero", "sensor", "sensor"
@@ -32,8 +37,9 @@ class ZeroDrift(Effect):
             channel="temperature",
         ),
         TEMPERATURE_LAG,
+        EffectParameter("exponent", "1", "power of the time, 1 for a steady drift", None, 0.4, 2.0, 0.05, absent=1.0),
     )
-    shapes = TEMPERATURE_LAGS
+    shapes = (*({**lag, "exponent": 1.0} for lag in TEMPERATURE_LAGS), {**TEMPERATURE_LAGS[0], "exponent": 0.5})
     exposed_by = by("rests", "idle", "pauses")
     separated_by = {
         "coloured_noise": by("repeats"),
@@ -48,11 +54,17 @@ class ZeroDrift(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the drift since the session's start."""
-        return signal + drift(conditions, values)
+        return signal + drift(conditions, values, lambda time_s: _grown(time_s, float(values[3])))
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """Subtract the drift; exact. None with a temperature coefficient: a stream carries no temperature."""
-        rate, coefficient, _ = (float(value) for value in values)
+        rate, coefficient, _, exponent = (float(value) for value in values)
         if coefficient != 0.0:
             return None
-        return Memoryless(lambda signal, time_s: signal - rate * time_s, f"x -= {c_number(rate)} * t;")
+        body = f"x -= {c_number(rate * FIRST_S)} * pow(t / {c_number(FIRST_S)}, {c_number(exponent)});"
+        return Memoryless(lambda signal, time_s: signal - rate * _grown(time_s, exponent), body)
+
+
+def _grown(time_s: Array, exponent: float) -> Array:
+    """(n,) the time that a steady drift would take to come as far."""
+    return time_s if exponent == 1.0 else np.asarray(FIRST_S * (time_s / FIRST_S) ** exponent)
