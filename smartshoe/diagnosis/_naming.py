@@ -49,7 +49,7 @@ def names_of(
 
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
-    are. Where much is left beside the largest, that one alone is named if it is likelier there than not, as half sure.
+    are. Where much is left beside the largest, that one alone is named if it cannot be ruled out, as half sure at most.
     ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
     curve: none of these is more than half sure, and nothing is named for its size.
 
@@ -67,7 +67,8 @@ def names_of(
     if is_followed or not larger:
         return larger
     largest = max(larger, key=lambda one: one.member.size)
-    return (_doubted(largest),) if probability_of_kind(largest.member, left, thresholds) > 0.5 else ()
+    kind = probability_of_kind(largest.member, left, thresholds)
+    return (_doubted(largest),) if kind > thresholds.equivalent_odds * (1.0 - kind) else ()
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
@@ -87,6 +88,7 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     # Of a family of one law nothing follows better or worse than another; curves of other families follow too.
     others = max(len(kin), len(one.laws) - 1 if one.effect.is_memoryless else 0)
     sure = probability_of_kind(one, left, thresholds, lawless=bool(others))
+    sure = sure if sure >= thresholds.least_confidence else min(sure, 0.5)
     return Name(one, nearest, sure, 1.0 / (1.0 + others), tuple(kin), True, is_sure)
 
 

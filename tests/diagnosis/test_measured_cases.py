@@ -324,7 +324,7 @@ class TestSensors:
         assert "shuffle the loads" in _limit(found, "with the clock")
         assert found.verdict == "partly_explained"
         assert found.extended is not None
-        assert found.extended.variance_explained_percent > 99.0
+        assert found.extended.variance_explained_percent > 98.0
 
     @pytest.mark.parametrize("name", _few(SENSORS))
     def test_the_baseline_is_as_good_as_a_plain_standard_linear_solid(self, measured: Path, name: str) -> None:

@@ -176,6 +176,19 @@ def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> 
     assert name.law == pytest.approx(1.0 / 3.0)
 
 
+def test_a_kind_without_a_law_is_half_sure_at_most_or_as_sure_as_a_name_must_be() -> None:
+    (block, *_) = blocks()["static_curve"]
+    margins = (("dead_band", 500.0), ("contact_area", 510.0))
+    seen = set()
+    for departed in (0.3, 1.5, 2.0, 4.0):
+        one = member(block, size=0.06, departed=departed, laws=margins)
+        name = only(names_of([one], 0.03, STANDARD))
+        kind = probability_of_kind(one, 0.03, STANDARD, lawless=True)
+        assert name.confidence == (kind if kind >= STANDARD.least_confidence else min(kind, 0.5))
+        seen.add((kind >= STANDARD.least_confidence, kind > 0.5))
+    assert seen == {(True, True), (False, True), (False, False)}
+
+
 def test_a_block_is_named_by_a_law_of_its_own_stage() -> None:
     """A set grows with what the wall has borne: a drift by the clock may come near, and is none of a wall."""
     (block,) = blocks()["zero"]
@@ -204,7 +217,7 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
 
 
 def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_what_is_left() -> None:
-    doubted = [member(size=0.05, departed=4.0), member("rate_gain", size=0.02, departed=4.0)]
+    doubted = [member(size=0.05, departed=5.0), member("rate_gain", size=0.02, departed=5.0)]
     assert not names_of(doubted, 0.03, STANDARD)
     name = only(names_of(doubted, 0.03, STANDARD, is_followed=True))
     assert name.effect.name == "linear_leak"
@@ -212,14 +225,17 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
     assert name.confidence == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
 
 
-def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_is_likelier_than_not() -> None:
+def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cannot_be_ruled_out() -> None:
     likely, less, small = (
-        member(size=0.05, departed=2.5), member("rate_gain", size=0.04, departed=2.5), member(size=0.05, departed=4.0)
+        member(size=0.05, departed=2.5), member("rate_gain", size=0.04, departed=2.5), member(size=0.05, departed=4.8)
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     name = only(names_of([less, likely], 0.03, STANDARD))
     assert (name.member, name.confidence, name.is_sure) == (likely, 0.5, False)
-    assert not names_of([small, less], 0.03, STANDARD)  # the largest is less likely than not
+    open_ = replace(likely, departed=3.5)
+    assert only(names_of([open_], 0.03, STANDARD)).confidence == probability_of_kind(open_, 0.03, STANDARD) < 0.5
+    assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
+    assert not names_of([small, less], 0.03, STANDARD)  # the largest can be ruled out
     assert not names_of([likely], 0.051, STANDARD)  # and more is left than it explains
 
 
