@@ -68,9 +68,6 @@ def softened(load, strength, width, widening, raised, largest, dead_zone, share,
     wide = ``width`` + ``widening`` M^2; M is the largest phi so far, ``largest`` before the record, and counts less
     ``dead_zone``; r is `rise`.
     """
-    if share < 0.0:  # an arm that pushes leaves a tenth of the wall's own stiffness, at least, softened or not
-        raised = min(raised, max(-0.9 / share - 1.0, 0.0))
-        strength = min(strength, max(0.9 + share * (1.0 + raised), 0.0))
     # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
     bound = strength / width * (3.0 + 2.0 / width)
     arm = held = 0.0

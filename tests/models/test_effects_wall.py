@@ -378,3 +378,15 @@ def test_beside_an_arm_that_pushes_no_gas_is_asked_for_less_than_a_vacuum() -> N
         back = made.inverse_beside(Arm(share, 0.23), np.array([5.0]), step_s)
         back.reset()
         assert back.push(pressure, beside.time_s) == pytest.approx(load, abs=5e-4)
+
+
+@pytest.mark.parametrize("share", [-0.1, -0.3, -0.6])
+def test_a_softened_wall_beside_an_arm_that_pushes_is_undone(share: float) -> None:
+    made, step_s = effect("mullins_softening"), 0.002
+    time_s = step_s * np.arange(20001)
+    load = np.interp(time_s, [0.0, 10.0, 20.0, 30.0, 40.0], [0.0, 0.6, 0.1, 1.0, 0.2])
+    beside = Conditions(time_s, load, step_s).within(share, 0.23)
+    values = np.array([0.8, 0.5, 0.3, 0.0])
+    back = made.inverse_beside(Arm(share, 0.23), values, step_s)
+    back.reset()
+    assert back.push(made.apply(load, beside, values), time_s) == pytest.approx(load, abs=2e-3)

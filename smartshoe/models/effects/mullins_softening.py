@@ -58,23 +58,27 @@ class MullinsSoftening(Effect):
         if values[0] == 0.0:
             return signal.copy()
         before, out = float(conditions.before.get("largest_load", 0.0)), np.empty(signal.size)
-        given = *_amounts(values), before, dead_zone(conditions), *arm_beside(conditions)
+        arm = arm_beside(conditions)
+        given = *_amounts(values, arm[0]), before, dead_zone(conditions), *arm
         softened(np.ascontiguousarray(signal), *given, out)
         return out
 
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
-        return BesideArm(self.inverse(values, step_s), arm, step_s)
+        return BesideArm(_undone(*_amounts(values, arm.share)), arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
-        from smartshoe.kernels.memory import CLOSE, STEPS, softened_undone
+        return _undone(*_amounts(values))
 
-        strength, width, widening, raised = _amounts(values)
 
-        def body(of: Mapping[str, str]) -> str:
-            most, per_width, a = of["largest"], c_number(1.0 / width), c_number(raised)
-            return f"""{{
+def _undone(strength: float, width: float, widening: float, raised: float) -> Undone:
+    """The inverse, of `_amounts`."""
+    from smartshoe.kernels.memory import CLOSE, STEPS, softened_undone
+
+    def body(of: Mapping[str, str]) -> str:
+        most, per_width, a = of["largest"], c_number(1.0 / width), c_number(raised)
+        return f"""{{
     const double rise = 1.0 + {a} * tanh({most} * {most} * {per_width}), highest = {most} * rise;
     if (x < highest) {{
         const double below = highest * highest - x * x;
@@ -105,13 +109,20 @@ class MullinsSoftening(Effect):
     }}
 }}"""
 
-        constants = (strength, width, widening, raised, LEAST_DEAD_ZONE)
-        return Undone(softened_undone, constants, np.zeros(1), ("largest",), body)
+    constants = (strength, width, widening, raised, LEAST_DEAD_ZONE)
+    return Undone(softened_undone, constants, np.zeros(1), ("largest",), body)
 
 
-def _amounts(values: Array) -> tuple[float, float, float, float]:
-    """What is lost below the largest load, its width, what that grows by, and the most that a first loading rises."""
+def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, float]:
+    """What is lost below the largest load, its width, what that grows by, and the most that a first loading rises.
+
+    Beside an arm of ``share``: one that pushes leaves a tenth of the wall's own stiffness, at least, softened or not.
+    """
     gained, width, at_once, widening = (float(value) for value in values)
     below = (1.0 - at_once) * gained
     lost = below / (1.0 + below) / math.tanh(0.75 / (width + widening))
-    return lost, width, widening, at_once * gained / math.tanh(0.75 / width)
+    raised = at_once * gained / math.tanh(0.75 / width)
+    if share < 0.0:
+        raised = min(raised, max(-0.9 / share - 1.0, 0.0))
+        lost = min(lost, max(0.9 + share * (1.0 + raised), 0.0))
+    return lost, width, widening, raised
