@@ -80,7 +80,10 @@ class Thresholds:
         0.4, "share of an effect's size", "a departure from which on the law is unsure", "effects.md: 5 to 40 %"
     )
     equivalent_odds: float = threshold(
-        0.3, "odds", "of another law from which on it cannot be ruled out", "about 1 in 4"
+        0.3,
+        "odds",
+        "of another law, or of a kind where none is sure, from which on it cannot be ruled out",
+        "about 1 in 4",
     )
     kind_odds: tuple[float, ...] = threshold(
         (2.77, -1.12, -0.99, -1.09, -2.22),
