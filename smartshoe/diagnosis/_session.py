@@ -304,11 +304,15 @@ def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -
 
 
 def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> bool:
-    """Whether a recording begins at a load (n,) of which its gauge (n,) reads next to nothing: the load cell's tare."""
+    """Whether a recording begins at a load (n,) of which its gauge (n,) reads next to nothing: the load cell's tare.
+
+    A unit is pressed only: where the load falls clearly below that later, it was none, and the gauge was set to zero.
+    """
     first = slice(0, max(1, round(thresholds.settled_s / step_s)))
-    load, reading = load[first], reading[first]
-    still = np.ptp(load) < thresholds.standing
-    return bool(still and abs(float(reading.mean())) < thresholds.same * abs(float(load.mean())))
+    begun, reading = load[first], reading[first]
+    still = np.ptp(begun) < thresholds.standing
+    lowest = float(np.quantile(load, 0.01)) > float(begun.mean()) - thresholds.standing
+    return bool(still and lowest and abs(float(reading.mean())) < thresholds.same * abs(float(begun.mean())))
 
 
 def _rests_levelled(load: Array, level: float, reach: float) -> Array:
