@@ -306,13 +306,14 @@ def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -
 def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> bool:
     """Whether a recording begins at a load (n,) of which its gauge (n,) reads next to nothing: the load cell's tare.
 
-    A unit is pressed only: where the load falls clearly below that later, it was none, and the gauge was set to zero.
+    A unit is pressed only: where load and reading fall clearly below that later, it began loaded, and its gauge was set
+    to zero there.
     """
     first = slice(0, max(1, round(thresholds.settled_s / step_s)))
-    begun, reading = load[first], reading[first]
-    still = np.ptp(begun) < thresholds.standing
-    lowest = float(np.quantile(load, 0.01)) > float(begun.mean()) - thresholds.standing
-    return bool(still and lowest and abs(float(reading.mean())) < thresholds.same * abs(float(begun.mean())))
+    begun, read = (float(one[first].mean()) for one in (load, reading))
+    still = np.ptp(load[first]) < thresholds.standing
+    fall = min(level - float(np.quantile(one, 0.01)) for level, one in ((begun, load), (read, reading)))
+    return bool(still and fall < thresholds.standing and abs(read) < thresholds.same * abs(begun))
 
 
 def _rests_levelled(load: Array, level: float, reach: float) -> Array:

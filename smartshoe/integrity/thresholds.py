@@ -53,8 +53,8 @@ class Thresholds:
     tolerable: float = threshold(
         1.5e-3,
         "share of full scale",
-        "structure that small imperfections of a good unit add up to; beside a sure cause one that is larger and"
-        " likelier than not is named",
+        "structure that small imperfections of a good unit add up to; a larger effect is named beside another cause"
+        " where it is likelier there than not",
         "three effects of 0.08 % each: 0.14 %",
     )
     extrapolates: float = threshold(
@@ -82,7 +82,7 @@ class Thresholds:
     equivalent_odds: float = threshold(
         0.3,
         "odds",
-        "of another law, or of a kind where none is sure, from which on it cannot be ruled out",
+        "of another law, or of the one kind that is named, from which on it cannot be ruled out",
         "about 1 in 4",
     )
     kind_odds: tuple[float, ...] = threshold(

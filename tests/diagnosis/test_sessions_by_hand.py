@@ -194,12 +194,15 @@ def test_a_unit_begins_unloaded_where_its_gauge_reads_a_quarter_of_a_still_load(
     assert not told(swaying, 0.0 * load)
     swaying[5] -= 1e-6
     assert told(swaying, 0.0 * load)
-    # A unit is pressed only: it began loaded where its load falls clearly below that later, but for a spike.
-    for later_load, is_tare in ((0.4 - 0.99 * STANDARD.standing, True), (0.4 - 1.01 * STANDARD.standing, False)):
-        assert told(np.concatenate([np.full(20, 0.4), np.full(20, later_load)]), np.zeros(40)) == is_tare
-    spiky = np.full(400, 0.4)
-    spiky[100:103] = 0.0
-    assert told(spiky, 0.0 * spiky)
+    # A unit is pressed only: it began loaded where load and reading fall clearly below that later, but for a spike.
+    for by, is_tare in ((0.99 * STANDARD.standing, True), (1.01 * STANDARD.standing, False)):
+        falling = np.concatenate([np.zeros(20), np.full(20, -by)])
+        assert told(0.4 + 2.0 * falling, falling) == told(0.4 + falling, 2.0 * falling) == is_tare
+        assert told(0.4 + 2.0 * falling, 0.0 * falling)
+        assert told(0.0 * falling + 0.4, 2.0 * falling)
+    spiky = np.zeros(400)
+    spiky[100:103] = -1.0
+    assert told(0.4 + spiky, spiky)
     # Of slow logs a single sample.
     assert begins_unloaded(np.array([0.4, 0.9]), np.array([0.0, 0.9]), 5.0, STANDARD)
 
