@@ -61,8 +61,11 @@ def names_of(
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
         is_firm = not is_clocked and any(one.confidence >= thresholds.least_confidence for one in likely)
-        large = [one for one in likely if is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable]
-        return tuple(one for one in likely if one.is_sure or one in large)
+        return tuple(
+            one
+            for one in likely
+            if one.is_sure or (is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable)
+        )
     larger = tuple(one for one in likely if one.member.size > left)
     if is_followed or not larger:
         return larger
@@ -87,8 +90,8 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
         return Name(one, nearest, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
     # Of a family of one law nothing follows better or worse than another; curves of other families follow too.
     others = max(len(kin), len(one.laws) - 1 if one.effect.is_memoryless else 0)
-    sure = probability_of_kind(one, left, thresholds, lawless=bool(others))
-    sure = sure if sure >= thresholds.least_confidence else min(sure, 0.5)
+    lawless = probability_of_kind(one, left, thresholds, lawless=bool(others))
+    sure = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
     return Name(one, nearest, sure, 1.0 / (1.0 + others), tuple(kin), True, is_sure)
 
 

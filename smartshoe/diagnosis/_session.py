@@ -311,9 +311,10 @@ def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thre
     """
     first = slice(0, max(1, round(thresholds.settled_s / step_s)))
     begun, read = (float(one[first].mean()) for one in (load, reading))
-    still = np.ptp(load[first]) < thresholds.standing
+    if not (np.ptp(load[first]) < thresholds.standing and abs(read) < thresholds.same * abs(begun)):
+        return False
     fall = min(level - float(np.quantile(one, 0.01)) for level, one in ((begun, load), (read, reading)))
-    return bool(still and fall < thresholds.standing and abs(read) < thresholds.same * abs(begun))
+    return fall < thresholds.standing
 
 
 def _rests_levelled(load: Array, level: float, reach: float) -> Array:

@@ -231,9 +231,10 @@ def _shaken(recordings: list[Recording], seed: int) -> list[Recording]:
 
 
 @cache
-def _sensor(measured: Path, name: str) -> Diagnosis:
+def _sensor(measured: Path, name: str, seed: int = 0) -> Diagnosis:
     fit, hold, column = SENSORS[name]
-    return diagnose(_files(measured, fit, column), hold_out=_files(measured, hold, column))
+    fitted, judges = _files(measured, fit, column), _files(measured, hold, column)
+    return diagnose(_shaken(fitted, seed), hold_out=_shaken(judges, seed + 10 if seed else 0))
 
 
 def _columns(recording: Recording, pole_per_s: float) -> tuple[Array, Array]:
@@ -289,10 +290,7 @@ class TestSensors:
     @pytest.mark.parametrize(("seed", "count"), [(0, 1), (1, 2), (2, 2)])
     def test_two_cycles_tell_two_causes_at_most_and_the_right_ones(self, measured: Path, seed: int, count: int) -> None:
         """Of the readings as they are the curve alone, with noise of a hundred-thousandth what relaxes, too."""
-        fit, hold, column = SENSORS["vhb_two_rates"]
-        found = diagnose(
-            _shaken(_files(measured, fit, column), seed), hold_out=_shaken(_files(measured, hold, column), seed + 10)
-        )
+        found = _sensor(measured, "vhb_two_rates", seed)
         families = {cause.effect.family for cause in found.causes}
         assert families <= KINDS["vhb_two_rates"]
         assert len(found.causes) == len(families) == count
@@ -302,9 +300,7 @@ class TestSensors:
     @pytest.mark.parametrize("name", ["air", "velostat", "vhb_two_rates"])
     def test_the_first_cause_does_not_hang_on_last_digits(self, measured: Path, name: str, seed: int) -> None:
         """Of the microfluidic sensor, which no equation follows, it does: the curve is hardly sure there."""
-        fit, hold, column = SENSORS[name]
-        judges = _files(measured, hold, column)
-        found = diagnose(_shaken(_files(measured, fit, column), seed), hold_out=_shaken(judges, seed + 10))
+        found = _sensor(measured, name, seed)
         assert found.causes
         assert found.causes[0].effect.family in KINDS[name]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import Conditions
 
@@ -13,6 +15,15 @@ def arm_beside(conditions: Conditions) -> tuple[float, float, float, float]:
     share, rate_per_s = conditions.relaxing or (0.0, 0.0)
     decay, now, before = (float(value) for value in hold_coefficients(rate_per_s * float(conditions.step_s)))
     return share, decay, now, before
+
+
+def most_beside(share: float) -> float:
+    """By how much more than its own a spring may deform beside an arm of ``share``, over its own.
+
+    An arm that pushes, as a creeping unit's does, leaves a tenth of the spring's stiffness, at least; else a fit would
+    come upon numbers without bounds.
+    """
+    return max(-0.9 / share - 1.0, 0.0) if share < 0.0 else math.inf
 
 
 def relaxed(deformation: Array, conditions: Conditions) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import GasBesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects._wall_loop import arm_beside, relaxed
+from smartshoe.models.effects._wall_loop import arm_beside, most_beside, relaxed
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm
@@ -39,12 +39,13 @@ class GasCompression(Effect):
         """The pressure of the stiffer gas."""
         from smartshoe.kernels.wall_loop import compressed
 
-        ratio = _beside(float(values[0]), (conditions.relaxing or (0.0, 0.0))[0])
+        arm = arm_beside(conditions)
+        ratio = _beside(float(values[0]), arm[0])
         if ratio == 0.0:
             return signal.copy()
         # The load of which the linear core made the signal.
         load, out = signal + relaxed(signal, conditions), np.empty(signal.size)
-        compressed(load, ratio, _stiffness(ratio)[0], *arm_beside(conditions), out)
+        compressed(load, ratio, _stiffness(ratio)[0], *arm, out)
         return out
 
     def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
@@ -65,13 +66,12 @@ class GasCompression(Effect):
 def _beside(ratio: float, share: float) -> float:
     """The largest ratio up to this one beside an arm of ``share``.
 
-    An arm that pushes, as a creeping unit's does, leaves a tenth of the wall's own stiffness, at least: a gas that
-    stiffens as much as it would otherwise ask for less than no absolute pressure (`kernels.wall_loop.compressed`).
+    A gas that stiffens more beside an arm that pushes would ask for less than no absolute pressure
+    (`kernels.wall_loop.compressed`).
     """
     from smartshoe.models.core import USUAL_WALL_RATIO
 
-    wall = USUAL_WALL_RATIO - 1.0
-    return ratio if share >= 0.0 else min(ratio, max(-wall * (0.9 / share + 1.0) - 1.0, 0.0))
+    return min(ratio, max((USUAL_WALL_RATIO - 1.0) * most_beside(share) - 1.0, 0.0))
 
 
 def _stiffness(ratio: float) -> tuple[float, float]:

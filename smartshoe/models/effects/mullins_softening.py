@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_loop import arm_beside
+from smartshoe.models.effects._wall_loop import arm_beside, most_beside
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, dead_zone
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -121,8 +121,7 @@ def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, fl
     gained, width, at_once, widening = (float(value) for value in values)
     below = (1.0 - at_once) * gained
     lost = below / (1.0 + below) / math.tanh(0.75 / (width + widening))
-    raised = at_once * gained / math.tanh(0.75 / width)
+    raised = min(at_once * gained / math.tanh(0.75 / width), most_beside(share))
     if share < 0.0:
-        raised = min(raised, max(-0.9 / share - 1.0, 0.0))
         lost = min(lost, max(0.9 + share * (1.0 + raised), 0.0))
     return lost, width, widening, raised

@@ -61,7 +61,10 @@ class ZeroDrift(Effect):
         rate, coefficient, _, exponent = (float(value) for value in values)
         if coefficient != 0.0:
             return None
-        body = f"x -= {c_number(rate * FIRST_S)} * pow(t / {c_number(FIRST_S)}, {c_number(exponent)});"
+        # A steady drift costs firmware no power.
+        power = f"{c_number(FIRST_S)} * pow(t / {c_number(FIRST_S)}, {c_number(exponent)})"
+        grown = "t" if exponent == 1.0 else power
+        body = f"x -= {c_number(rate)} * {grown};"
         return Memoryless(lambda signal, time_s: signal - rate * _grown(time_s, exponent), body)
 
 
