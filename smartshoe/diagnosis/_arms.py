@@ -17,6 +17,8 @@ from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
 
+PROMISING = 3  # of fits from far away, that go on to their end: a resolution
+
 
 def with_another_pole(state: State, sessions: Sequence[Session]) -> State:
     """The best of fits from several relaxation rates without the effects that add arms to the baseline's.
@@ -53,8 +55,9 @@ def with_a_usual_arm(state: State, sessions: Sequence[Session]) -> State:
     """
     starts = [with_arm(state.fit.model, arm) for arm in _usual_arms(state.thresholds)]
     found = _fits_from(starts, state, sessions, BREADTH)  # far from any fit, one linearisation does not decide
-    usual = [one for one in found if not is_beyond_memory(one.model, state.thresholds)] or found
-    return _at_best_of(usual, state, sessions)
+    few = dict.fromkeys((*_promising(_usual(found, state), state), *_promising(found, state)))
+    ended = [fit(one.likelihood, one.model) for one in few]
+    return _at_best_of(_usual(ended, state), state, sessions)
 
 
 def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
@@ -77,7 +80,8 @@ def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     """
     bare = _without_core_effects(state.fit.model)
     arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(state.fit.model))]
-    return _at_best_of(_fits_from([with_arm(bare, arm) for arm in arms], state, sessions), state, sessions)
+    found = _fits_from([with_arm(bare, arm) for arm in arms], state, sessions)
+    return _at_best_of([fit(one.likelihood, one.model) for one in _promising(found, state)], state, sessions)
 
 
 def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
@@ -117,6 +121,16 @@ def _fits_from(
         few = dict.fromkeys((best, *alone))  # what is asked for is often one of these
         found += [fit(likelihood, with_members(given, one, start, likelihood), FEW_STEPS) for one in few]
     return found
+
+
+def _usual(found: Sequence[Fit], state: State) -> Sequence[Fit]:
+    """Those whose arm is one that laws remember by; all where there is none."""
+    return [one for one in found if not is_beyond_memory(one.model, state.thresholds)] or found
+
+
+def _promising(found: Sequence[Fit], state: State) -> list[Fit]:
+    """The best of fits that began far from any end, to go on with: half way the rest is taken for other effects."""
+    return sorted(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))[:PROMISING]
 
 
 def _at_best_of(found: Sequence[Fit], state: State, sessions: Sequence[Session]) -> State:

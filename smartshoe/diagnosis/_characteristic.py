@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -110,6 +111,34 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
         f"over this load the {sensor.name} rises by {middle:.3g} {unit}/{of_load} about the middle and by {ends:.3g}"
         f" {unit}/{of_load} at the ends: {shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"
     )
+
+
+def conductance_of(recordings: Sequence[Recording], thresholds: Thresholds) -> str | None:
+    """A sentence where the readings are resistances, and the conductance follows the load by a line far better.
+
+    Contacts that grow with the load conduct in proportion to it (Holm 1967).
+    """
+    if any(one.sensor.unit.quantity != "resistance" for one in recordings):
+        return None
+    by_line = []
+    for load, sensor in ((one.load, one.sensor) for one in recordings):
+        present = load.present & sensor.present
+        x, y = load.values[present], sensor.values[present]
+        if min(np.ptp(x), np.ptp(y)) == 0.0 or y.min() <= 0.0:
+            return None
+        by_line.append([_by_line(x, y), _by_line(x, 1.0 / y)])
+    resistance, conductance = np.mean(by_line, axis=0)
+    if thresholds.clear**2 * (1.0 - conductance) > 1.0 - resistance:
+        return None
+    return (
+        f"a line of the load explains {100 * resistance:.0f} % of the resistance's variance and"
+        f" {100 * conductance:.0f} % of the conductance's: diagnose that (a column of 1/{recordings[0].sensor.name}),"
+        " whose curve is milder and hides less"
+    )
+
+
+def _by_line(x: Array, y: Array) -> float:
+    return float(np.corrcoef(x, y)[0, 1]) ** 2
 
 
 def _explained(values: Array, by: Array) -> float:

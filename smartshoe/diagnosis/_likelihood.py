@@ -61,14 +61,15 @@ class Likelihood:
         return np.asarray((seen.T @ seen - cross.T @ self._inverse[k] @ cross) / self.noise_sd**2)
 
     def cost(self, model: ExtendedModel) -> float:
-        """Sum of squares over what is fitted, in units of the noise's variance."""
+        """Sum of squares over what is fitted, in units of the noise's variance; infinite of a model that runs off."""
         self._about(model)
         traces = [model.trace(session.conditions) for session in self.sessions]
         self._last = model, traces  # the slopes of a step that is taken begin with them
         total = 0.0
-        for k, (session, (reading, _)) in enumerate(zip(self.sessions, traces, strict=True)):
-            total += float(self._gram(k, (session.reading - reading)[:, None])[0, 0])
-        return total
+        with np.errstate(over="ignore", invalid="ignore"):  # a leak beside an arm that pushes grows without bounds
+            for k, (session, (reading, _)) in enumerate(zip(self.sessions, traces, strict=True)):
+                total += float(self._gram(k, (session.reading - reading)[:, None])[0, 0])
+        return total if math.isfinite(total) else math.inf
 
     def normal(self, model: ExtendedModel, rows: Sequence[Array] | None = None) -> tuple[float, Array, Array]:
         """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p); ``rows`` where they are known."""

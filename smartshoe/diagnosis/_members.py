@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class Member:
     ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
     place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood. ``others_depart``: rms by
     which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
-    with what another member adds, 0 where all pull against it.
+    with what another member adds, 0 where all pull against it. ``is_ended``: it lies where it turns into an effect of
+    another kind.
     """
 
     effect: Effect
@@ -50,6 +51,12 @@ class Member:
     fall: float
     others_depart: float = 0.0
     likeness: float = 0.0
+    is_ended: bool = False
+
+    @property
+    def is_any_curve(self) -> bool:
+        """Whether it is a curve of no kind, whose ``laws`` are all curves; with `is_ended` all of them are one."""
+        return self.effect.is_memoryless and (self.effect.is_flexible or self.is_ended)
 
     @property
     def name(self) -> str:
@@ -61,7 +68,7 @@ def members_of(
     evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
 ) -> tuple[Member, ...]:
     chosen = [evidence.given.candidates[member] for member in best.members]
-    less = [fit(likelihood, extended.model.without(one.name), FEW_STEPS) for one in chosen]
+    less = [fit(likelihood, _without(one.name, extended.model), FEW_STEPS) for one in chosen]
     whole = _left(likelihood, extended)
     added = np.array([_left(likelihood, one) - whole for one in less]).reshape(len(less), whole.size)
     inner = added @ added.T
@@ -72,6 +79,7 @@ def members_of(
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
         is_material = sizes[k] > evidence.thresholds.material
+        is_ended = bool(extended.model.part(one.name).kind_ends_at)
         made.append(
             Member(
                 one.effect,
@@ -79,10 +87,11 @@ def members_of(
                 best.departed[k],
                 alternatives(evidence, best, member, refused),
                 less[k],
-                _other_laws(one, less[k], likelihood, extended) if is_material else (),
+                _other_laws(one, less[k], likelihood, extended, is_ended=is_ended) if is_material else (),
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
+                is_ended,
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))
@@ -93,13 +102,23 @@ def _left(likelihood: Likelihood, found: Fit) -> Array:
     return np.concatenate([residual_of(one, found.model)[one.fitted] for one in likelihood.sessions])
 
 
-def _other_laws(one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit) -> tuple[Alternative, ...]:
-    """The other laws of a member's family, each fitted in its place, nearest first; of a flexible curve all curves."""
+def _without(name: str, model: ExtendedModel) -> ExtendedModel:
+    """``model`` without an effect; without any curve where it is one that lies where its kind ends: it bends others."""
+    part = model.part(name)
+    if not (part.effect.is_memoryless and part.kind_ends_at):
+        return model.without(name)
+    return replace(model, parts=tuple(one for one in model.parts if not one.effect.is_memoryless))
+
+
+def _other_laws(
+    one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit, *, is_ended: bool
+) -> tuple[Alternative, ...]:
+    """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
+    of_curves = one.effect.is_memoryless and (one.effect.is_flexible or is_ended)
     channels = {e.name for e in available(likelihood.sessions)}
     found = []
     for law in catalogue().values():
-        is_curve = one.effect.is_flexible and one.effect.is_memoryless
-        is_other = law.is_memoryless if is_curve else law.family == one.effect.family
+        is_other = law.is_memoryless if of_curves else law.family == one.effect.family
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         start = begun_with(law, less.model, likelihood)

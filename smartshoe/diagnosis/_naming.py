@@ -53,7 +53,7 @@ def names_of(
     ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
     curve: none of these is more than half sure, and nothing is named for its size.
 
-    A flexible block is named by the law that comes nearest.
+    A flexible block, and a curve that lies where its kind ends, is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     if is_clocked:
@@ -77,33 +77,46 @@ def names_of(
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     kind = probability_of_kind(one, left, thresholds)
     is_sure = kind >= thresholds.least_confidence
+    by = _law_in_its_place(one)
+    if by is not None and by.margin <= thresholds.departure**2 * one.fall:
+        # The block is how that law departs: the others are weighed against it.
+        followed = catalogue()[str(by.effect)]
+        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in _kin_of(followed))
+        as_law = replace(one, laws=beside, fall=one.fall - by.margin)
+        return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
     if not one.effect.is_flexible:
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
-    nearest = _nearest_law(one)
-    by = next((a for a in one.laws if a.effect == nearest.name), None)
-    kin = [e.name for e in catalogue().values() if e.family == nearest.family and e is not nearest]
-    if by is not None and by.margin <= thresholds.departure**2 * one.fall:
-        # The block is how that law departs: the others are weighed against it.
-        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
-        as_law = replace(one, laws=beside, fall=one.fall - by.margin)
-        return Name(one, nearest, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
-    # Of a family of one law nothing follows better or worse than another; curves of other families follow too.
-    others = max(len(kin), len(one.laws) - 1 if one.effect.is_memoryless else 0)
-    lawless = probability_of_kind(one, left, thresholds, lawless=bool(others))
+    nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
+    others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
+    kin = tuple(name for name in others if name != nearest.name)
+    # Of a family of one law nothing follows better or worse than another.
+    lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
     sure = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
-    return Name(one, nearest, sure, 1.0 / (1.0 + others), tuple(kin), True, is_sure)
+    return Name(one, nearest, sure, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 
 
-def _nearest_law(block: Member) -> Effect:
-    """Of a curve any law that is one; else of its family, and of its stage where there is one.
+def _law_in_its_place(one: Member) -> Alternative | None:
+    """The law that is named where it misses little: of any curve the nearest, of another block `_nearest_of_kind`."""
+    if one.is_any_curve:
+        return next(iter(one.laws), None)
+    if not one.effect.is_flexible:
+        return None
+    nearest = _nearest_of_kind(one).name
+    return next((a for a in one.laws if a.effect == nearest), None)
+
+
+def _kin_of(law: Effect) -> tuple[str, ...]:
+    """The other laws of its family."""
+    return tuple(one.name for one in catalogue().values() if one.family == law.family and one is not law)
+
+
+def _nearest_of_kind(block: Member) -> Effect:
+    """The law of a block's family that comes nearest; of no curve one of another stage.
 
     What grows with the load borne is none that goes with the clock.
     """
-    laws = catalogue()
-    if block.effect.is_memoryless and block.laws:
-        return laws[str(block.laws[0].effect)]
-    family = [e for e in laws.values() if e.family == block.effect.family]
+    family = [e for e in catalogue().values() if e.family == block.effect.family]
     alike = [e for e in family if e.stage == block.effect.stage and not block.effect.is_memoryless]
     margins = {a.effect: a.margin for a in block.laws}
     return min(alike or family, key=lambda e: margins.get(e.name, math.inf))

@@ -20,29 +20,6 @@ def parameters_of(fit: Fit, name: str, scale: Scale) -> dict[str, Parameter]:
     return {key: _parameter(fit, k, scale) for k, owner, key in _told(fit) if owner == name}
 
 
-def may_be_none(fit: Fit, name: str) -> bool:
-    """Whether the 95 % region of an effect's strengths holds none at all: by Wald's statistic of all of them together.
-
-    Not of a flexible block, whose weights share a prior, nor where a strength is held by a bound, as far from none as
-    it may be: the curvature there is no interval's.
-    """
-    if fit.model.part(name).effect.is_flexible:
-        return False
-    from scipy.special import chdtri
-
-    parameters, theta = fit.model.parameters, fit.model.theta
-    places = [k for k, owner, _ in _told(fit) if owner == name and parameters[k][1].null is not None]
-    strengths = [parameters[k][1] for k in places]
-    if any(
-        value != one.null and value in (one.lower, one.upper)
-        for value, one in zip(theta[places], strengths, strict=True)
-    ):
-        return False
-    away = theta[places] - np.array([one.null for one in strengths], dtype=np.float64)
-    covariance = fit.covariance[np.ix_(places, places)]
-    return float(away @ np.linalg.pinv(covariance, hermitian=True) @ away) < float(chdtri(len(places), 0.05))
-
-
 def joint_parameters(fit: Fit, scale: Scale) -> tuple[dict[str, Parameter], tuple[tuple[float, ...], ...]]:
     """Every effect's parameters as ``effect.parameter``, and their covariance in the same units and order."""
     told = _told(fit)

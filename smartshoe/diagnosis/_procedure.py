@@ -11,7 +11,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
-from smartshoe.diagnosis._characteristic import characteristic_of, friction_of
+from smartshoe.diagnosis._characteristic import characteristic_of, conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._force import force_error, force_of, undoes
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
@@ -19,7 +19,7 @@ from smartshoe.diagnosis._inference import Inference, infer, load_cycles
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
-from smartshoe.diagnosis._parameters import in_unit, joint_parameters, may_be_none, parameters_of
+from smartshoe.diagnosis._parameters import in_unit, joint_parameters, parameters_of
 from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
@@ -32,7 +32,6 @@ from smartshoe.diagnosis._verdict import (
     few_cycles_of,
     known_error,
     moved_of,
-    none_of,
     off_elsewhere,
     other_kind_of,
     parted_clocks,
@@ -192,7 +191,8 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
         start = start.with_part(added, values)
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
     friction = [friction_of(recording, thresholds) for recording in clocks.recordings[:count]]
-    limits = [*clocks.says, *ranges.says, *(said for said in friction if said is not None), *excitation.limits()]
+    said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
+    limits = [*clocks.says, *ranges.says, *(said for said in said_of_curve if said is not None), *excitation.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
@@ -223,7 +223,6 @@ def _diagnosed(
         members, everything, thresholds, is_followed=is_followed, is_clocked=given.excitation.goes_with_the_clock
     )
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
-    unclear += [(one, none_of(one)) for one in names if may_be_none(found.fit, one.member.name)]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     cycles = load_cycles(sessions, thresholds)
@@ -366,8 +365,8 @@ def _cause(
                 "share of its kind that the law misses in percent",
                 100 * missed,
                 100 * thresholds.departure**2,
-                f"the law misses {100 * missed:.2g} % of what a flexible block of its kind explains, no more than laws"
-                " do: the block stays in the extended model, the parameters are the law's in its place",
+                f"the law misses {100 * missed:.2g} % of what {member.name.replace('_', ' ')} explains, no more than"
+                " laws do: that stays in the extended model, the parameters are the law's in its place",
             )
         )
     lacking = name.effect.exposed_by - given.excitation.present

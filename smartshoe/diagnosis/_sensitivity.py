@@ -78,7 +78,9 @@ def available(sessions: Sequence[Session]) -> list[Effect]:
 def logged_channels(sessions: Sequence[Session]) -> set[str]:
     """What every recording holds besides load and reading, in the words of `smartshoe.models.effects.exposure`."""
     channels = (("temperature", "temperature_k"), ("neighbour", "neighbour"))
-    return {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
+    logged = {name for name, field in channels if all(getattr(s.conditions, field) is not None for s in sessions)}
+    begin_apart = "temperature" in logged and any(s.conditions.begins_warmer_k for s in sessions)
+    return logged | ({"temperatures"} if begin_apart else set())
 
 
 def nuisances(session: Session, pole_per_s: float) -> Array:

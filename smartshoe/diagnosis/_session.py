@@ -175,7 +175,7 @@ def prepare(
         before = left_behind.get(recording.metadata.get("continues", ""), {})
         made[index] = _session(recording, index, usable[index], scale, factor, before, thresholds)
         left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
-    sessions = [made[index] for index in range(len(recordings))]
+    sessions = _on_one_scale([made[index] for index in range(len(recordings))])
     if held_out is not None:
         return [
             replace(session, held_out=np.full(session.reading.size, out))
@@ -188,6 +188,17 @@ def prepare(
         kept.append(replace(session, held_out=(number + 1) % thresholds.held_out_every == 0))
         count = int(number[-1]) + 1
     return kept
+
+
+def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
+    """``sessions`` with all temperatures above that where the first that has one begins."""
+    logged = [kelvin for one in sessions if (kelvin := one.conditions.temperature_k) is not None]
+    return [
+        one
+        if (kelvin := one.conditions.temperature_k) is None
+        else replace(one, conditions=replace(one.conditions, temperature_k=kelvin - logged[0][0]))
+        for one in sessions
+    ]
 
 
 def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
@@ -216,10 +227,12 @@ def at_full_rate(
     sessions: Sequence[Session], usable: Sequence[Mask], scale: Scale, thresholds: Thresholds
 ) -> list[Session]:
     """The same sessions without thinning: cycles and what is held out as they are."""
-    return [
-        _session(one.recording, one.index, mask, scale, 1, one.conditions.before, thresholds, one)
-        for one, mask in zip(sessions, usable, strict=True)
-    ]
+    return _on_one_scale(
+        [
+            _session(one.recording, one.index, mask, scale, 1, one.conditions.before, thresholds, one)
+            for one, mask in zip(sessions, usable, strict=True)
+        ]
+    )
 
 
 def _session(
@@ -242,7 +255,7 @@ def _session(
     extra = {}
     temperature = _named(recording, "temperature")
     if temperature is not None:
-        extra["temperature_k"] = temperature.si - temperature.si[0]
+        extra["temperature_k"] = bridged(time_s, temperature.si, temperature.present)
     neighbour = _neighbour(recording)
     if neighbour is not None:
         extra["neighbour"] = neighbour.in_unit(scale.unit) / abs(scale.reading)

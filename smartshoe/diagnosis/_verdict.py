@@ -40,13 +40,13 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     """What is said of an effect that follows best where it is of another kind, or is the wall's own arm."""
     told = name.effect.name.replace("_", " ")
     part = model.part(name.member.name)
-    for parameter, value in zip(part.effect.parameters, part.values, strict=True):
-        if parameter.is_where_kind_ends(float(value)):
-            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            return (
-                f"what follows best as {told} has its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it"
-                " turns into an effect of another kind, so that it is not named"
-            )
+    if name.by is None and part.kind_ends_at:
+        parameter, value = part.kind_ends_at[0]
+        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+        return (
+            f"what follows best as {told} has its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it"
+            " turns into an effect of another kind, so that it is not named"
+        )
     if part.name in dict(arms_of(model)) and is_stretched(model):
         return (
             f"beside {told} the wall's own relaxation has come to the end of its range, where no wall's is: either may"
@@ -68,14 +68,6 @@ def few_cycles_of(name: Name, cycles: int) -> str:
     return (
         f"{name.effect.name.replace('_', ' ')} fits, but {cycles} load cycles show no more than {cycles} causes, so"
         " that it is not named (repeat the cycles)"
-    )
-
-
-def none_of(name: Name) -> str:
-    """What is said of an effect whose strength may be none, beside all else that moves with it."""
-    return (
-        f"{name.effect.name.replace('_', ' ')} fits, but the interval of its strength holds none, since others may do"
-        " what it does, so that it is not named"
     )
 
 

@@ -125,9 +125,11 @@ def _lacking(recording: Recording) -> str | None:
     count = len(recording.sensors)
     if count == 1:
         return None
-    return (
-        f"there are {count} readings: name one with --sensor" if count else "there is no reading: name it with --sensor"
-    )
+    if count:
+        return f"there are {count} readings: name one with --sensor"
+    others = ", ".join(one.name for one in recording.of_role("auxiliary"))
+    among = f" (columns: {others})" if others else ""
+    return f"there is no reading: name its column with --sensor{among}"
 
 
 def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> View | None:

@@ -36,6 +36,12 @@ class Part:
         """The name of the effect."""
         return self.effect.name
 
+    @property
+    def kind_ends_at(self) -> tuple[tuple[EffectParameter, float], ...]:
+        """The parameters whose values lie where it turns into an effect of another kind."""
+        valued = zip(self.effect.parameters, (float(value) for value in self.values), strict=True)
+        return tuple((one, value) for one, value in valued if one.is_where_kind_ends(value))
+
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:

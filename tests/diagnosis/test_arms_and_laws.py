@@ -38,21 +38,37 @@ def test_an_arm_is_beyond_memory_where_it_relaxes_faster_or_slower_than_laws_rem
     assert is_beyond_memory(replace(MODEL, relaxation_rate_per_s=1.0 / tau_s), STANDARD) is beyond
 
 
+class _Fitted(SimpleNamespace):
+    __hash__ = object.__hash__
+
+
 def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_most(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The best by cost and odds among fits whose arm stays one as units have; of all, where none does."""
+    """The best by cost and odds among fits whose arm stays one as units have; of all, where none does.
+
+    The three best of either go on to their end, and there they are compared.
+    """
     costs = {"best": 30.0, "a": 20.0, "b": 60.0}
     ends: dict[str, float] = {}  # where an effect takes the arm, if not nowhere
     tried: list[Any] = []
+    half_way: dict[int, _Fitted] = {}
+    gone_on: list[str] = []
+    falls: dict[str, float] = {}
     posterior = SimpleNamespace(posterior=lambda members: "ab"[members[0]])
 
-    def fitted(likelihood: Any, given: Any, steps: int) -> Any:
+    def fitted(likelihood: Any, given: Any, steps: int | None = None) -> Any:
+        if steps is None:
+            before = half_way[id(given)]
+            gone_on.append(before.one)
+            return _Fitted(model=given, cost=before.cost - falls.get(before.one, 0.0), one=before.one)
         start, one = given
         tried.append((start.names, start.relaxing_share, start.relaxation_rate_per_s, one, steps))
         rate = ends.get(one, start.relaxation_rate_per_s)
-        model = replace(start, relaxation_rate_per_s=rate)
-        return SimpleNamespace(model=model, cost=costs[one] + abs(start.relaxation_rate_per_s - 1.0 / 3.0), one=one)
+        cost = costs[one] + abs(start.relaxation_rate_per_s - 1.0 / 3.0)
+        found = _Fitted(model=replace(start, relaxation_rate_per_s=rate), cost=cost, one=one, likelihood=None)
+        half_way[id(found.model)] = found
+        return found
 
     monkeypatch.setattr(_arms, "searched", lambda start, sessions, thresholds: ("given", posterior, "best"))
     monkeypatch.setattr(_arms, "additions", lambda evidence, members, breadth: [0, 1])
@@ -63,13 +79,21 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
         fit=SimpleNamespace(model=replace(MODEL, relaxing_share=4.0, relaxation_rate_per_s=0.01)),
         likelihood=lambda sessions: None, thresholds=STANDARD, evidence=SimpleNamespace(odds=10.0),
     )  # fmt: skip
-    for there, taken in (({"a": 50.0}, "best"), ({"a": 0.2}, "a"), (dict.fromkeys(costs, 0.01), "a")):
+    # The fastest and the slowest of memories are no more such themselves: of a usual arm is that between.
+    for there, fall, taken, going_on in (
+        ({"a": 50.0}, 0.0, "best", ["best", "b", "a", "a", "a"]),
+        ({"a": 0.2}, 0.0, "a", ["a", "a", "a"]),
+        (dict.fromkeys(costs, 0.01), 0.0, "a", ["a", "a", "a"]),
+        ({"a": 50.0, "b": 0.2}, 40.0, "b", ["best", "b", "b", "a", "a", "a"]),  # it falls most on the way
+    ):
         ends.clear()
         ends.update(there)
+        falls.update(b=fall)
+        gone_on.clear()
         found: Any = _arms.with_a_usual_arm(state, [])
-        assert found.one == taken
+        assert (found.one, gone_on) == (taken, going_on)
     arms = [((), 0.08, 1.0 / tau_s, one, 4) for tau_s in STANDARD.memory_s for one in ("best", "a", "b")]
-    assert tried == arms * 3
+    assert tried == arms * 4
 
 
 def test_an_arm_that_creeps_is_one_of_a_share_above_nothing() -> None:
@@ -114,11 +138,11 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
 
     costs = {1.0 / 0.3: 50.0, 1.0 / 3.0: 45.0, 1.0 / 30.0: 100.0, 0.2: 40.0}
 
-    def fitted(likelihood: Any, start: ExtendedModel, steps: int) -> Any:
+    def fitted(likelihood: Any, start: ExtendedModel, steps: int = 25) -> Any:
         rate = start.relaxation_rate_per_s
         share = -0.1 if rate == 0.2 else 0.1  # it has come to fall
         ended = ExtendedModel(1.0, share, rate, 800.0, 140.0, "mbar")
-        return SimpleNamespace(model=ended, cost=costs[rate], steps=steps)
+        return SimpleNamespace(model=ended, cost=costs[rate], steps=steps, likelihood=likelihood)
 
     monkeypatch.setattr(_arms, "searched", searched)
     monkeypatch.setattr(_arms, "with_members", lambda given, best, start, likelihood: start)
@@ -130,7 +154,7 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
             evidence=SimpleNamespace(odds=odds),
         )  # fmt: skip
         found: Any = _arms.with_an_arm_that_creeps(state, [])
-        assert found.model.relaxation_rate_per_s == rate
+        assert (found.model.relaxation_rate_per_s, found.steps) == (rate, 25)  # the best go on to their end
     memories = [((), 0.08, 1.0 / tau_s) for tau_s in STANDARD.memory_s]
     assert starts[:4] == [*memories, ((), pytest.approx(0.2), pytest.approx(0.2))]
     starts.clear()

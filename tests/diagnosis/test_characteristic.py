@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._characteristic import Branches, branches_of, characteristic_of, friction_of
+from smartshoe.diagnosis._characteristic import (
+    Branches,
+    branches_of,
+    characteristic_of,
+    conductance_of,
+    friction_of,
+)
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -138,3 +145,29 @@ def test_only_friction_is_told_as_friction() -> None:
     assert told(TRIANGLE) is None
     assert told(TRIANGLE + 5.0 * _rising()) is None
     assert told(np.random.default_rng(1).standard_normal(TIME_S.size)) is None
+
+
+@given(power=st.floats(0.8, 1.2), floor_s=st.floats(1e-5, 1e-3), seed=st.integers(0, 1000))
+@settings(max_examples=15)
+def test_a_resistance_that_falls_as_contacts_grow_is_better_diagnosed_as_a_conductance(
+    power: float, floor_s: float, seed: int
+) -> None:
+    """Only where that is nearer to a line, and of no other quantity."""
+    load = 101.0 + TRIANGLE
+    conducts = floor_s + 1e-4 * load**power
+    noisy = conducts * np.random.default_rng(seed).normal(1.0, 0.01, load.size)
+
+    def said(**reading: Array) -> str | None:
+        recording = Recording.from_arrays(time_s=TIME_S, force_n=load, **reading)  # type: ignore[arg-type]
+        sensor = next(iter(reading)).rsplit("_", 1)[0]
+        channel = recording.channels[sensor]
+        return conductance_of([recording.with_channel(replace(channel, role="sensor"))], STANDARD)
+
+    told = said(resistance_ohm=1.0 / noisy)
+    assert told is not None
+    line, conductance = (float(found) for found in re.findall(r"explains ([\d.]+) % .* and ([\d.]+) %", told)[0])
+    assert line < conductance
+    assert "1/resistance" in told
+    assert said(pressure_mbar=1.0 / noisy) is None
+    assert said(resistance_ohm=1e3 * noisy) is None
+    assert said(resistance_ohm=1.0 / noisy - 1.0 / noisy.min()) is None  # a difference of resistances has no reciprocal

@@ -112,7 +112,8 @@ def test_a_slot_is_a_family_or_the_one_that_is_imitated() -> None:
 
 def test_an_effect_needs_its_channel_in_every_session() -> None:
     def session(**more: Any) -> Any:
-        return SimpleNamespace(conditions=SimpleNamespace(**{"temperature_k": None, "neighbour": None, **more}))
+        plain = {"temperature_k": None, "neighbour": None, "begins_warmer_k": 0.0}
+        return SimpleNamespace(conditions=SimpleNamespace(**{**plain, **more}))
 
     bare, beside, warm = session(), session(neighbour=1), session(temperature_k=1)
 

@@ -121,7 +121,6 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_procedure, "residual_structure", structure)
     answer("names_of", lambda *_: tuple(made.names))
     answer("other_kind_of", lambda name, *_: "it turned" if name.name == "turned" else None)
-    answer("may_be_none", lambda fit, name: name == "faint")
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
     answer("fitted_rms", 1.0)
@@ -196,14 +195,6 @@ def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch:
         parts.given.excitation.goes_with_the_clock = is_followed
         _run_diagnosis(parts)
         assert parts.seen["names_of"][1] == {"is_followed": is_followed, "is_clocked": is_followed}
-
-
-def test_an_effect_whose_strength_may_be_none_is_said_and_no_cause(parts: Any) -> None:
-    parts.names = [_name("linear_leak"), _name("faint")]
-    told = _run_diagnosis(parts)
-    assert [one.name for one in told.causes] == ["linear_leak"]
-    (_, said) = told.limits
-    assert said.startswith("delay fits, but the interval of its strength holds none")
 
 
 def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:

@@ -109,7 +109,7 @@ def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
     assert not left_out.stands(plain, plain)
     # Two recordings that a drift of the gain happens to fit, each in its own way.
     rising, falling = (
-        MODEL.with_part(effect("gain_drift"), np.array([slope, 0.0, 60.0])) for slope in (0.002, -0.0004)
+        MODEL.with_part(effect("gain_drift"), np.array([slope, 0.0, 60.0, 0.0])) for slope in (0.002, -0.0004)
     )
     chance = _sessions([rising, falling])
     model, bare = _fitted(chance, "gain_drift"), _fitted(chance)
@@ -194,7 +194,7 @@ def test_effects_that_fit_by_their_difference_undo_one_another(reverse: float) -
     together = MODEL.with_part(drift, np.array([per_s, 0.0, 0.0, 1.0])).with_part(warm, along)
     assert cancelling(sessions, together, STANDARD) == []
     # A small one beside them has no part in it.
-    beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0]))
+    beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0, 3.0, 0.0]))
     assert cancelling(sessions, beside, STANDARD) == ["zero_drift", "warm_up"]
     assert cancelling(sessions, MODEL, STANDARD) == []
     assert cancelling(sessions, MODEL.with_part(warm, slow), STANDARD) == []

@@ -16,7 +16,7 @@ from smartshoe import Recording
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import jitter_s
 from smartshoe.diagnosis._procedure import _without
-from smartshoe.diagnosis._sensitivity import available, nuisance_precision
+from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
 from smartshoe.diagnosis._session import (
     Scale,
     at_full_rate,
@@ -204,6 +204,28 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
     assert at.neighbour.max() == pytest.approx(35.0 / abs(scale.reading), rel=0.03)
     (plain,), _ = prepared(pressed(load))
     assert (plain.conditions.temperature_k, plain.conditions.neighbour) == (None, None)
+
+
+def test_temperatures_of_all_recordings_are_on_one_scale() -> None:
+    """From where the first begins that has one, whatever is missing; so that rooms of several warmths are told."""
+    load = triangles()
+    time_s = STEP_S * np.arange(load.size)
+    warm_k = 293.0 + 0.05 * time_s
+    patchy_k = np.where((time_s > 4.0) & (time_s < 5.0), np.nan, warm_k + 6.0)
+    runs = [
+        Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * load, **channels)
+        for channels in ({}, {"temperature_k": warm_k}, {"temperature_k": patchy_k})
+    ]
+    (plain, *logged), scale = prepared(*runs)
+    assert plain.conditions.temperature_k is None
+    fine = at_full_rate([plain, *logged], [np.ones(load.size, dtype=bool)] * 3, scale, STANDARD)
+    for one, begins_k in zip([*logged, *fine[1:]], (0.0, 6.0) * 2, strict=True):
+        at = one.conditions
+        assert at.temperature_k == pytest.approx(begins_k + 0.05 * at.time_s, abs=1e-3)
+        assert at.begins_warmer_k == pytest.approx(begins_k)
+    assert logged_channels(logged) == {"temperature", "temperatures"}
+    assert logged_channels(logged[:1]) == {"temperature"}
+    assert logged_channels([plain, *logged]) == set()
 
 
 def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> None:

@@ -171,9 +171,26 @@ def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> 
     margins = (("dead_band", 90.0), ("contact_area", 95.0), ("saturation", 900.0))
     one = member(block, laws=margins, fall=1000.0)
     name = only(names_of([one], 0.0, STANDARD))
-    assert (name.effect.name, name.equivalents, name.kind_only) == ("dead_band", (), True)
+    assert (name.effect.name, name.equivalents, name.kind_only) == (
+        "dead_band",
+        ("contact_area", "saturation"),
+        True,
+    )
     assert name.confidence == probability_of_kind(one, 0.0, STANDARD, lawless=True)
     assert name.law == pytest.approx(1.0 / 3.0)
+
+
+def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_well() -> None:
+    """A dead band of a third of full scale is a curve like any other; one of its own kind is a dead band."""
+    laws = (("sensor_nonlinearity", 20.0), ("gas_compression", 60.0))
+    one = replace(member("dead_band", size=0.02, laws=laws, fall=1000.0), is_ended=True)
+    name = only(names_of([one], 0.0, STANDARD))
+    assert (name.effect.name, name.equivalents, name.kind_only) == ("sensor_nonlinearity", ("gas_compression",), False)
+    assert name.by is one.laws[0]
+    beyond = tuple(Alternative(law.effect, law.margin + 1000.0 * STANDARD.departure**2) for law in one.laws)
+    for other in (replace(one, is_ended=False, laws=()), replace(one, laws=beyond)):
+        name = only(names_of([other], 0.0, STANDARD))
+        assert (name.effect.name, name.by) == ("dead_band", None)
 
 
 def test_a_kind_without_a_law_is_half_sure_at_most_or_as_sure_as_a_name_must_be() -> None:

@@ -15,7 +15,6 @@ from smartshoe.diagnosis import _inference, _zero
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
-from smartshoe.diagnosis._parameters import may_be_none
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
@@ -97,37 +96,7 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
 
 
 def _named(name: str) -> Any:
-    return SimpleNamespace(effect=effect(name), member=SimpleNamespace(name=name))
-
-
-def test_strengths_may_be_none_where_their_joint_region_holds_it() -> None:
-    """Of a polynomial's strengths none need be sure by itself where they move against one another."""
-    model = MODEL.with_part("linear_leak", np.array([0.02])).with_part("sensor_nonlinearity")
-    theta = model.theta
-    places = [
-        k for k, (owner, one) in enumerate(model.parameters) if owner == "sensor_nonlinearity" and one.null is not None
-    ]
-    theta[places[:2]] = 0.01, 0.02
-    model = model.at(theta)
-    covariance = np.eye(theta.size) * 1e-12
-    fit: Any = SimpleNamespace(model=model, covariance=covariance, likelihood=SimpleNamespace(sessions=()))
-    leak = next(k for k, (owner, _) in enumerate(model.parameters) if owner == "linear_leak")
-    for sd, none in ((0.0101, False), (0.0103, True)):  # 1.96 standard deviations
-        covariance[leak, leak] = sd**2
-        assert may_be_none(fit, "linear_leak") is none
-    assert not may_be_none(fit, "sensor_nonlinearity")
-    full = MODEL.with_part("linear_leak", np.array([effect("linear_leak").parameters[0].upper]))
-    held: Any = SimpleNamespace(model=full, covariance=1e6 * np.eye(full.theta.size), likelihood=fit.likelihood)
-    assert not may_be_none(held, "linear_leak")  # as strong as it may be
-    # Each is half its standard deviation from none, and only their weighed sum is sure.
-    one, other = places[:2]
-    covariance[one, one], covariance[other, other] = 0.02**2, 0.04**2
-    covariance[one, other] = covariance[other, one] = -0.99 * 0.02 * 0.04
-    assert not may_be_none(fit, "sensor_nonlinearity")
-    covariance[one, other] = covariance[other, one] = 0.0
-    assert may_be_none(fit, "sensor_nonlinearity")
-    block: Any = SimpleNamespace(model=MODEL.with_part("flexible_curve"))
-    assert not may_be_none(block, "flexible_curve")
+    return SimpleNamespace(effect=effect(name), member=SimpleNamespace(name=name), by=None)
 
 
 def test_what_faults_add_is_the_most_of_those_fitted_in_shares_of_the_reading() -> None:

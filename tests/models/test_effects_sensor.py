@@ -148,8 +148,8 @@ def test_signs_are_those_of_the_documentation() -> None:
     assert _sign("zero_offset", [0.01]) > 0
     assert _sign("load_cell_tare", [0.01]) > 0
     assert _sign("zero_drift", [1e-3, 0.0, 0.0, 1.0]) > 0
-    assert _sign("gain_drift", [1e-3, 0.0, 0.0]) > 0
-    assert _sign("gain_drift", [1e-3, 0.0, 0.0], at=0.0) == 0
+    assert _sign("gain_drift", [1e-3, 0.0, 0.0, 0.0]) > 0
+    assert _sign("gain_drift", [1e-3, 0.0, 0.0, 0.0], at=0.0) == 0
     assert _sign("warm_up", [0.01, 5.0, 1.0]) > 0
     assert _sign("cross_talk", [0.01]) > 0
     assert _sign("saturation", [0.5, 0.4, 0.01, 0.0]) < 0
@@ -282,12 +282,37 @@ def test_a_sensors_body_follows_a_temperature_by_its_time_constant(tau_s: float,
         assert np.max(np.abs(moved - 0.04 * body_k)) < 0.04 * 2.0 * omega
 
 
+@given(
+    begins_k=st.floats(-20.0, 20.0), coefficient=st.floats(-0.01, 0.01), share=st.floats(0.0, 1.0), moves=st.booleans()
+)
+def test_a_gain_goes_with_the_temperature_from_recording_to_recording(
+    begins_k: float, coefficient: float, share: float, moves: bool
+) -> None:
+    """A room that is warmer by a share of which counts, beside what goes on within the recording."""
+    time_s = 0.1 * np.arange(2000)
+    within_k = 3.0 * np.sin(time_s / 20.0) if moves else np.zeros(time_s.size)
+    p, gain = np.full(time_s.size, 0.5), effect("gain_drift")
+    here, first = (Conditions(time_s, p, 0.1, temperature_k=begun + within_k) for begun in (begins_k, 0.0))
+    counts_k = begins_k if abs(begins_k) >= 0.2 else 0.0  # less than a cheap probe tells
+    moved = gain.apply(p, here, np.array([0.0, coefficient, 0.0, share]))
+    alone = gain.apply(p, first, np.array([0.0, coefficient, 0.0, 0.0]))
+    assert np.allclose(moved - alone, 0.5 * coefficient * share * counts_k, rtol=0, atol=1e-12)
+    # A zero of each recording's own is told anyway.
+    zero = effect("zero_drift")
+    values = np.array([0.0, coefficient, 0.0, 1.0])
+    assert np.allclose(zero.apply(p, here, values), zero.apply(p, first, values), rtol=0, atol=1e-12)
+
+
 def test_shapes_that_differ_by_what_is_not_logged_are_one() -> None:
     drift, lag = effect("zero_drift"), effect("sensor_lag")
     assert [dict(one) for one in drift.shapes_with({"neighbour"})] == [
         {"temperature_lag": 3.0, "exponent": 1.0}, {"temperature_lag": 3.0, "exponent": 0.5},
     ]  # fmt: skip
     assert drift.shapes_with({"temperature"}) == drift.shapes
+    gain = effect("gain_drift")
+    assert [len(gain.shapes_with(logged)) for logged in ((), {"temperature"}, {"temperature", "temperatures"})] == [
+        1, 2, 4,
+    ]  # fmt: skip
     assert lag.shapes_with(()) == lag.shapes
 
 
@@ -296,6 +321,9 @@ def test_a_file_from_before_sensors_lagged_behind_a_temperature_has_no_such_lag_
     stored = now.to_dict()
     before = {**stored, "effects": {"zero_drift": {"drift_rate": 1e-5, "temperature_coefficient": 2e-3}}}
     assert ExtendedModel.from_dict(before).to_dict() == stored
+    gain = {"drift_rate": 1e-5, "temperature_coefficient": 2e-3, "temperature_lag": 60.0}
+    told = ExtendedModel.from_dict({**stored, "effects": {"gain_drift": gain}})
+    assert told.to_dict()["effects"]["gain_drift"] == {**gain, "carried_over": 0.0}
     with pytest.raises(KeyError):
         ExtendedModel.from_dict({**stored, "effects": {"zero_drift": {"drift_rate": 1e-5}}})
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects.effect import Conditions, EffectParameter
+from smartshoe.models.effects.effect import LEAST_CHANGE_K, Conditions, EffectParameter
 from smartshoe.models.first_order import lag
 
-LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
 SAME_AS_TIME = 0.98  # correlation above which a temperature is a clock, and the two have no separate coefficients
 SMOOTHED_S = 3.0  # a thermometer's noise would come in as noise of the model; no faster body is told from this one
 BLOCKS = 50
@@ -36,18 +35,23 @@ def running_time_s(conditions: Conditions) -> Array:
     return conditions.kept("running_time_s", (), lambda: conditions.time_s + conditions.before.get("time_s", 0.0))
 
 
-def drift(conditions: Conditions, values: Array, grown: Callable[[Array], Array] | None = None) -> Array:
+def drift(
+    conditions: Conditions, values: Array, grown: Callable[[Array], Array] | None = None, carried_over: float = 0.0
+) -> Array:
     """(n,) a rate ``values[0]`` in 1/s times the time and a coefficient ``values[1]`` in 1/K times the temperature.
 
     ``grown`` (n,) of the time stands for it where the drift is none of a steady pace.
     The sensor's body follows the temperature that was logged by a first-order lag of ``values[2]`` s, and is as warm as
     that where the recording begins. The coefficient does nothing without a temperature that moves, the rate nothing
-    where that temperature rises as evenly as a clock.
+    where that temperature rises as evenly as a clock. ``carried_over`` is the share that counts of what the recording
+    begins warmer than the first of all.
     """
     warmer_k = _warmer_k(conditions)
     moved = np.zeros(conditions.time_s.size)
     if warmer_k.size and values[1] != 0.0:
         moved += values[1] * (lag(warmer_k, 1.0 / values[2], float(conditions.step_s)) if values[2] > 0.0 else warmer_k)
+    if carried_over != 0.0:
+        moved += values[1] * carried_over * conditions.begins_warmer_k
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
         time_s = running_time_s(conditions)
         moved += values[0] * (time_s if grown is None else grown(time_s))
@@ -75,7 +79,7 @@ def _settling_scale(tau_s: float, stretch: float) -> float:
 
 
 def _warmer_k(conditions: Conditions) -> Array:
-    """The smoothed temperature (n,), or (0,) where none was logged or it stood still; cached between calls."""
+    """The smoothed temperature (n,) above the recording's own first, (0,) where none was logged or it stood still."""
     known = conditions.cache.get("warmer_k")
     if known is None:
         known = np.zeros(0)
@@ -85,7 +89,7 @@ def _warmer_k(conditions: Conditions) -> Array:
             whole = temperature.size // BLOCKS * BLOCKS
             means = temperature[:whole].reshape(BLOCKS, -1).mean(axis=1)
             if float(np.ptp(means)) >= LEAST_CHANGE_K:
-                known = _running_mean(temperature, round(0.5 * SMOOTHED_S / conditions.step_s))
+                known = _running_mean(temperature - temperature[0], round(0.5 * SMOOTHED_S / conditions.step_s))
                 like_time = abs(float(np.corrcoef(means, np.arange(BLOCKS))[0, 1])) >= SAME_AS_TIME
                 conditions.cache["drift_by_clock"] = np.array([0.0 if like_time else 1.0])
         conditions.cache["warmer_k"] = known

@@ -28,7 +28,8 @@ class DeadBand(Effect):
     is_steep_undone = True
     says = "the first newtons of each loading do not reach the tube: no reading at low loads, a constant lack above"
     parameters = (
-        EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.3, 0.01),
+        EffectParameter("lost_load", "FS_load", "load that is lost once all gaps are closed", 0.0, 0.0, 0.3, 0.01,
+                        kind_ends="upper"),
         EffectParameter("softness", "1", "how far the gaps spread, over the lost load", None, 0.03, 3.0, 0.3),
         EffectParameter("onset", "1", "load over which the loss sets in, over the lost load", None, 0.0, 1.5, 0.3,
                         absent=0.0, natural="lower"),

@@ -53,7 +53,7 @@ class EffectParameter:
     size: float
     prior_sd: float | None = None
     channel: Exposure | Literal[""] = ""
-    kind_ends: Literal["", "upper", "both"] = ""
+    kind_ends: Literal["", "lower", "upper", "both"] = ""
     absent: float | None = None
     natural: Literal["", "lower", "both"] = ""
 
@@ -63,9 +63,11 @@ class EffectParameter:
 
     def is_where_kind_ends(self, value: float) -> bool:
         """Whether a value lies at a bound beyond which the effect is of another kind."""
-        return (self.kind_ends != "" and value >= self.upper) or (self.kind_ends == "both" and value <= self.lower)
+        above, below = self.kind_ends in ("upper", "both"), self.kind_ends in ("lower", "both")
+        return (above and value >= self.upper) or (below and value <= self.lower)
 
 
+LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
 MOST_KEPT = 6  # of one name: a law's own, and those with one of its shape's numbers moved
 
 
@@ -75,8 +77,9 @@ class Conditions:
 
     ``time_s`` (n,) from the session's start, step ``step_s``; ``load`` (n,) the measured load as a share of full
     scale; ``load_noise`` its noise's standard deviation; ``before`` what an earlier recording left behind (largest
-    load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the session's first value, and
-    ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not logged.
+    load, cycles, time, dose) where this one continues it. ``temperature_k`` (n,) above the first value of the first
+    session, and ``neighbour`` (n,) another unit's pressure as a share of this unit's full scale, are None where not
+    logged.
     ``relaxing`` are the share and the rate in 1/s of the model's relaxing arm while it runs, for effects that say that
     they bend beside it; None for all others, and outside a model.
     """
@@ -119,6 +122,12 @@ class Conditions:
             found = np.gradient(self.load, self.step_s) if self.load.size > 1 else np.zeros(self.load.size)
             self.cache["rate_per_s"] = found
         return found
+
+    @property
+    def begins_warmer_k(self) -> float:
+        """By how much it begins warmer than the first session did; 0 where no cheap probe would show it."""
+        begins = 0.0 if self.temperature_k is None else float(self.temperature_k[0])
+        return begins if abs(begins) >= LEAST_CHANGE_K else 0.0
 
 
 class Inverse(ABC):

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 Exposure = Literal[
     "holds", "rests", "rates", "repeats", "peaks", "pauses", "idle", "steps", "minor_loops", "low_loads",
     "shuffled_loads", "long_hold", "multisine",
-    "temperature", "displacement", "neighbour", "command", "pressure_reference",
+    "temperature", "temperatures", "displacement", "neighbour", "command", "pressure_reference",
 ]  # fmt: skip
 
 SAYS = MappingProxyType({
@@ -26,6 +26,7 @@ SAYS = MappingProxyType({
     "long_hold": "a load held for minutes",
     "multisine": "a sum of sines over two decades of frequency",
     "temperature": "the unit's temperature, logged",
+    "temperatures": "recordings that begin at several temperatures, logged",
     "displacement": "the machine's displacement, logged",
     "neighbour": "the neighbouring unit's reading, logged",
     "command": "the machine's commanded load, logged",
@@ -33,7 +34,9 @@ SAYS = MappingProxyType({
 })  # fmt: skip
 """What a protocol or a log must hold for each word, as half a sentence."""
 
-CHANNELS: frozenset[Exposure] = frozenset({"temperature", "displacement", "neighbour", "command", "pressure_reference"})
+CHANNELS: frozenset[Exposure] = frozenset(
+    {"temperature", "temperatures", "displacement", "neighbour", "command", "pressure_reference"}
+)
 """Words that ask for a channel and not for a load history."""
 CLOCK: frozenset[Exposure] = frozenset({"idle", "pauses", "shuffled_loads"})
 """What tells an effect that goes with time, or with what was borne so far, from one that goes with the load."""

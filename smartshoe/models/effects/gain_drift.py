@@ -18,7 +18,8 @@ class GainDrift(Effect):
 
     dT is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead
     of a die in its package. g_T is inert without a temperature that moves, g where the temperature is a straight line
-    in time.
+    in time. dT is counted from where a recording begins, and ``carried_over`` of what that is warmer than the first
+    recording's beginning is added: 0 where the span is set anew each time, 1 for one sensor in rooms of any warmth.
     """
 
     name, family, stage, place = "gain_drift", "gain_drift", "sensor", "sensor"
@@ -36,8 +37,12 @@ class GainDrift(Effect):
             channel="temperature",
         ),
         TEMPERATURE_LAG,
-    )
-    shapes = TEMPERATURE_LAGS
+        EffectParameter(
+            "carried_over", "1", "share of the temperature between recordings that counts", None, 0.0, 1.0, 0.5,
+            channel="temperatures", absent=0.0, natural="both",
+        ),
+    )  # fmt: skip
+    shapes = tuple({**at, "carried_over": share} for share in (0.0, 1.0) for at in TEMPERATURE_LAGS)
     exposed_by = by("repeats", "peaks", "pauses")
     separated_by = {
         "coloured_noise": by("repeats"),
@@ -48,15 +53,15 @@ class GainDrift(Effect):
     }
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
-        """The signal times the gain since the session's start."""
-        return signal + signal * drift(conditions, values)
+        """The signal times the gain since the first session's start."""
+        return signal + signal * drift(conditions, values, carried_over=float(values[3]))
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """Divide by the gain; exact while that stays above a hundredth of its first value.
 
         None with a temperature coefficient: a stream carries no temperature.
         """
-        rate, coefficient, _ = (float(value) for value in values)
+        rate, coefficient = (float(value) for value in values[:2])
         if coefficient != 0.0:
             return None
         return Memoryless(

@@ -1,0 +1,350 @@
+"""Force sensors that are no pneumatic shoe's, by textbook physics, pressed as hands, robots and walkers press them.
+
+What an engineer may bring whom nobody here knows. Each is an equation or two of its own kind of sensor, with noise, and
+says which families of the catalogue a standard linear solid of it lacks. *Left out:* everything else of the sensor.
+
+Sources: contacts that grow with load (Holm 1967), polymers that creep by powers of time (Findley 1976), hysteresis by
+relays (Mayergoyz 1991), bridges and their creep (OIML R 60), piezoelectric discharge and optical loss (Fraden 2016),
+rubber's softening (Mullins 1969).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike
+from scipy.signal import lfilter
+
+from smartshoe.arrays import Array
+from smartshoe.recording import Recording
+
+ROOM_C = 20.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recording's load (n,) in N at ``time_s`` (n,), the ``number``-th of its unit; ``rng`` for what is random."""
+
+    time_s: Array
+    load_n: Array
+    number: int
+    rng: Generator
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second."""
+        return 1.0 / float(self.time_s[1] - self.time_s[0])
+
+    def late(self, signal: Array, tau_s: float) -> Array:
+        """(n,) a first-order lag of it, in steady state at first."""
+        keep = float(np.exp(-1.0 / (self.rate_hz * tau_s)))
+        return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal - signal[0]) + signal[0])
+
+    def crept(self, signal: Array, taus_s: ArrayLike, weights: ArrayLike | None = None) -> Array:
+        """(n,) mean of its lags, weighed."""
+        lags = [self.late(signal, float(tau)) for tau in np.asarray(taus_s)]
+        return np.asarray(np.average(lags, axis=0, weights=weights))
+
+    def noise(self, sd: float, memory: float = 0.6) -> Array:
+        """(n,) noise of a standard deviation, each sample with some ``memory`` of the one before."""
+        white = self.rng.normal(0.0, sd * np.sqrt(1.0 - memory**2), self.time_s.size)
+        return np.asarray(lfilter([1.0], [1.0, -memory], white))
+
+
+# -- loads ------------------------------------------------------------------------------------------------------------
+Load = Callable[[Generator, int], tuple[Array, Array]]
+
+
+def presses(
+    seconds: float,
+    rate_hz: float,
+    highest_n: float,
+    hold_s: tuple[float, float] = (0.3, 2.0),
+    ramp_s: tuple[float, float] = (0.2, 2.0),
+    rest_s: tuple[float, float] = (0.5, 3.0),
+    lowest_n: float = 0.0,
+) -> Load:
+    """Presses of random height, speed and length, none alike."""
+
+    def made(rng: Generator, number: int) -> tuple[Array, Array]:
+        time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
+        corners = [(0.0, lowest_n), (rng.uniform(*rest_s), lowest_n)]
+        while corners[-1][0] < seconds:
+            peak = lowest_n + (highest_n - lowest_n) * rng.uniform(0.3, 1.0)
+            for lasts, level in ((ramp_s, peak), (hold_s, peak), (ramp_s, lowest_n), (rest_s, lowest_n)):
+                corners.append((corners[-1][0] + rng.uniform(*lasts), level))
+        load = np.interp(time_s, *np.transpose(corners))
+        width = max(3, int(0.05 * rate_hz))  # no robot turns a corner at once
+        padded = np.pad(load, width, mode="edge")
+        return time_s, np.convolve(padded, np.full(width, 1.0 / width), "same")[width:-width]
+
+    return made
+
+
+def one_press(rng: Generator, number: int) -> tuple[Array, Array]:
+    """A rest, one press at a rate that changes from recording to recording, a rest."""
+    ramp_s, peak = (0.2, 0.5, 1.0, 2.0)[number % 4], rng.uniform(10.0, 40.0)
+    time_s = np.arange(0.0, 8.0, 0.01)
+    corners_s = [0.0, 1.0, 1.0 + ramp_s, 2.5 + ramp_s, 2.5 + 2 * ramp_s, 8.0]
+    return time_s, np.interp(time_s, corners_s, [0.0, 0.0, peak, peak, 0.0, 0.0])
+
+
+def stretch(rng: Generator, number: int) -> tuple[Array, Array]:
+    """One cycle of a strip, each recording faster than the last."""
+    seconds, rate_hz = ((200.0, 10.0), (66.0, 20.0), (40.0, 20.0))[number]
+    time_s = np.arange(0.0, seconds, 1.0 / rate_hz)
+    return time_s, np.interp(time_s, [0.0, 0.5 * seconds, seconds], [0.0, 1.0, 0.0])
+
+
+def hand(rng: Generator, number: int) -> tuple[Array, Array]:
+    """A hand that never lets go."""
+    time_s = np.arange(0.0, 60.0, 0.01)
+    swing = np.abs(np.convolve(rng.normal(0.0, 1.0, time_s.size + 200), np.hanning(160), "same")[100:-100])
+    return time_s, 2.0 + 24.0 * swing / swing.max()
+
+
+def sways(rng: Generator, number: int) -> tuple[Array, Array]:
+    """Three sines about a mean, after a ramp."""
+    time_s = np.arange(0.0, 60.0, 0.01)
+    sines = [np.sin(2.0 * np.pi * hz * time_s + rng.uniform(0.0, 6.0)) for hz in (0.1 * (1 + number), 0.33, 1.1)]
+    return time_s, 60.0 * np.clip(time_s / 2.0, 0.0, 1.0) * (0.55 + 0.4 * np.mean(sines, axis=0))
+
+
+def steps(rng: Generator, number: int) -> tuple[Array, Array]:
+    """Double-humped steps of a walker."""
+    time_s = np.arange(0.0, 60.0, 0.01)
+    load, begins_s = np.zeros(time_s.size), 0.5
+    while begins_s < 59.0:
+        lasts_s = rng.uniform(0.6, 0.75)
+        share = (time_s - begins_s) / lasts_s
+        hump = np.sin(np.pi * share) + 0.35 * np.sin(3.0 * np.pi * share)
+        load += np.where((share > 0.0) & (share < 1.0), rng.uniform(500.0, 700.0) * np.maximum(hump, 0.0), 0.0)
+        begins_s += lasts_s + rng.uniform(0.35, 0.5)
+    return time_s, load
+
+
+# -- sensors ----------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class OtherSensor:
+    """``reading`` (n,) of a run, logged as ``column``; ``kinds``: families that a standard linear solid of it lacks.
+
+    ``beside``: families of which there is a little too, or which nothing but their size tells from those.
+    """
+
+    reading: Callable[[Run], Array]
+    load: Load
+    column: str
+    load_noise_n: float
+    kinds: frozenset[str]
+    beside: frozenset[str] = frozenset()
+    fitted: int = 2
+    held_out: int = 2
+    logs: Callable[[Run], Mapping[str, Array]] = lambda run: {}
+    """Channels beside the reading, by column."""
+
+    def recordings(self, seed: int) -> tuple[list[Recording], list[Recording]]:
+        """Those to fit and those to judge on."""
+        rng = np.random.default_rng(seed)
+        made = []
+        for number in range(self.fitted + self.held_out):
+            run = Run(*self.load(rng, number), number, rng)
+            columns: dict[str, Any] = {self.column: self.reading(run), **self.logs(run)}
+            measured_n = run.load_n + rng.normal(0.0, self.load_noise_n, run.load_n.size)
+            name = f"recording_{number + 1}"
+            made.append(Recording.from_arrays(time_s=run.time_s, name=name, force_n=measured_n, **columns))
+        return made[: self.fitted], made[self.fitted :]
+
+
+def _film(run: Run) -> Array:
+    conducts = 1e-5 * np.maximum(run.load_n, 0.0) ** 0.85
+    ohm = 1.0 / (1e-7 + 0.9 * conducts + 0.1 * run.crept(conducts, (0.3, 1.0, 3.0, 10.0, 30.0)))
+    return np.asarray(np.round((5.0 * 1e4 / (1e4 + ohm) + run.noise(0.003)) / 5.0 * 1023.0) * 5.0 / 1023.0)
+
+
+def _bridge(run: Run) -> Array:
+    return 2e-3 * run.load_n + 5e-7 * run.late(run.load_n, 8.0) + run.noise(4e-4, 0.2)
+
+
+def _foam_capacitor(run: Run) -> Array:
+    closed = 0.45 * -np.expm1(-run.load_n / 9.0)
+    closed = 0.85 * closed + 0.1 * run.late(closed, 0.6) + 0.05 * run.late(closed, 12.0)
+    return 10.0 / (1.0 - closed) + run.noise(0.008)
+
+
+def _piezo(run: Run) -> Array:
+    return 0.02 * (run.load_n - run.late(run.load_n, 20.0)) + run.noise(0.002)
+
+
+def _rubber_barometer(run: Run) -> Array:
+    pressed = 3.0 * run.load_n + 0.07 * run.load_n**2 + 0.25 * run.late(run.load_n, 2.0)
+    return 1010.0 + pressed - 1.5 * np.expm1(-run.time_s / 60.0) + run.noise(0.05)
+
+
+def _air_line(run: Run) -> Array:
+    angular, step_s = 2.0 * np.pi * 2.0, 0.1 / run.rate_hz
+    out, speed, place = np.empty(run.load_n.size), 0.0, float(run.load_n[0])
+    for k, load in enumerate(run.load_n):
+        for _ in range(10):
+            speed += step_s * (angular**2 * (load - place) - 1.4 * angular * speed)
+            place += step_s * speed
+        out[k] = place
+    return 0.5 * out + run.noise(0.05)
+
+
+def _fibre(run: Run) -> Array:
+    return 4.0 * np.exp(-run.load_n / 12.0) + 0.5 + run.noise(0.006)
+
+
+def _relays(load_n: Array, highest_n: float, count: int = 25) -> Array:
+    """(n,) share of relays that are up, of all that switch up above where they switch down."""
+    level = np.linspace(0.0, highest_n, count)
+    ups, downs = np.meshgrid(level, level, indexing="ij")
+    there, is_up, out = ups >= downs, np.zeros((count, count), dtype=bool), np.empty(load_n.size)
+    for k, load in enumerate(load_n):
+        is_up = (is_up & (downs < load)) | (ups <= load)
+        out[k] = is_up[there].mean()
+    return out
+
+
+def _magnet(run: Run) -> Array:
+    deep = 0.2 * _relays(run.load_n, 10.0) + 0.08 * run.load_n
+    field_mt = 1.0 / (2.2 - deep) ** 3
+    return 20.0 * (0.9 * field_mt + 0.1 * run.late(field_mt, 3.0)) + run.noise(0.004)
+
+
+def _late_pad(run: Run) -> Array:
+    reading = 0.8 * run.load_n + 0.35 * run.late(run.load_n, 0.9)
+    return np.interp(run.time_s - 0.08, run.time_s, reading) + run.rng.uniform(-3.0, 3.0) + run.noise(0.02)
+
+
+def _room_k(run: Run) -> Array:
+    return np.asarray(6.0 * run.number + 8.0 * np.sin(2.0 * np.pi * run.time_s / 300.0 + run.number))
+
+
+def _bridge_in_any_room(run: Run) -> Array:
+    warmer_k = _room_k(run)
+    spanned = 0.05 * run.load_n + 0.006 * run.late(run.load_n, 4.0)
+    return spanned * (1.0 - 0.004 * warmer_k) + 0.002 * warmer_k + run.noise(0.004)
+
+
+def _ionic(run: Run) -> Array:
+    pressed, taus = np.maximum(run.load_n, 0.0) ** 0.7, np.geomspace(0.05, 100.0, 14)
+    return 0.5 * pressed + 0.5 * run.crept(pressed, taus, taus**-0.35) + run.noise(0.01)
+
+
+def _strip(run: Run) -> Array:
+    drawn = run.load_n**0.8
+    return 40.0 * (drawn + run.crept(drawn, np.geomspace(1.0, 300.0, 8))) + run.noise(0.05)
+
+
+def _insole(run: Run) -> Array:
+    volts = 3.0 * run.load_n / (run.load_n + 900.0)
+    return 0.92 * volts + 0.08 * run.late(volts, 0.4) + 0.02 * run.number + run.noise(0.01)
+
+
+def _coarse(run: Run) -> Array:
+    crept = run.crept(run.load_n, (1.0, 5.0, 25.0, 120.0))
+    return np.asarray(np.round((0.9 * run.load_n + 0.2 * crept) / 120.0 * 255.0) / 51.0)
+
+
+def _sticky(run: Run) -> Array:
+    out, place = np.empty(run.load_n.size), float(run.load_n[0])
+    for k, load in enumerate(run.load_n):
+        place += (load - place) * -np.expm1(-1.0 / (run.rate_hz * (0.15 if load > place else 1.2)))
+        out[k] = place
+    return 0.1 * (0.8 * run.load_n + 0.2 * out) + run.noise(0.004)
+
+
+def _curing(run: Run) -> Array:
+    kept = 1.0 + 0.06 * np.expm1(-run.time_s / 100.0)
+    return 0.1 * (run.load_n + 0.1 * run.late(run.load_n, 1.0)) * kept + run.noise(0.004)
+
+
+def _with_play(run: Run) -> Array:
+    out, place = np.empty(run.load_n.size), float(run.load_n[0])
+    for k, load in enumerate(run.load_n):
+        place = min(max(place, load - 0.8), load + 0.8)
+        out[k] = place
+    return 0.1 * run.late(0.7 * run.load_n + 0.3 * out, 0.05) + run.noise(0.004)
+
+
+def _slow(run: Run) -> Array:
+    return run.late(0.05 * run.load_n + 0.01 * run.late(run.load_n, 3.0), 0.12) + run.noise(0.004)
+
+
+def _leaking(run: Run) -> Array:
+    out, lost = np.empty(run.load_n.size), 0.0
+    for k, load in enumerate(run.load_n):
+        out[k] = load - lost
+        lost += 0.003 / run.rate_hz * out[k]
+    return 0.2 * out + run.noise(0.05)
+
+
+def _thickening(run: Run) -> Array:
+    speed = np.abs(run.late(np.gradient(run.load_n, 1.0 / run.rate_hz), 0.05))
+    return 0.05 * run.load_n * (1.0 + 0.04 * np.log1p(speed / 50.0)) + run.noise(0.006)
+
+
+def _curved(run: Run) -> Array:
+    curved = 0.05 * run.load_n * (1.0 - 0.1 * run.load_n / 40.0)
+    return curved + 0.012 * run.late(run.load_n, 1.2) + run.rng.uniform(-0.3, 0.3) + run.noise(0.006)
+
+
+def _reseated(run: Run) -> Array:
+    spanned = 0.05 * run.load_n + 0.006 * run.late(run.load_n, 2.0)
+    return spanned * (1.0 + run.rng.uniform(-0.04, 0.04)) + run.noise(0.005)
+
+
+def _beside_another(run: Run) -> Array:
+    other_n = presses(90.0, run.rate_hz, 30.0)(run.rng, 0)[1]
+    return 0.05 * run.load_n + 0.006 * run.late(run.load_n, 2.0) + 0.004 * other_n + run.noise(0.004)
+
+
+def _sensor(
+    reading: Callable[[Run], Array], load: Load, column: str, load_noise_n: float, kinds: str, beside: str = "",
+    fitted: int = 2, held_out: int = 2,
+) -> OtherSensor:  # fmt: skip
+    few = frozenset(kinds.split()), frozenset(beside.split())
+    return OtherSensor(reading, load, column, load_noise_n, *few, fitted, held_out)
+
+
+CURVE = "static_curve"
+OTHER_SENSORS = {
+    "polymer_film": _sensor(_film, presses(90, 100, 40), "pressure_v", 0.02, CURVE, "relaxation"),
+    "strain_gauge": _sensor(_bridge, presses(120, 200, 500), "pressure_v", 0.1, ""),
+    "foam_capacitor": _sensor(_foam_capacitor, presses(100, 50, 20), "pressure_v", 0.01, CURVE, "relaxation"),
+    "piezo": _sensor(_piezo, presses(100, 100, 100), "pressure_v", 0.03, "leak"),
+    "rubber_barometer": _sensor(_rubber_barometer, presses(100, 50, 15), "pressure_mbar", 0.01, f"{CURVE} zero"),
+    "air_line": _sensor(_air_line, sways, "pressure_kpa", 0.03, "timing"),
+    "fibre": _sensor(_fibre, presses(80, 50, 30), "pressure_v", 0.02, CURVE),
+    "magnet": _sensor(_magnet, presses(60, 50, 10), "pressure_v", 0.006, f"{CURVE} hysteresis", "relaxation"),
+    "late_pad": _sensor(_late_pad, hand, "pressure_v", 0.01, "timing"),
+    "bridge_in_any_room": replace(
+        _sensor(_bridge_in_any_room, presses(200, 25, 50), "pressure_v", 0.03, "gain_drift zero"),
+        logs=lambda run: {"temperature_c": ROOM_C + _room_k(run)},
+    ),
+    "ionic_gel": _sensor(_ionic, presses(90, 50, 5), "pressure_v", 0.003, f"{CURVE} relaxation"),
+    "strip": _sensor(_strip, stretch, "pressure_mm", 0.002, CURVE, "relaxation", held_out=1),
+    "insole": _sensor(_insole, steps, "pressure_v", 1.0, CURVE, "relaxation"),
+    "coarse": _sensor(
+        _coarse, presses(300, 10, 100, (10.0, 30.0), (2.0, 6.0), (10.0, 30.0)), "pressure_v", 0.1, "relaxation"
+    ),
+    "sticky": _sensor(_sticky, presses(90, 50, 20), "pressure_v", 0.01, "asymmetry"),
+    "curing": _sensor(_curing, presses(300, 50, 20), "pressure_v", 0.01, "gain_drift", "softening"),
+    "with_play": _sensor(_with_play, presses(90, 50, 20), "pressure_v", 0.01, "hysteresis", "timing"),
+    "slow": _sensor(_slow, presses(90, 100, 40), "pressure_v", 0.02, "timing"),
+    "leaking": _sensor(
+        _leaking, presses(400, 20, 500, (20.0, 60.0), (1.0, 4.0), (20.0, 60.0)), "pressure_kpa", 0.2, "leak"
+    ),
+    "thickening": _sensor(_thickening, presses(90, 100, 100, ramp_s=(0.1, 4.0)), "pressure_v", 0.03, "rate"),
+    "one_press_each": _sensor(_curved, one_press, "pressure_v", 0.02, CURVE, fitted=10, held_out=4),
+    "noisy_load": _sensor(_curved, presses(90, 100, 60), "pressure_v", 0.6, CURVE),
+    # Of what is no entry of the catalogue nothing may be named.
+    "reseated": _sensor(_reseated, presses(60, 50, 60), "pressure_v", 0.03, "", fitted=3),
+    "beside_another": _sensor(_beside_another, presses(90, 100, 40), "pressure_v", 0.02, ""),
+}  # fmt: skip
+OUTSIDE = frozenset({"reseated", "beside_another"})
