@@ -26,7 +26,7 @@ ROOM_C = 20.0
 
 
 @dataclass(frozen=True)
-class Run:
+class LoadHistory:
     """One recording's load (n,) in N at ``time_s`` (n,), the ``number``-th of its unit; ``rng`` for what is random."""
 
     time_s: Array
@@ -130,12 +130,12 @@ def steps(rng: Generator, number: int) -> tuple[Array, Array]:
 # -- sensors ----------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class OtherSensor:
-    """``reading`` (n,) of a run, logged as ``column``; ``kinds``: families that a standard linear solid of it lacks.
+    """``reading`` (n,) of a load history, logged as ``column``; ``kinds``: families that a line and an arm of it lack.
 
     ``beside``: families of which there is a little too, or which nothing but their size tells from those.
     """
 
-    reading: Callable[[Run], Array]
+    reading: Callable[[LoadHistory], Array]
     load: Load
     column: str
     load_noise_n: float
@@ -143,7 +143,7 @@ class OtherSensor:
     beside: frozenset[str] = frozenset()
     fitted: int = 2
     held_out: int = 2
-    logs: Callable[[Run], Mapping[str, Array]] = lambda run: {}
+    logs: Callable[[LoadHistory], Mapping[str, Array]] = lambda history: {}
     """Channels beside the reading, by column."""
 
     def recordings(self, seed: int) -> tuple[list[Recording], list[Recording]]:
@@ -151,52 +151,52 @@ class OtherSensor:
         rng = np.random.default_rng(seed)
         made = []
         for number in range(self.fitted + self.held_out):
-            run = Run(*self.load(rng, number), number, rng)
-            columns: dict[str, Any] = {self.column: self.reading(run), **self.logs(run)}
-            measured_n = run.load_n + rng.normal(0.0, self.load_noise_n, run.load_n.size)
+            history = LoadHistory(*self.load(rng, number), number, rng)
+            columns: dict[str, Any] = {self.column: self.reading(history), **self.logs(history)}
+            measured_n = history.load_n + rng.normal(0.0, self.load_noise_n, history.load_n.size)
             name = f"recording_{number + 1}"
-            made.append(Recording.from_arrays(time_s=run.time_s, name=name, force_n=measured_n, **columns))
+            made.append(Recording.from_arrays(time_s=history.time_s, name=name, force_n=measured_n, **columns))
         return made[: self.fitted], made[self.fitted :]
 
 
-def _film(run: Run) -> Array:
-    conducts = 1e-5 * np.maximum(run.load_n, 0.0) ** 0.85
-    ohm = 1.0 / (1e-7 + 0.9 * conducts + 0.1 * run.crept(conducts, (0.3, 1.0, 3.0, 10.0, 30.0)))
-    return np.asarray(np.round((5.0 * 1e4 / (1e4 + ohm) + run.noise(0.003)) / 5.0 * 1023.0) * 5.0 / 1023.0)
+def _film(history: LoadHistory) -> Array:
+    conducts = 1e-5 * np.maximum(history.load_n, 0.0) ** 0.85
+    ohm = 1.0 / (1e-7 + 0.9 * conducts + 0.1 * history.crept(conducts, (0.3, 1.0, 3.0, 10.0, 30.0)))
+    return np.asarray(np.round((5.0 * 1e4 / (1e4 + ohm) + history.noise(0.003)) / 5.0 * 1023.0) * 5.0 / 1023.0)
 
 
-def _bridge(run: Run) -> Array:
-    return 2e-3 * run.load_n + 5e-7 * run.late(run.load_n, 8.0) + run.noise(4e-4, 0.2)
+def _bridge(history: LoadHistory) -> Array:
+    return 2e-3 * history.load_n + 5e-7 * history.late(history.load_n, 8.0) + history.noise(4e-4, 0.2)
 
 
-def _foam_capacitor(run: Run) -> Array:
-    closed = 0.45 * -np.expm1(-run.load_n / 9.0)
-    closed = 0.85 * closed + 0.1 * run.late(closed, 0.6) + 0.05 * run.late(closed, 12.0)
-    return 10.0 / (1.0 - closed) + run.noise(0.008)
+def _foam_capacitor(history: LoadHistory) -> Array:
+    closed = 0.45 * -np.expm1(-history.load_n / 9.0)
+    closed = 0.85 * closed + 0.1 * history.late(closed, 0.6) + 0.05 * history.late(closed, 12.0)
+    return 10.0 / (1.0 - closed) + history.noise(0.008)
 
 
-def _piezo(run: Run) -> Array:
-    return 0.02 * (run.load_n - run.late(run.load_n, 20.0)) + run.noise(0.002)
+def _piezo(history: LoadHistory) -> Array:
+    return 0.02 * (history.load_n - history.late(history.load_n, 20.0)) + history.noise(0.002)
 
 
-def _rubber_barometer(run: Run) -> Array:
-    pressed = 3.0 * run.load_n + 0.07 * run.load_n**2 + 0.25 * run.late(run.load_n, 2.0)
-    return 1010.0 + pressed - 1.5 * np.expm1(-run.time_s / 60.0) + run.noise(0.05)
+def _rubber_barometer(history: LoadHistory) -> Array:
+    pressed = 3.0 * history.load_n + 0.07 * history.load_n**2 + 0.25 * history.late(history.load_n, 2.0)
+    return 1010.0 + pressed - 1.5 * np.expm1(-history.time_s / 60.0) + history.noise(0.05)
 
 
-def _air_line(run: Run) -> Array:
-    angular, step_s = 2.0 * np.pi * 2.0, 0.1 / run.rate_hz
-    out, speed, place = np.empty(run.load_n.size), 0.0, float(run.load_n[0])
-    for k, load in enumerate(run.load_n):
+def _air_line(history: LoadHistory) -> Array:
+    angular, step_s = 2.0 * np.pi * 2.0, 0.1 / history.rate_hz
+    out, speed, place = np.empty(history.load_n.size), 0.0, float(history.load_n[0])
+    for k, load in enumerate(history.load_n):
         for _ in range(10):
             speed += step_s * (angular**2 * (load - place) - 1.4 * angular * speed)
             place += step_s * speed
         out[k] = place
-    return 0.5 * out + run.noise(0.05)
+    return 0.5 * out + history.noise(0.05)
 
 
-def _fibre(run: Run) -> Array:
-    return 4.0 * np.exp(-run.load_n / 12.0) + 0.5 + run.noise(0.006)
+def _fibre(history: LoadHistory) -> Array:
+    return 4.0 * np.exp(-history.load_n / 12.0) + 0.5 + history.noise(0.006)
 
 
 def _relays(load_n: Array, highest_n: float, count: int = 25) -> Array:
@@ -210,102 +210,104 @@ def _relays(load_n: Array, highest_n: float, count: int = 25) -> Array:
     return out
 
 
-def _magnet(run: Run) -> Array:
-    deep = 0.2 * _relays(run.load_n, 10.0) + 0.08 * run.load_n
+def _magnet(history: LoadHistory) -> Array:
+    deep = 0.2 * _relays(history.load_n, 10.0) + 0.08 * history.load_n
     field_mt = 1.0 / (2.2 - deep) ** 3
-    return 20.0 * (0.9 * field_mt + 0.1 * run.late(field_mt, 3.0)) + run.noise(0.004)
+    return 20.0 * (0.9 * field_mt + 0.1 * history.late(field_mt, 3.0)) + history.noise(0.004)
 
 
-def _late_pad(run: Run) -> Array:
-    reading = 0.8 * run.load_n + 0.35 * run.late(run.load_n, 0.9)
-    return np.interp(run.time_s - 0.08, run.time_s, reading) + run.rng.uniform(-3.0, 3.0) + run.noise(0.02)
+def _late_pad(history: LoadHistory) -> Array:
+    reading = 0.8 * history.load_n + 0.35 * history.late(history.load_n, 0.9)
+    return (
+        np.interp(history.time_s - 0.08, history.time_s, reading) + history.rng.uniform(-3.0, 3.0) + history.noise(0.02)
+    )
 
 
-def _room_k(run: Run) -> Array:
-    return np.asarray(6.0 * run.number + 8.0 * np.sin(2.0 * np.pi * run.time_s / 300.0 + run.number))
+def _room_k(history: LoadHistory) -> Array:
+    return np.asarray(6.0 * history.number + 8.0 * np.sin(2.0 * np.pi * history.time_s / 300.0 + history.number))
 
 
-def _bridge_in_any_room(run: Run) -> Array:
-    warmer_k = _room_k(run)
-    spanned = 0.05 * run.load_n + 0.006 * run.late(run.load_n, 4.0)
-    return spanned * (1.0 - 0.004 * warmer_k) + 0.002 * warmer_k + run.noise(0.004)
+def _bridge_in_any_room(history: LoadHistory) -> Array:
+    warmer_k = _room_k(history)
+    spanned = 0.05 * history.load_n + 0.006 * history.late(history.load_n, 4.0)
+    return spanned * (1.0 - 0.004 * warmer_k) + 0.002 * warmer_k + history.noise(0.004)
 
 
-def _ionic(run: Run) -> Array:
-    pressed, taus = np.maximum(run.load_n, 0.0) ** 0.7, np.geomspace(0.05, 100.0, 14)
-    return 0.5 * pressed + 0.5 * run.crept(pressed, taus, taus**-0.35) + run.noise(0.01)
+def _ionic(history: LoadHistory) -> Array:
+    pressed, taus = np.maximum(history.load_n, 0.0) ** 0.7, np.geomspace(0.05, 100.0, 14)
+    return 0.5 * pressed + 0.5 * history.crept(pressed, taus, taus**-0.35) + history.noise(0.01)
 
 
-def _strip(run: Run) -> Array:
-    drawn = run.load_n**0.8
-    return 40.0 * (drawn + run.crept(drawn, np.geomspace(1.0, 300.0, 8))) + run.noise(0.05)
+def _strip(history: LoadHistory) -> Array:
+    drawn = history.load_n**0.8
+    return 40.0 * (drawn + history.crept(drawn, np.geomspace(1.0, 300.0, 8))) + history.noise(0.05)
 
 
-def _insole(run: Run) -> Array:
-    volts = 3.0 * run.load_n / (run.load_n + 900.0)
-    return 0.92 * volts + 0.08 * run.late(volts, 0.4) + 0.02 * run.number + run.noise(0.01)
+def _insole(history: LoadHistory) -> Array:
+    volts = 3.0 * history.load_n / (history.load_n + 900.0)
+    return 0.92 * volts + 0.08 * history.late(volts, 0.4) + 0.02 * history.number + history.noise(0.01)
 
 
-def _coarse(run: Run) -> Array:
-    crept = run.crept(run.load_n, (1.0, 5.0, 25.0, 120.0))
-    return np.asarray(np.round((0.9 * run.load_n + 0.2 * crept) / 120.0 * 255.0) / 51.0)
+def _coarse(history: LoadHistory) -> Array:
+    crept = history.crept(history.load_n, (1.0, 5.0, 25.0, 120.0))
+    return np.asarray(np.round((0.9 * history.load_n + 0.2 * crept) / 120.0 * 255.0) / 51.0)
 
 
-def _sticky(run: Run) -> Array:
-    out, place = np.empty(run.load_n.size), float(run.load_n[0])
-    for k, load in enumerate(run.load_n):
-        place += (load - place) * -np.expm1(-1.0 / (run.rate_hz * (0.15 if load > place else 1.2)))
+def _sticky(history: LoadHistory) -> Array:
+    out, place = np.empty(history.load_n.size), float(history.load_n[0])
+    for k, load in enumerate(history.load_n):
+        place += (load - place) * -np.expm1(-1.0 / (history.rate_hz * (0.15 if load > place else 1.2)))
         out[k] = place
-    return 0.1 * (0.8 * run.load_n + 0.2 * out) + run.noise(0.004)
+    return 0.1 * (0.8 * history.load_n + 0.2 * out) + history.noise(0.004)
 
 
-def _curing(run: Run) -> Array:
-    kept = 1.0 + 0.06 * np.expm1(-run.time_s / 100.0)
-    return 0.1 * (run.load_n + 0.1 * run.late(run.load_n, 1.0)) * kept + run.noise(0.004)
+def _curing(history: LoadHistory) -> Array:
+    kept = 1.0 + 0.06 * np.expm1(-history.time_s / 100.0)
+    return 0.1 * (history.load_n + 0.1 * history.late(history.load_n, 1.0)) * kept + history.noise(0.004)
 
 
-def _with_play(run: Run) -> Array:
-    out, place = np.empty(run.load_n.size), float(run.load_n[0])
-    for k, load in enumerate(run.load_n):
+def _with_play(history: LoadHistory) -> Array:
+    out, place = np.empty(history.load_n.size), float(history.load_n[0])
+    for k, load in enumerate(history.load_n):
         place = min(max(place, load - 0.8), load + 0.8)
         out[k] = place
-    return 0.1 * run.late(0.7 * run.load_n + 0.3 * out, 0.05) + run.noise(0.004)
+    return 0.1 * history.late(0.7 * history.load_n + 0.3 * out, 0.05) + history.noise(0.004)
 
 
-def _slow(run: Run) -> Array:
-    return run.late(0.05 * run.load_n + 0.01 * run.late(run.load_n, 3.0), 0.12) + run.noise(0.004)
+def _slow(history: LoadHistory) -> Array:
+    return history.late(0.05 * history.load_n + 0.01 * history.late(history.load_n, 3.0), 0.12) + history.noise(0.004)
 
 
-def _leaking(run: Run) -> Array:
-    out, lost = np.empty(run.load_n.size), 0.0
-    for k, load in enumerate(run.load_n):
+def _leaking(history: LoadHistory) -> Array:
+    out, lost = np.empty(history.load_n.size), 0.0
+    for k, load in enumerate(history.load_n):
         out[k] = load - lost
-        lost += 0.003 / run.rate_hz * out[k]
-    return 0.2 * out + run.noise(0.05)
+        lost += 0.003 / history.rate_hz * out[k]
+    return 0.2 * out + history.noise(0.05)
 
 
-def _thickening(run: Run) -> Array:
-    speed = np.abs(run.late(np.gradient(run.load_n, 1.0 / run.rate_hz), 0.05))
-    return 0.05 * run.load_n * (1.0 + 0.04 * np.log1p(speed / 50.0)) + run.noise(0.006)
+def _thickening(history: LoadHistory) -> Array:
+    speed = np.abs(history.late(np.gradient(history.load_n, 1.0 / history.rate_hz), 0.05))
+    return 0.05 * history.load_n * (1.0 + 0.04 * np.log1p(speed / 50.0)) + history.noise(0.006)
 
 
-def _curved(run: Run) -> Array:
-    curved = 0.05 * run.load_n * (1.0 - 0.1 * run.load_n / 40.0)
-    return curved + 0.012 * run.late(run.load_n, 1.2) + run.rng.uniform(-0.3, 0.3) + run.noise(0.006)
+def _curved(history: LoadHistory) -> Array:
+    curved = 0.05 * history.load_n * (1.0 - 0.1 * history.load_n / 40.0)
+    return curved + 0.012 * history.late(history.load_n, 1.2) + history.rng.uniform(-0.3, 0.3) + history.noise(0.006)
 
 
-def _reseated(run: Run) -> Array:
-    spanned = 0.05 * run.load_n + 0.006 * run.late(run.load_n, 2.0)
-    return spanned * (1.0 + run.rng.uniform(-0.04, 0.04)) + run.noise(0.005)
+def _reseated(history: LoadHistory) -> Array:
+    spanned = 0.05 * history.load_n + 0.006 * history.late(history.load_n, 2.0)
+    return spanned * (1.0 + history.rng.uniform(-0.04, 0.04)) + history.noise(0.005)
 
 
-def _beside_another(run: Run) -> Array:
-    other_n = presses(90.0, run.rate_hz, 30.0)(run.rng, 0)[1]
-    return 0.05 * run.load_n + 0.006 * run.late(run.load_n, 2.0) + 0.004 * other_n + run.noise(0.004)
+def _beside_another(history: LoadHistory) -> Array:
+    other_n = presses(90.0, history.rate_hz, 30.0)(history.rng, 0)[1]
+    return 0.05 * history.load_n + 0.006 * history.late(history.load_n, 2.0) + 0.004 * other_n + history.noise(0.004)
 
 
 def _sensor(
-    reading: Callable[[Run], Array], load: Load, column: str, load_noise_n: float, kinds: str, beside: str = "",
+    reading: Callable[[LoadHistory], Array], load: Load, column: str, load_noise_n: float, kinds: str, beside: str = "",
     fitted: int = 2, held_out: int = 2,
 ) -> OtherSensor:  # fmt: skip
     few = frozenset(kinds.split()), frozenset(beside.split())
@@ -325,7 +327,7 @@ OTHER_SENSORS = {
     "late_pad": _sensor(_late_pad, hand, "pressure_v", 0.01, "timing"),
     "bridge_in_any_room": replace(
         _sensor(_bridge_in_any_room, presses(200, 25, 50), "pressure_v", 0.03, "gain_drift zero"),
-        logs=lambda run: {"temperature_c": ROOM_C + _room_k(run)},
+        logs=lambda history: {"temperature_c": ROOM_C + _room_k(history)},
     ),
     "ionic_gel": _sensor(_ionic, presses(90, 50, 5), "pressure_v", 0.003, f"{CURVE} relaxation"),
     "strip": _sensor(_strip, stretch, "pressure_mm", 0.002, CURVE, "relaxation", held_out=1),

@@ -26,6 +26,7 @@ from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
+from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session
@@ -33,7 +34,7 @@ from smartshoe.diagnosis._settling import Progress, better_from, law_or_block, l
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects.effect import CoreEffect
+from smartshoe.models.effects.effect import CoreEffect, Effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.loading import turning_points
 
@@ -44,7 +45,8 @@ class Inference:
 
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
     ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
-    one is idle, and others undo one another without it.
+    one is idle, and others undo one another without it. ``alone``: the effect that does most by itself, where no
+    member is sure.
     """
 
     baseline: Fit
@@ -56,6 +58,7 @@ class Inference:
     refused: tuple[str, ...] = ()
     can_validate: bool = True
     undone: tuple[str, ...] = ()
+    alone: Effect | None = None
 
 
 def infer(
@@ -109,8 +112,22 @@ def infer(
         alone = None if first is None else _judged(first, plain, sessions)
         found = found.with_nothing_but(plain) if alone is None or alone.is_stepped_down else alone
         members = found.members()
+    alone = None
+    if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in members):
+        progress("trying each of a few effects alone")
+        alone = _best_alone(begun, plain, sessions)
+        if alone is not None and not found.fit.model.parts:
+            found, members = alone, alone.members()
     return Inference(
-        plain, found.fit, found.likelihood, members, screening, likeness, found.refused, undone=found.undone
+        plain,
+        found.fit,
+        found.likelihood,
+        members,
+        screening,
+        likeness,
+        found.refused,
+        undone=found.undone,
+        alone=None if alone is None else alone.fit.model.parts[-1].effect,
     )
 
 
@@ -198,6 +215,29 @@ def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> Stat
     likelihood = begun.likelihood(sessions)
     evidence, best = evidence_about(path[0], sessions, begun.evidence)
     return State(evidence.given, evidence, best, fit(likelihood, path[0]), state.banned)
+
+
+def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> _Judged | None:
+    """Of the few likeliest effects the one by which alone what is left out is foreseen best, where any stands.
+
+    Where several stand in for one another none is sure; which of them does most by itself does not hang on the others.
+    It must do away with more than small imperfections of a good unit add up to.
+    """
+    before, thresholds = error_of(sessions, plain.model), begun.thresholds
+    if before <= thresholds.tolerable:
+        return None
+    left_out = LeftOut(sessions, begun.evidence.noise_sd, plain.model, thresholds)
+    likelihood, standing = begun.likelihood(sessions), []
+    for k in additions(begun.evidence, begun.start, BREADTH):
+        best = begun.evidence.posterior((*begun.start, k))
+        if best.score >= begun.evidence.posterior(begun.start).score:
+            continue
+        one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
+        judged = _judged(State(begun.given, begun.evidence, best, one), plain, sessions)
+        removed = before**2 - error_of(sessions, judged.fit.model) ** 2
+        if not judged.is_stepped_down and removed > thresholds.tolerable**2:
+            standing.append(judged)
+    return min(standing, key=lambda one: float(left_out.errors(one.fit.model).sum()), default=None)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

@@ -118,11 +118,13 @@ def _other_laws(
     channels = {e.name for e in available(likelihood.sessions)}
     found = []
     for law in catalogue().values():
-        is_other = law.is_memoryless if of_curves else law.family == one.effect.family
+        is_other = law.is_memoryless if of_curves else law.slot == one.effect.slot
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         start = begun_with(law, less.model, likelihood)
         fitted = fit(likelihood, start, FEW_STEPS)
+        if of_curves and fitted.model.part(law.name).kind_ends_at:
+            continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
     return tuple(sorted(found, key=lambda a: a.margin))
 

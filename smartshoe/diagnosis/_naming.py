@@ -41,6 +41,7 @@ def names_of(
     *,
     is_followed: bool = False,
     is_clocked: bool = False,
+    alone: Effect | None = None,
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
@@ -49,7 +50,8 @@ def names_of(
 
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
-    are. Where much is left beside the largest, that one alone is named if it cannot be ruled out, as half sure at most.
+    are. Where much is left beside the largest, that one alone is named if it cannot be ruled out, as half sure at most;
+    else the one of the kind that does most ``alone``, likewise.
     ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
     curve: none of these is more than half sure, and nothing is named for its size.
 
@@ -67,11 +69,14 @@ def names_of(
             if one.is_sure or (is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable)
         )
     larger = tuple(one for one in likely if one.member.size > left)
-    if is_followed or not larger:
+    if is_followed and larger:
         return larger
-    largest = max(larger, key=lambda one: one.member.size)
-    kind = probability_of_kind(largest.member, left, thresholds)
-    return (_doubted(largest),) if kind > thresholds.equivalent_odds * (1.0 - kind) else ()
+    largest = max(larger, key=lambda one: one.member.size, default=None)
+    kind = 0.0 if largest is None else probability_of_kind(largest.member, left, thresholds)
+    if largest is not None and kind > thresholds.equivalent_odds * (1.0 - kind):
+        return (_doubted(largest),)
+    by_itself = [one for one in likely if alone is not None and one.member.effect.slot == alone.slot]
+    return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
@@ -84,7 +89,7 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
         beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in _kin_of(followed))
         as_law = replace(one, laws=beside, fall=one.fall - by.margin)
         return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
-    if not one.effect.is_flexible:
+    if not (one.effect.is_flexible or one.is_any_curve):
         law, equivalents = probability_of_law(one, thresholds)
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
@@ -107,8 +112,8 @@ def _law_in_its_place(one: Member) -> Alternative | None:
 
 
 def _kin_of(law: Effect) -> tuple[str, ...]:
-    """The other laws of its family."""
-    return tuple(one.name for one in catalogue().values() if one.family == law.family and one is not law)
+    """The other laws of its family, and of those that count as its members."""
+    return tuple(one.name for one in catalogue().values() if one.slot == law.slot and one is not law)
 
 
 def _nearest_of_kind(block: Member) -> Effect:

@@ -220,14 +220,20 @@ def _diagnosed(
     is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
     members = [one for one in found.members if one.name not in found.undone]
     names = names_of(
-        members, everything, thresholds, is_followed=is_followed, is_clocked=given.excitation.goes_with_the_clock
+        members,
+        everything,
+        thresholds,
+        is_followed=is_followed,
+        is_clocked=given.excitation.goes_with_the_clock,
+        alone=found.alone,
     )
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     cycles = load_cycles(sessions, thresholds)
-    unclear += [(one, few_cycles_of(one, cycles)) for one in names[cycles:]]
-    names = names[:cycles]
+    surest = sorted(names, key=lambda one: -one.confidence)[:cycles]
+    unclear += [(one, few_cycles_of(one, cycles)) for one in names if one not in surest]
+    names = tuple(one for one in names if one in surest)
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))

@@ -40,8 +40,8 @@ class Candidate:
 
     @property
     def slot(self) -> str:
-        """Of what there is one in a set: a law, or a flexible block in its place, of each family."""
-        return self.effect.imitates or self.effect.family
+        """Of what there is one in a set."""
+        return self.effect.slot
 
     def start(self, strengths: Array) -> Array:
         """Parameter values (p,) with these changes of the strengths from null, within their bounds."""

@@ -40,17 +40,17 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     """What is said of an effect that follows best where it is of another kind, or is the wall's own arm."""
     told = name.effect.name.replace("_", " ")
     part = model.part(name.member.name)
-    if name.by is None and part.kind_ends_at:
+    if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         return (
             f"what follows best as {told} has its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it"
             " turns into an effect of another kind, so that it is not named"
         )
-    if part.name in dict(arms_of(model)) and is_stretched(model):
+    if (part.name in dict(arms_of(model)) or part.effect.is_latency) and is_stretched(model):
         return (
             f"beside {told} the wall's own relaxation has come to the end of its range, where no wall's is: either may"
-            " be the other's, so that it is not named"
+            " be the other's, or undo it, so that it is not named"
         )
     return None
 
@@ -64,7 +64,7 @@ def moved_of(name: Name) -> str:
 
 
 def few_cycles_of(name: Name, cycles: int) -> str:
-    """What is said of an effect beside as many larger ones as there are load cycles to tell them by."""
+    """What is said of an effect beside as many surer ones as there are load cycles to tell them by."""
     return (
         f"{name.effect.name.replace('_', ' ')} fits, but {cycles} load cycles show no more than {cycles} causes, so"
         " that it is not named (repeat the cycles)"

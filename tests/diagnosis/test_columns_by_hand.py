@@ -104,10 +104,8 @@ def test_a_strength_has_the_sign_that_its_bounds_allow() -> None:
 
 
 def test_a_slot_is_a_family_or_the_one_that_is_imitated() -> None:
-    one = _candidate((0.0, 0.0, 5.0))
-    assert (one.name, one.slot) == ("one", "family")
-    other: Any = SimpleNamespace(**{**vars(one.effect), "imitates": "another"})
-    assert replace(one, effect=other).slot == "another"
+    assert {effect(name).slot for name in ("saturation", "contact_area")} == {"static_curve"}
+    assert (effect("linear_leak").slot, _candidate((0.0, 0.0, 5.0)).name) == ("leak", "one")
 
 
 def test_an_effect_needs_its_channel_in_every_session() -> None:

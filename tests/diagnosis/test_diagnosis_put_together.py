@@ -92,7 +92,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     other = SimpleNamespace(effect=effect("dead_band"), size=0.25, name="dead_band")
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
-        can_validate=True, refused=(), undone=(), screening=tuple((f"n{k}", float(k)) for k in range(6)),
+        can_validate=True, refused=(), undone=(), alone=None, screening=tuple((f"n{k}", float(k)) for k in range(6)),
         likeness=np.eye(6),
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
@@ -146,9 +146,11 @@ def _run_diagnosis(parts: Any) -> Any:
     return result
 
 
-def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True) -> Any:
-    known, member = effect("delay" if name in ("turned", "faint") else name), SimpleNamespace(size=size, name=name)
-    return SimpleNamespace(name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member)
+def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, confidence: float = 0.9) -> Any:
+    known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
+    return SimpleNamespace(
+        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, confidence=confidence
+    )
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
@@ -180,7 +182,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
         [("fitted", [True, True, False])],  # a cycle that is held out decides over no name
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
-    assert seen["names_of"][1] == {"is_followed": False, "is_clocked": False}
+    assert seen["names_of"][1] == {"is_followed": False, "is_clocked": False, "alone": None}
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
@@ -194,7 +196,7 @@ def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch:
         monkeypatch.setattr(_procedure, "fitted_rms", lambda _, of, left=left: left if of[0] == "held 2" else 1.0)
         parts.given.excitation.goes_with_the_clock = is_followed
         _run_diagnosis(parts)
-        assert parts.seen["names_of"][1] == {"is_followed": is_followed, "is_clocked": is_followed}
+        assert parts.seen["names_of"][1] == {"is_followed": is_followed, "is_clocked": is_followed, "alone": None}
 
 
 def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:
@@ -207,13 +209,15 @@ def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts
 
 
 def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    parts.names = [_name("turned"), _name("linear_leak"), _name("delay")]  # the first is none for a reason of its own
-    for cycles, named in ((1, ["linear_leak"]), (2, ["delay", "linear_leak"])):
+    """The surest of them; and one that is none for a reason of its own counts for nothing."""
+    for cycles, sure, named in ((1, 0.8, ["linear_leak"]), (2, 0.8, ["delay", "linear_leak"]), (1, 0.95, ["delay"])):
+        parts.names = [_name("turned"), _name("linear_leak"), _name("delay", confidence=sure)]
         parts.seen.clear()
         monkeypatch.setattr(_procedure, "load_cycles", lambda sessions, thresholds, cycles=cycles: cycles)
         told = _run_diagnosis(parts)
         assert [one.name for one in told.causes] == named
-        assert any("delay fits, but 1 load cycles show no more" in said for said in told.limits) is (cycles == 1)
+        other = "linear leak" if sure > 0.9 else "delay"
+        assert any(f"{other} fits, but 1 load cycles show no more" in said for said in told.limits) is (cycles == 1)
 
 
 def test_a_block_whose_kind_is_a_cause_is_not_listed_beside_it(parts: Any) -> None:

@@ -11,7 +11,7 @@ import pytest
 from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, told_fit, worth
 
 from smartshoe.diagnosis import _inference
-from smartshoe.diagnosis._inference import _judged, _screening, independent, infer
+from smartshoe.diagnosis._inference import _best_alone, _judged, _screening, independent, infer
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -40,11 +40,15 @@ def test_screening_is_what_each_effect_alone_takes_off() -> None:
 
 
 # -- the whole inference, by what each part answers -------------------------------------------------------------------
+class _Model(str):
+    parts: tuple[Any, ...] = ()
+
+
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
         independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={},
-        names={}, refused={}, errors={}, stepped=(), is_law=True,
+        names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={}, alone=None,
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -66,9 +70,11 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         return lambda one, *rest: state(f"{name} {one.name}")
 
     def judged(one: Any, plain: Any, sessions: Any) -> Any:
+        model = _Model(one.name)
+        model.parts = told.parts.get(one.name, ())
         return SimpleNamespace(
-            members=lambda: (),
-            fit=SimpleNamespace(model=one.name),
+            members=lambda: told.members,
+            fit=SimpleNamespace(model=model),
             likelihood="likelihood",
             refused=told.refused.get(one.name, ()),
             undone=(),
@@ -97,6 +103,8 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "with_laws", lambda one, model, sessions: told.lawful or one)
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one, sessions: lawful if told.is_law else one)
     monkeypatch.setattr(_inference, "_judged", judged)
+    monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
+    monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
     monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
     monkeypatch.setattr(_inference, "score_of", lambda model, likelihood, odds: told.scores.get(model, -len(model)))
@@ -137,6 +145,68 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     assert flow.infer().fit.model == "settled first"
     flow.lawful, flow.laws = None, [{"a": "b"}, {"c": "d"}]
     assert flow.infer().fit.model == "law law settled first"
+
+
+def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> None:
+    """And it is the answer where nothing else is left."""
+    least = STANDARD.least_confidence
+    flow.members = (0.1, 0.99 * least)  # told as how sure each is where nothing is left
+    assert flow.infer().alone is None
+    part = SimpleNamespace(effect="a curve")
+    flow.alone = SimpleNamespace(
+        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,))), likelihood="of alone", refused=("b",), undone=(),
+        members=lambda: ("curve",),
+    )  # fmt: skip
+    found = flow.infer()
+    assert (found.alone, found.fit, found.members) == ("a curve", flow.alone.fit, ("curve",))
+    assert (found.likelihood, found.refused) == ("of alone", ("b",))
+    flow.parts = {"settled first": (part, part)}
+    found = flow.infer()
+    assert (found.alone, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
+    flow.members = (0.1, least)
+    assert flow.infer().alone is None
+
+
+def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the five likeliest for which there is evidence; what it does away with is more than is tolerable."""
+    evidence: Any = ToldEvidence([candidate(f"n{k}") for k in range(7)], worth(9.0, 8.0, 7.0, 6.0, 5.0, 4.0, -1.0))
+    evidence.noise_sd = 0.1
+    stepped, left_out = set[str](), {"n0": 3.0, "n1": 1.0, "n2": 2.0, "n3": 0.5, "n4": 2.5, "n5": 0.1, "n6": 0.1}
+    errors = {"plain": 0.01, **dict.fromkeys(left_out, 0.009)}
+    monkeypatch.setattr(_inference, "error_of", lambda sessions, model: errors[model])
+    monkeypatch.setattr(_inference, "with_members", lambda given, best, model, likelihood: f"n{best.members[0]}")
+    monkeypatch.setattr(_inference, "fit", lambda likelihood, model: SimpleNamespace(model=model))
+    monkeypatch.setattr(_inference, "State", lambda given, evidence, best, fit: fit)
+    monkeypatch.setattr(
+        _inference,
+        "_judged",
+        lambda one, plain, sessions: SimpleNamespace(fit=one, is_stepped_down=one.model in stepped),
+    )
+
+    class Left:
+        def __init__(self, *given: Any) -> None: ...
+
+        def errors(self, model: Any) -> Any:
+            return np.array([left_out[model]])
+
+    monkeypatch.setattr(_inference, "LeftOut", Left)
+    begun: Any = SimpleNamespace(
+        given=evidence.given, evidence=evidence, start=(), thresholds=STANDARD, likelihood=lambda sessions: None,
+        fit=SimpleNamespace(model="plain"),
+    )  # fmt: skip
+    plain: Any = SimpleNamespace(model="plain")
+
+    def found() -> str | None:
+        one = _best_alone(begun, plain, [])
+        return None if one is None else str(one.fit.model)
+
+    assert found() == "n3"
+    stepped.add("n3")
+    assert found() == "n1"
+    errors["n1"] = float(np.sqrt(errors["plain"] ** 2 - 0.99 * STANDARD.tolerable**2))
+    assert found() == "n2"
+    errors["plain"] = STANDARD.tolerable
+    assert found() is None
 
 
 def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(flow: Any) -> None:

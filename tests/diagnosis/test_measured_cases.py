@@ -287,13 +287,13 @@ class TestSensors:
         assert "no cause can be told" in _limit(found, "one load cycle")
 
     @pytest.mark.bank
-    @pytest.mark.parametrize(("seed", "count"), [(0, 1), (1, 2), (2, 2)])
-    def test_two_cycles_tell_two_causes_at_most_and_the_right_ones(self, measured: Path, seed: int, count: int) -> None:
-        """Of the readings as they are the curve alone, with noise of a hundred-thousandth what relaxes, too."""
+    @pytest.mark.parametrize("seed", [0, 1, 2])
+    def test_two_cycles_tell_two_causes_at_most_and_the_right_ones(self, measured: Path, seed: int) -> None:
+        """The curve and what relaxes, with noise of a hundred-thousandth as without."""
         found = _sensor(measured, "vhb_two_rates", seed)
         families = {cause.effect.family for cause in found.causes}
         assert families <= KINDS["vhb_two_rates"]
-        assert len(found.causes) == len(families) == count
+        assert len(found.causes) == len(families) == 2
 
     @pytest.mark.bank
     @pytest.mark.parametrize("seed", [1, 2])

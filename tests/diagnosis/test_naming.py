@@ -136,7 +136,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     (block, *_) = blocks()["static_curve"]
     margins = (("contact_area", 3.0), ("gas_compression", 900.0), ("wall_hardening", 40.0))
     name = only(names_of([member(block, laws=margins, fall=47.0)], 0.0, STANDARD))
-    family = {one.name for one in catalogue().values() if one.family == "static_curve"}
+    family = {one.name for one in catalogue().values() if one.slot == "static_curve"}
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family
@@ -180,6 +180,25 @@ def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> 
     assert name.law == pytest.approx(1.0 / 3.0)
 
 
+def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_most() -> None:
+    """A block of that kind in the model, larger than all small imperfections of a good unit."""
+    (block, *_) = blocks()["static_curve"]
+    laws = (("contact_area", 1.0), ("dead_band", 90.0))
+    curve, other = (
+        member(block, size=0.01, departed=3.0, laws=laws),
+        member("play_hysteresis", size=0.012, departed=3.0),
+    )
+    left = 0.02
+    assert names_of([curve, other], left, STANDARD) == ()
+    name = only(names_of([curve, other], left, STANDARD, alone=effect("saturation")))
+    assert name.effect.name == "contact_area"
+    assert name.confidence < 0.5
+    assert not name.is_sure
+    assert names_of([curve, other], left, STANDARD, alone=effect("linear_leak")) == ()
+    small = replace(curve, size=STANDARD.tolerable)
+    assert names_of([small, other], left, STANDARD, alone=effect("contact_area")) == ()
+
+
 def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_well() -> None:
     """A dead band of a third of full scale is a curve like any other; one of its own kind is a dead band."""
     laws = (("sensor_nonlinearity", 20.0), ("gas_compression", 60.0))
@@ -187,10 +206,14 @@ def test_a_curve_where_its_kind_ends_has_the_name_of_the_law_that_follows_as_wel
     name = only(names_of([one], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == ("sensor_nonlinearity", ("gas_compression",), False)
     assert name.by is one.laws[0]
-    beyond = tuple(Alternative(law.effect, law.margin + 1000.0 * STANDARD.departure**2) for law in one.laws)
-    for other in (replace(one, is_ended=False, laws=()), replace(one, laws=beyond)):
-        name = only(names_of([other], 0.0, STANDARD))
-        assert (name.effect.name, name.by) == ("dead_band", None)
+    of_its_kind = replace(one, is_ended=False, laws=())
+    name = only(names_of([of_its_kind], 0.0, STANDARD))
+    assert (name.effect.name, name.by) == ("dead_band", None)
+    # Where none follows as well the nearest gives its name to any curve.
+    farther = tuple(Alternative(law.effect, law.margin + 1000.0 * STANDARD.departure**2) for law in one.laws)
+    name = only(names_of([replace(one, laws=farther)], 0.0, STANDARD))
+    assert (name.effect.name, name.kind_only, name.by) == ("sensor_nonlinearity", True, None)
+    assert {"gas_compression", "saturation", "contact_area", "wall_hardening"} <= {*name.equivalents}
 
 
 def test_a_kind_without_a_law_is_half_sure_at_most_or_as_sure_as_a_name_must_be() -> None:

@@ -219,6 +219,11 @@ class Effect(ABC):
         return self.inverse(values, step_s)
 
     @property
+    def slot(self) -> str:
+        """Of what there is one in a set: a law, or a flexible block in its place, of each family."""
+        return self.imitates or self.family
+
+    @property
     def goes_with_the_clock(self) -> bool:
         """Whether it goes with time, or with what was borne so far, by what its neighbours are told from it."""
         return any(words & CLOCK for words in self.separated_by.values())
