@@ -109,14 +109,15 @@ def infer(
         found, members = other, other.members()
     if found.is_stepped_down:
         first = _first_step(begun, state, sessions)
-        alone = None if first is None else _judged(first, plain, sessions)
-        found = found.with_nothing_but(plain) if alone is None or alone.is_stepped_down else alone
+        again = None if first is None else _judged(first, plain, sessions)
+        found = found.with_nothing_but(plain) if again is None or again.is_stepped_down else again
         members = found.members()
-    alone = None
+    alone, refused = None, found.refused
     if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in members):
         progress("trying each of a few effects alone")
         alone = _best_alone(begun, plain, sessions)
-        if alone is not None and not found.fit.model.parts:
+        if alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
+            refused = tuple(name for name in refused if name not in alone.fit.model.names)
             found, members = alone, alone.members()
     return Inference(
         plain,
@@ -125,7 +126,7 @@ def infer(
         members,
         screening,
         likeness,
-        found.refused,
+        refused,
         undone=found.undone,
         alone=None if alone is None else alone.fit.model.parts[-1].effect,
     )

@@ -349,13 +349,18 @@ def _cause(
             )
         )
     if not name.is_sure:
+        does_most_alone = found.alone is not None and found.alone.slot == name.effect.slot
+        why = (
+            "by itself it foresees best what is left out"
+            if does_most_alone
+            else "it is named for its size, which is more than all that is left, or than small imperfections add up to"
+        )
         evidence.append(
             Statement(
                 "confidence of its kind",
                 name.confidence,
                 thresholds.least_confidence,
-                "it is not sure, since others may do what it does: it is named for its size, which is more than all"
-                " that is left, or than small imperfections add up to",
+                f"it is not sure, since others may do what it does: {why}",
             )
         )
     elif name.kind_only:

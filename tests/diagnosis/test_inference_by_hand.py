@@ -150,12 +150,12 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
 def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> None:
     """And it is the answer where nothing else is left."""
     least = STANDARD.least_confidence
-    flow.members = (0.1, 0.99 * least)  # told as how sure each is where nothing is left
+    flow.members, flow.refused = (0.1, 0.99 * least), {"settled first": ("b", "curve")}  # told as how sure each is
     assert flow.infer().alone is None
     part = SimpleNamespace(effect="a curve")
     flow.alone = SimpleNamespace(
-        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,))), likelihood="of alone", refused=("b",), undone=(),
-        members=lambda: ("curve",),
+        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))), likelihood="of alone",
+        undone=(), members=lambda: ("curve",),
     )  # fmt: skip
     found = flow.infer()
     assert (found.alone, found.fit, found.members) == ("a curve", flow.alone.fit, ("curve",))

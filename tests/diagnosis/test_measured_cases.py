@@ -296,6 +296,24 @@ class TestSensors:
         assert len(found.causes) == len(families) == 2
 
     @pytest.mark.bank
+    @pytest.mark.parametrize("which", ["as they are", "swapped", "three speeds"])
+    def test_the_curve_of_the_microfluidic_sensor_does_not_hang_on_what_is_fitted(
+        self, measured: Path, which: str
+    ) -> None:
+        """No equation follows it, so that nothing is sure; the curve does most by itself, whatever is given."""
+        fit, hold, column = SENSORS["microfluidic"]
+        fitted, judges = _files(measured, fit, column), _files(measured, hold, column)
+        if which == "swapped":
+            fitted, judges = judges, fitted
+        found = diagnose(fitted[::2] if which == "three speeds" else fitted, hold_out=judges)
+        assert [cause.effect.family for cause in found.causes] == ["static_curve"]
+        assert found.causes[0].confidence <= 0.5
+        assert any("by itself it foresees best" in one.says for one in found.causes[0].evidence)
+        assert found.verdict == "partly_explained"
+        assert found.extended is not None
+        assert found.extended.variance_explained_percent > 96.0
+
+    @pytest.mark.bank
     @pytest.mark.parametrize("seed", [1, 2])
     @pytest.mark.parametrize("name", ["air", "velostat", "vhb_two_rates"])
     def test_the_first_cause_does_not_hang_on_last_digits(self, measured: Path, name: str, seed: int) -> None:
