@@ -39,7 +39,13 @@ def _constant(one: Recording) -> Recording:
     return one.with_channel(replace(one.sensor, values=np.full(len(one), 10.0)))
 
 
+def _as(one: Recording, name: str) -> Recording:
+    """With its reading under another name, of which nothing tells that it is one."""
+    return one.without(one.sensor.name).with_channel(replace(one.sensor, name=name, role="auxiliary"))
+
+
 BAD = {
+    "name its column with --sensor (columns: film)": _as(OTHER, "film"),
     "reference load": OTHER.without("force"),
     "1 samples": OTHER.taken(slice(0, 1)),
     "constant": _constant(OTHER),

@@ -1,4 +1,4 @@
-"""A zero that follows the temperature of a die within its housing, while the thermometer hangs in the air."""
+"""A zero, and a gain, that follow the temperature of a die within its housing, while the thermometer is in the air."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from smartshoe.units import unit
 SLAB_S = 50.0  # of the slowest mode
 START_C = 22.0
 SHARE_PER_KELVIN = 0.006  # of full scale
+GAIN_PER_KELVIN = -0.004
 
 
 def _air_k(time_s: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -40,6 +41,31 @@ def _warmed(recording: Recording, full_scale: float, rng: np.random.Generator) -
     moved = SHARE_PER_KELVIN * full_scale * _amid_k(air_k, recording.sample_time_s)
     thermometer = Channel.from_values("temperature", START_C + air_k, unit("°C"))
     return recording.with_channel(replace(reading, values=reading.values + moved)).with_channel(thermometer)
+
+
+def _in_a_room(recording: Recording, room_k: float, rng: np.random.Generator) -> Recording:
+    """The gain of a sensor that has come to a room ``room_k`` above the first, and goes on with its air."""
+    reading = recording.sensors[0]
+    air_k = room_k + _air_k(recording.time_s, rng)
+    gain = 1.0 + GAIN_PER_KELVIN * (room_k + _amid_k(air_k - room_k, recording.sample_time_s))
+    thermometer = Channel.from_values("temperature", START_C + air_k, unit("°C"))
+    return recording.with_channel(replace(reading, values=reading.values * gain)).with_channel(thermometer)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gain_that_follows_the_temperature_from_room_to_room_is_told(seed: int) -> None:
+    case = within_reach({}, PLAIN[seed % len(PLAIN)], seed, recordings=3)
+    rng = np.random.default_rng(seed)
+    fitted = [_in_a_room(one, room_k, rng) for one, room_k in zip(case.recordings, (0.0, 7.0, -4.0), strict=True)]
+    held_out = [_in_a_room(one, 3.0, rng) for one in case.hold_out]
+    found = diagnose(fitted, held_out)
+    told = next(cause for cause in found.causes if cause.name == "gain_drift")
+    assert told.confidence > 0.5
+    # Within a recording lag and coefficient stand in for one another; what is between rooms is told.
+    coefficient, share = (told.parameters[name].value for name in ("temperature_coefficient", "carried_over"))
+    assert coefficient * share == pytest.approx(GAIN_PER_KELVIN, rel=0.05)
+    assert found.verdict == "explained"
+    assert found.explained_percent > 0.75 * found.explainable_percent
 
 
 @pytest.mark.parametrize("seed", range(4))
