@@ -47,7 +47,7 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
             f"what follows best as {told} has its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it"
             " turns into an effect of another kind, so that it is not named"
         )
-    if (part.name in dict(arms_of(model)) or part.effect.is_latency) and is_stretched(model):
+    if is_stretched(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
         return (
             f"beside {told} the wall's own relaxation has come to the end of its range, where no wall's is: either may"
             " be the other's, or undo it, so that it is not named"

@@ -53,7 +53,7 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
     """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
-    by then, which is taken out: the third column is how much that is.
+    by then, which is taken out: the third column is how much that is. A load that begins to rise at once is no rest.
     """
     found = []
     for session in sessions:
@@ -71,11 +71,18 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         most = max(1, round(thresholds.hold_s / session.conditions.step_s))  # nothing has crept yet
         first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
         kept = session.fitted[first]
-        if kept.sum() * session.conditions.step_s >= thresholds.settled_s:
+        lasts_s = kept.sum() * session.conditions.step_s
+        if lasts_s >= thresholds.settled_s and abs(_risen(load[first][kept])) < thresholds.still_per_s * lasts_s:
             drifted = float(np.mean(_drifted(session, model)[first][kept]))
             reading = float(np.mean(session.reading[first][kept])) - drifted
             found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
     return np.array(found).reshape(-1, 3)
+
+
+def _risen(load: Array) -> float:
+    """By how much a load (n,) rises from its first half to its second, on the line through the means of both."""
+    half = load.size // 2
+    return 2.0 * float(np.mean(load[half:]) - np.mean(load[:half])) if half else 0.0
 
 
 def _drifted(session: Session, model: ExtendedModel) -> Array:

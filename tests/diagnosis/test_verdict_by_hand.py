@@ -85,14 +85,17 @@ def test_an_effect_is_not_named_where_it_turns_into_one_of_another_kind(
 def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[str, float]) -> None:
     """Either may be the wall's own: what has no arm of its own, or a ladder of them, is none."""
 
-    def said(name: str, model: ExtendedModel) -> str | None:
-        values = [0.1, 0.3] if name in ("second_relaxation", "power_law_creep") else [0.001]
+    def said(name: str, model: ExtendedModel, early_s: float = -0.08) -> str | None:
+        values = (
+            [0.1, 0.3] if name in ("second_relaxation", "power_law_creep") else [early_s if name == "delay" else 0.001]
+        )
         return other_kind_of(_named(name), model.with_part(name, values))
 
     for name in ("second_relaxation", "power_law_creep", "linear_leak", "delay"):
         assert said(name, MODEL) is None
         is_open = name in ("second_relaxation", "delay")  # an arm of 5 at 33/s is 0.18 s late, which a delay undoes
         assert (said(name, replace(MODEL, **arm)) is not None) is is_open
+        assert said("delay", replace(MODEL, **arm), 0.08) is None  # late as well
     inside = {key: 0.99 * value + 0.01 * getattr(MODEL, key) for key, value in arm.items()}
     assert said("second_relaxation", replace(MODEL, **inside)) is None  # type: ignore[arg-type]
 

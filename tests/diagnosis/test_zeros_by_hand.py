@@ -165,6 +165,16 @@ def _rested(count: int, level: float = 0.0, reading: float = 0.01, step_s: float
     return one
 
 
+def test_a_load_that_begins_to_rise_at_once_is_no_rest() -> None:
+    """A reading that is late says nothing of its zero there; a machine that creeps as slowly as in a hold rests."""
+    for per_s, is_told in ((0.9 * STANDARD.still_per_s, True), (1.1 * STANDARD.still_per_s, False)):
+        one = _rested(20)
+        load = one.conditions.load.copy()
+        load[:20] = 0.1 * per_s * np.arange(20)
+        one.conditions = Conditions(one.conditions.time_s, load, 0.1)
+        assert first_rests([one], MODEL, STANDARD).size == (3 if is_told else 0)
+
+
 def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
     """Four tenths of a second: four samples; and no more of it is looked at than of a hold that shows creep."""
     for count, is_told in ((3, False), (4, True)):
