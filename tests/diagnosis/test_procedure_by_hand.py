@@ -191,6 +191,7 @@ def _told(
     laws: Any = (),
     is_sure: bool = True,
     by: Any = None,
+    alone: Any = None,
 ) -> Any:
     asked: list[Any] = []
 
@@ -220,7 +221,7 @@ def _told(
         by=by,
     )
     given: Any = SimpleNamespace(scale=SCALE, excitation=SimpleNamespace(present=present))
-    found: Any = SimpleNamespace(fit="fit")
+    found: Any = SimpleNamespace(fit="fit", alone=alone)
     cause = _cause(name, found, "fine", AFTER, given, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]
     fitted = ("fit", "static_curve_block") if by is None else (by.fit, "linear_leak")
@@ -254,6 +255,11 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
     assert "not sure" in doubt.says
+    assert "named for its size" in doubt.says
+    for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another
+        doubt = _told(monkeypatch, exposed, is_sure=False, alone=effect(alone)).evidence[-1]
+        assert ("by itself it foresees best" in doubt.says) is is_why
+        assert ("named for its size" in doubt.says) is not is_why
 
 
 def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
