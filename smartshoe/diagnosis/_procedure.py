@@ -364,11 +364,13 @@ def _cause(
             )
         )
     elif name.kind_only:
-        evidence.append(
-            Statement(
-                "kind", 1.0, 1.0, "the kind is sure, the law is not: no equation of it follows better than others"
-            )
+        is_certain = name.confidence >= thresholds.least_confidence
+        why = (
+            "the kind is sure, the law is not: no equation of it follows better than others"
+            if is_certain
+            else "no equation of its kind follows it: it may be of a kind that the catalogue does not have"
         )
+        evidence.append(Statement("kind", float(is_certain), 1.0, why))
     if name.by is not None:
         missed = max(name.by.margin, 0.0) / max(member.fall, 1.0)  # of -2 log likelihood
         evidence.append(

@@ -308,7 +308,7 @@ class TestSensors:
         found = diagnose(fitted[::2] if which == "three speeds" else fitted, hold_out=judges)
         assert [cause.effect.family for cause in found.causes] == ["static_curve"]
         assert found.causes[0].confidence <= 0.5
-        why = "it is named for its size" if which == "as they are" else "by itself it foresees best what is left out"
+        why = "no equation of its kind follows it" if which == "as they are" else "by itself it foresees best"
         assert any(why in one.says for one in found.causes[0].evidence)
         assert found.verdict == "partly_explained"
         assert found.extended is not None
