@@ -115,10 +115,11 @@ def infer(
     alone, refused = None, found.refused
     if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in members):
         progress("trying each of a few effects alone")
-        alone = _best_alone(begun, plain, sessions)
-        if alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
-            refused = tuple(name for name in refused if name not in alone.fit.model.names)
-            found, members = alone, alone.members()
+        best_alone = _best_alone(begun, plain, sessions)
+        alone = None if best_alone is None else best_alone[0]
+        if best_alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
+            found = best_alone[1]
+            members, refused = found.members(), tuple(name for name in refused if name not in found.fit.model.names)
     return Inference(
         plain,
         found.fit,
@@ -128,7 +129,7 @@ def infer(
         likeness,
         refused,
         undone=found.undone,
-        alone=None if alone is None else alone.fit.model.parts[-1].effect,
+        alone=alone,
     )
 
 
@@ -218,7 +219,7 @@ def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> Stat
     return State(evidence.given, evidence, best, fit(likelihood, path[0]), state.banned)
 
 
-def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> _Judged | None:
+def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Judged] | None:
     """Of the few likeliest effects the one by which alone what is left out is foreseen best, where any stands.
 
     Where several stand in for one another none is sure; which of them does most by itself does not hang on the others.
@@ -229,16 +230,17 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> _Judge
         return None
     left_out = LeftOut(sessions, begun.evidence.noise_sd, plain.model, thresholds)
     likelihood, standing = begun.likelihood(sessions), []
+    nothing = begun.evidence.posterior(begun.start)
     for k in additions(begun.evidence, begun.start, BREADTH):
         best = begun.evidence.posterior((*begun.start, k))
-        if best.score >= begun.evidence.posterior(begun.start).score:
+        if best.score >= nothing.score:
             continue
         one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
         judged = _judged(State(begun.given, begun.evidence, best, one), plain, sessions)
         removed = before**2 - error_of(sessions, judged.fit.model) ** 2
         if not judged.is_stepped_down and removed > thresholds.tolerable**2:
-            standing.append(judged)
-    return min(standing, key=lambda one: float(left_out.errors(one.fit.model).sum()), default=None)
+            standing.append((begun.given.candidates[k].effect, judged))
+    return min(standing, key=lambda one: float(left_out.errors(one[1].fit.model).sum()), default=None)
 
 
 def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Fit:

@@ -153,12 +153,13 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     flow.members, flow.refused = (0.1, 0.99 * least), {"settled first": ("b", "curve")}  # told as how sure each is
     assert flow.infer().alone is None
     part = SimpleNamespace(effect="a curve")
-    flow.alone = SimpleNamespace(
+    judged = SimpleNamespace(
         fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))), likelihood="of alone",
         undone=(), members=lambda: ("curve",),
     )  # fmt: skip
+    flow.alone = "a curve", judged
     found = flow.infer()
-    assert (found.alone, found.fit, found.members) == ("a curve", flow.alone.fit, ("curve",))
+    assert (found.alone, found.fit, found.members) == ("a curve", judged.fit, ("curve",))
     assert (found.likelihood, found.refused) == ("of alone", ("b",))
     flow.parts = {"settled first": (part, part)}
     found = flow.infer()
@@ -198,7 +199,8 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
 
     def found() -> str | None:
         one = _best_alone(begun, plain, [])
-        return None if one is None else str(one.fit.model)
+        assert one is None or one[0].name == one[1].fit.model  # the effect that was added, and what it was judged to be
+        return None if one is None else str(one[1].fit.model)
 
     assert found() == "n3"
     stepped.add("n3")
