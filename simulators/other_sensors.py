@@ -10,8 +10,8 @@ rubber's softening (Mullins 1969).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -139,8 +139,8 @@ class OtherSensor:
     load: Load
     column: str
     load_noise_n: float
-    kinds: frozenset[str]
-    beside: frozenset[str] = frozenset()
+    kinds: Set[str]
+    beside: Set[str] = frozenset()
     fitted: int = 2
     held_out: int = 2
     logs: Callable[[LoadHistory], Mapping[str, Array]] = lambda history: {}
@@ -306,47 +306,39 @@ def _beside_another(history: LoadHistory) -> Array:
     return 0.05 * history.load_n + 0.006 * history.late(history.load_n, 2.0) + 0.004 * other_n + history.noise(0.004)
 
 
-def _sensor(
-    reading: Callable[[LoadHistory], Array], load: Load, column: str, load_noise_n: float, kinds: str, beside: str = "",
-    fitted: int = 2, held_out: int = 2,
-) -> OtherSensor:  # fmt: skip
-    few = frozenset(kinds.split()), frozenset(beside.split())
-    return OtherSensor(reading, load, column, load_noise_n, *few, fitted, held_out)
-
-
 CURVE = "static_curve"
 OTHER_SENSORS = {
-    "polymer_film": _sensor(_film, presses(90, 100, 40), "pressure_v", 0.02, CURVE, "relaxation"),
-    "strain_gauge": _sensor(_bridge, presses(120, 200, 500), "pressure_v", 0.1, ""),
-    "foam_capacitor": _sensor(_foam_capacitor, presses(100, 50, 20), "pressure_v", 0.01, CURVE, "relaxation"),
-    "piezo": _sensor(_piezo, presses(100, 100, 100), "pressure_v", 0.03, "leak"),
-    "rubber_barometer": _sensor(_rubber_barometer, presses(100, 50, 15), "pressure_mbar", 0.01, f"{CURVE} zero"),
-    "air_line": _sensor(_air_line, sways, "pressure_kpa", 0.03, "timing"),
-    "fibre": _sensor(_fibre, presses(80, 50, 30), "pressure_v", 0.02, CURVE),
-    "magnet": _sensor(_magnet, presses(60, 50, 10), "pressure_v", 0.006, f"{CURVE} hysteresis", "relaxation"),
-    "late_pad": _sensor(_late_pad, hand, "pressure_v", 0.01, "timing"),
-    "bridge_in_any_room": replace(
-        _sensor(_bridge_in_any_room, presses(200, 25, 50), "pressure_v", 0.03, "gain_drift zero"),
+    "polymer_film": OtherSensor(_film, presses(90, 100, 40), "pressure_v", 0.02, {CURVE}, {"relaxation"}),
+    "strain_gauge": OtherSensor(_bridge, presses(120, 200, 500), "pressure_v", 0.1, frozenset()),
+    "foam_capacitor": OtherSensor(_foam_capacitor, presses(100, 50, 20), "pressure_v", 0.01, {CURVE}, {"relaxation"}),
+    "piezo": OtherSensor(_piezo, presses(100, 100, 100), "pressure_v", 0.03, {"leak"}),
+    "rubber_barometer": OtherSensor(_rubber_barometer, presses(100, 50, 15), "pressure_mbar", 0.01, {CURVE, "zero"}),
+    "air_line": OtherSensor(_air_line, sways, "pressure_kpa", 0.03, {"timing"}),
+    "fibre": OtherSensor(_fibre, presses(80, 50, 30), "pressure_v", 0.02, {CURVE}),
+    "magnet": OtherSensor(_magnet, presses(60, 50, 10), "pressure_v", 0.006, {CURVE, "hysteresis"}, {"relaxation"}),
+    "late_pad": OtherSensor(_late_pad, hand, "pressure_v", 0.01, {"timing"}),
+    "bridge_in_any_room": OtherSensor(
+        _bridge_in_any_room, presses(200, 25, 50), "pressure_v", 0.03, {"gain_drift", "zero"},
         logs=lambda history: {"temperature_c": ROOM_C + _room_k(history)},
     ),
-    "ionic_gel": _sensor(_ionic, presses(90, 50, 5), "pressure_v", 0.003, f"{CURVE} relaxation"),
-    "strip": _sensor(_strip, stretch, "pressure_mm", 0.002, CURVE, "relaxation", held_out=1),
-    "insole": _sensor(_insole, steps, "pressure_v", 1.0, CURVE, "relaxation"),
-    "coarse": _sensor(
-        _coarse, presses(300, 10, 100, (10.0, 30.0), (2.0, 6.0), (10.0, 30.0)), "pressure_v", 0.1, "relaxation"
+    "ionic_gel": OtherSensor(_ionic, presses(90, 50, 5), "pressure_v", 0.003, {CURVE, "relaxation"}),
+    "strip": OtherSensor(_strip, stretch, "pressure_mm", 0.002, {CURVE}, {"relaxation"}, held_out=1),
+    "insole": OtherSensor(_insole, steps, "pressure_v", 1.0, {CURVE}, {"relaxation"}),
+    "coarse": OtherSensor(
+        _coarse, presses(300, 10, 100, (10.0, 30.0), (2.0, 6.0), (10.0, 30.0)), "pressure_v", 0.1, {"relaxation"}
     ),
-    "sticky": _sensor(_sticky, presses(90, 50, 20), "pressure_v", 0.01, "asymmetry"),
-    "curing": _sensor(_curing, presses(300, 50, 20), "pressure_v", 0.01, "gain_drift", "softening"),
-    "with_play": _sensor(_with_play, presses(90, 50, 20), "pressure_v", 0.01, "hysteresis", "timing"),
-    "slow": _sensor(_slow, presses(90, 100, 40), "pressure_v", 0.02, "timing"),
-    "leaking": _sensor(
-        _leaking, presses(400, 20, 500, (20.0, 60.0), (1.0, 4.0), (20.0, 60.0)), "pressure_kpa", 0.2, "leak"
+    "sticky": OtherSensor(_sticky, presses(90, 50, 20), "pressure_v", 0.01, {"asymmetry"}),
+    "curing": OtherSensor(_curing, presses(300, 50, 20), "pressure_v", 0.01, {"gain_drift"}, {"softening"}),
+    "with_play": OtherSensor(_with_play, presses(90, 50, 20), "pressure_v", 0.01, {"hysteresis"}, {"timing"}),
+    "slow": OtherSensor(_slow, presses(90, 100, 40), "pressure_v", 0.02, {"timing"}),
+    "leaking": OtherSensor(
+        _leaking, presses(400, 20, 500, (20.0, 60.0), (1.0, 4.0), (20.0, 60.0)), "pressure_kpa", 0.2, {"leak"}
     ),
-    "thickening": _sensor(_thickening, presses(90, 100, 100, ramp_s=(0.1, 4.0)), "pressure_v", 0.03, "rate"),
-    "one_press_each": _sensor(_curved, one_press, "pressure_v", 0.02, CURVE, fitted=10, held_out=4),
-    "noisy_load": _sensor(_curved, presses(90, 100, 60), "pressure_v", 0.6, CURVE),
+    "thickening": OtherSensor(_thickening, presses(90, 100, 100, ramp_s=(0.1, 4.0)), "pressure_v", 0.03, {"rate"}),
+    "one_press_each": OtherSensor(_curved, one_press, "pressure_v", 0.02, {CURVE}, fitted=10, held_out=4),
+    "noisy_load": OtherSensor(_curved, presses(90, 100, 60), "pressure_v", 0.6, {CURVE}),
     # Of what is no entry of the catalogue nothing may be named.
-    "reseated": _sensor(_reseated, presses(60, 50, 60), "pressure_v", 0.03, "", fitted=3),
-    "beside_another": _sensor(_beside_another, presses(90, 100, 40), "pressure_v", 0.02, ""),
+    "reseated": OtherSensor(_reseated, presses(60, 50, 60), "pressure_v", 0.03, frozenset(), fitted=3),
+    "beside_another": OtherSensor(_beside_another, presses(90, 100, 40), "pressure_v", 0.02, frozenset()),
 }  # fmt: skip
 OUTSIDE = frozenset({"reseated", "beside_another"})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL, with_usual_arm
@@ -55,9 +55,8 @@ def with_a_usual_arm(state: State, sessions: Sequence[Session]) -> State:
     """
     starts = [with_arm(state.fit.model, arm) for arm in _usual_arms(state.thresholds)]
     found = _fits_from(starts, state, sessions, BREADTH)  # far from any fit, one linearisation does not decide
-    few = dict.fromkeys((*_promising(_usual(found, state), state), *_promising(found, state)))
-    ended = [fit(one.likelihood, one.model) for one in few]
-    return _at_best_of(_usual(ended, state), state, sessions)
+    few = dict.fromkeys((*_likeliest(_usual(found, state), state), *_likeliest(found, state)))
+    return _at_best_of(_usual(_at_their_end(few), state), state, sessions)
 
 
 def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
@@ -81,7 +80,7 @@ def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     bare = _without_core_effects(state.fit.model)
     arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(state.fit.model))]
     found = _fits_from([with_arm(bare, arm) for arm in arms], state, sessions)
-    return _at_best_of([fit(one.likelihood, one.model) for one in _promising(found, state)], state, sessions)
+    return _at_best_of(_at_their_end(_likeliest(found, state)), state, sessions)
 
 
 def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
@@ -128,14 +127,18 @@ def _usual(found: Sequence[Fit], state: State) -> Sequence[Fit]:
     return [one for one in found if not is_beyond_memory(one.model, state.thresholds)] or found
 
 
-def _promising(found: Sequence[Fit], state: State) -> list[Fit]:
-    """The best of fits that began far from any end, to go on with: half way the rest is taken for other effects."""
+def _likeliest(found: Sequence[Fit], state: State) -> list[Fit]:
+    """The few that promise most, the likeliest first, the odds against effects counted."""
     return sorted(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))[:PROMISING]
 
 
+def _at_their_end(few: Iterable[Fit]) -> list[Fit]:
+    """Fits that began far from any end, gone on with: half way the rest is taken for other effects."""
+    return [fit(one.likelihood, one.model) for one in few]
+
+
 def _at_best_of(found: Sequence[Fit], state: State, sessions: Sequence[Session]) -> State:
-    best = min(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))
-    return state_at(best, sessions, state.thresholds)
+    return state_at(_likeliest(found, state)[0], sessions, state.thresholds)
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:

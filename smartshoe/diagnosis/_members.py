@@ -56,7 +56,7 @@ class Member:
     @property
     def is_any_curve(self) -> bool:
         """Whether it is a curve of no kind, whose ``laws`` are all curves; with `is_ended` all of them are one."""
-        return self.effect.is_memoryless and (self.effect.is_flexible or self.is_ended)
+        return _is_any_curve(self.effect, self.is_ended)
 
     @property
     def name(self) -> str:
@@ -102,6 +102,10 @@ def _left(likelihood: Likelihood, found: Fit) -> Array:
     return np.concatenate([residual_of(one, found.model)[one.fitted] for one in likelihood.sessions])
 
 
+def _is_any_curve(effect: Effect, is_ended: bool) -> bool:
+    return effect.is_memoryless and (effect.is_flexible or is_ended)
+
+
 def _without(name: str, model: ExtendedModel) -> ExtendedModel:
     """``model`` without an effect; without any curve where it is one that lies where its kind ends: it bends others."""
     part = model.part(name)
@@ -114,7 +118,7 @@ def _other_laws(
     one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit, *, is_ended: bool
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
-    of_curves = one.effect.is_memoryless and (one.effect.is_flexible or is_ended)
+    of_curves = _is_any_curve(one.effect, is_ended)
     channels = {e.name for e in available(likelihood.sessions)}
     found = []
     for law in catalogue().values():

@@ -69,13 +69,16 @@ def names_of(
             if one.is_sure or (is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable)
         )
     larger = tuple(one for one in likely if one.member.size > left)
-    if is_followed and larger:
+    if larger and is_followed:
         return larger
-    largest = max(larger, key=lambda one: one.member.size, default=None)
-    kind = 0.0 if largest is None else probability_of_kind(largest.member, left, thresholds)
-    if largest is not None and kind > thresholds.equivalent_odds * (1.0 - kind):
-        return (_doubted(largest),)
-    by_itself = [one for one in likely if alone is not None and one.member.effect.slot == alone.slot]
+    if larger:
+        largest = max(larger, key=lambda one: one.member.size)
+        kind = probability_of_kind(largest.member, left, thresholds)
+        if kind > thresholds.equivalent_odds * (1.0 - kind):
+            return (_doubted(largest),)
+    if alone is None:
+        return ()
+    by_itself = (one for one in likely if one.member.effect.slot == alone.slot)
     return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
 
 
@@ -86,7 +89,8 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
         followed = catalogue()[str(by.effect)]
-        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in _kin_of(followed))
+        kin = _kin_of(followed)
+        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
         as_law = replace(one, laws=beside, fall=one.fall - by.margin)
         return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
     if not (one.effect.is_flexible or one.is_any_curve):

@@ -101,7 +101,7 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
 
 
 def _named(name: str) -> Any:
-    return SimpleNamespace(effect=effect(name), member=SimpleNamespace(name=name), by=None)
+    return SimpleNamespace(effect=effect(name), member=SimpleNamespace(name=name))
 
 
 def test_what_faults_add_is_the_most_of_those_fitted_in_shares_of_the_reading() -> None:
