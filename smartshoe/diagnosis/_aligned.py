@@ -38,18 +38,19 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
     """The recordings on one clock each: by a shared delay or drift for the model, or each moved by its own."""
     places = [k for k, mask in enumerate(integrity.usable) if mask.any()]
     recordings, masks = [recordings[k] for k in places], [integrity.usable[k] for k in places]
-    lags, rates = (np.array(one)[places] for one in (integrity.clock_offset_s, integrity.clock_rate))
-    largest = float(np.max(np.abs(lags), initial=0.0))
+    told = (integrity.clock_offset_s, integrity.clock_rate, integrity.lag_seen_s)
+    lags, rates, seen = (np.array(one)[places] for one in told)
     plain = Aligned(recordings, masks, (), (), places)
     if not lags.any() and not rates.any():
         return plain
-    delay = effect("delay")
-    if not rates.any() and np.ptp(lags) <= thresholds.same * largest and largest < delay.parameters[0].upper:
-        return replace(plain, parts=((delay, np.array([float(np.mean(lags))])),))
-    shared = _one_pair(lags, rates, np.array([recording.duration_s for recording in recordings]), thresholds)
+    delay, drift = effect("delay"), effect("clock_drift")
+    duration_s = np.array([recording.duration_s for recording in recordings])
+    shared = _one_pair(lags, rates, duration_s, thresholds)
+    if shared is None:
+        shared = _one_lag(lags, rates, seen, duration_s, thresholds)
     if shared is not None and abs(shared[0]) < delay.parameters[0].upper:
-        before_s, rate = shared
-        return replace(plain, parts=((effect("clock_drift"), np.array([rate])), (delay, np.array([before_s]))))
+        late, parting = (delay, np.array([shared[0]])), (drift, np.array([shared[1]]))
+        return replace(plain, parts=(parting, late) if shared[1] else (late,))
     made, usable, says, moved = [], [], [], []
     for place, recording, mask, offset_s, rate in zip(places, recordings, masks, lags, rates, strict=True):
         if offset_s or rate:
@@ -81,6 +82,23 @@ def _one_pair(lags_s: Array, rates: Array, duration_s: Array, thresholds: Thresh
     hidden = np.abs(before_s + rate * duration_s[~shown]) < thresholds.settled_s
     fits = np.abs(seen - before_s - rate * places) <= thresholds.same * np.max(np.abs(seen))
     return (before_s, rate) if hidden.all() and fits.all() else None
+
+
+def _one_lag(
+    lags_s: Array, rates: Array, seen_s: Array, duration_s: Array, thresholds: Thresholds
+) -> tuple[float, float] | None:
+    """The lag in s that all recordings share, and 0 for its growth.
+
+    A recording of which no clock is told alone, as of slow or few movements, shares what its reading is seen to follow
+    by (``seen_s``), or anything where that is seen of none.
+    """
+    is_told = (lags_s != 0.0) | (rates != 0.0)
+    grown = 0.5 * (rates * duration_s)[is_told]
+    told = lags_s[is_told]
+    all_seen = np.concatenate([told - grown, told + grown, seen_s[~is_told & np.isfinite(seen_s)]])
+    if np.ptp(all_seen) > thresholds.same * np.max(np.abs(all_seen)):
+        return None
+    return float(np.mean(told)), 0.0
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:

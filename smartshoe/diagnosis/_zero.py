@@ -26,7 +26,8 @@ class Zero:
     """``value`` of the effect's one parameter (share of full scale) with its standard deviation.
 
     ``size`` it moves the reading by; ``alternatives`` that this data cannot tell from it. ``is_past``: the model's own
-    drift of the zero may have brought it there before the recordings began, so that no offset beside it is seen.
+    drift of the zero may have brought it there before the recordings began, so that no offset beside it is seen (nor a
+    tare, where the unit bears the load that is shown, and the zero may have drifted to what it reads beyond that).
     """
 
     effect: Effect
@@ -132,12 +133,17 @@ def zeros_of(
     reading_sd = float(np.linalg.norm([reading_sd, thresholds.departure * np.mean(np.abs(drifted)), slow]))
     load, reading = float(np.mean(loads)), float(np.mean(readings))
     many = largest_of_noise(1, thresholds)
+    is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
     if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
         return ()  # a convention of the sensor's; or the reading agrees with the load, and the unit bears it
+    commanded = any(one.recording.command_n is not None for one in sessions if one.fitted.any())
+    borne = (reading - load) * model.gain
+    if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):
+        return (Zero(sensor, borne, reading_sd, abs(borne), (machine.name,), True),)  # no cause more is needed
     named = []
-    if abs(load) >= many * load_sd:
+    if is_clear[0]:
         named.append(Zero(machine, -load, load_sd, abs(load * model.gain)))
-    if abs(reading) >= many * reading_sd:
+    if is_clear[1]:
         value = reading * model.gain
         named.append(Zero(sensor, value, reading_sd, abs(value), (), _is_past(value, sessions, model, thresholds)))
     return tuple(sorted(named, key=lambda one: -one.size))

@@ -10,7 +10,7 @@ powers and stop operators must fit the reading much better on the shifted clock 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,7 +30,12 @@ OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # what a bank of plays spans about
 
 def align(view: View) -> View:
     """The view with its load on the reading's clock, where the clocks differ; else as it was."""
-    line = _lag_line(view)
+    followed = _followed(view)
+    if followed is None:
+        return view
+    if followed.places.size:
+        view = replace(view, lag_seen_s=_middle(followed.best, followed.weights))
+    line = _lag_line(view, followed)
     if line is None:
         return view
     offset_s, rate = line
@@ -62,8 +67,25 @@ def _least_lag_s(view: View) -> float:
     return max(view.thresholds.sensor_lag_s, view.thresholds.few * view.step_s)
 
 
-def _lag_line(view: View) -> tuple[float, float] | None:
-    """Lag in s in the middle and its growth in s per s, or None where the clocks agree."""
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """Load and reading over even bins at ``grid`` (b,) and how late the reading follows in each of some windows.
+
+    ``places`` (w,) are the windows' middles in s, ``smallest`` and ``best`` lags in s, ``weights`` correlations.
+    """
+
+    grid: Array
+    load: Array
+    reading: Array
+    smooth_s: float
+    places: Array
+    smallest: Array
+    best: Array
+    weights: Array
+
+
+def _followed(view: View) -> _Followed | None:
+    """How late the reading follows, or None where nothing can tell."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
     if duration_s < given.hold_s or np.ptp(view.load.values) == 0.0 or np.ptp(view.reading.values) == 0.0:
@@ -80,11 +102,19 @@ def _lag_line(view: View) -> tuple[float, float] | None:
         places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s, given)
         if weights.size and float(np.median(weights)) >= 1.0 - given.same:
             break
+    return _Followed(grid, load, reading, smooth_s, places, smallest, best, weights)
+
+
+def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
+    """Lag in s in the middle and its growth in s per s, or None where the clocks agree."""
+    duration_s = float(view.time_s[-1] - view.time_s[0])
+    given = view.thresholds
+    grid, load, reading, smooth_s, places, weights = of.grid, of.load, of.reading, of.smooth_s, of.places, of.weights
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
     before, repeating = None, _repeats_itself(load, given)
     # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
-    for lags, earned in ((smallest, 1.0 - given.same), (best, 1.0 / given.clear)):
+    for lags, earned in ((of.smallest, 1.0 - given.same), (of.best, 1.0 / given.clear)):
         if places.size == 0 or np.max(np.abs(lags)) <= least:
             continue
         offered = []
@@ -95,7 +125,7 @@ def _lag_line(view: View) -> tuple[float, float] | None:
             shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
             before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
             after = _unexplained(grid, shifted, reading, smooth_s, given)
-            agreed = lags is smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
+            agreed = lags is of.smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
             # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
             # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
             # a constant lag from a relaxation neither way.

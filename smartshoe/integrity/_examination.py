@@ -43,6 +43,8 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     hum,
 )
 NONE: Array = np.zeros(0)
+Clock = tuple[float, float, float]  # offset, rate and lag that is seen, as in `Integrity`
+UNSEEN: Clock = (0.0, 0.0, float("nan"))
 
 
 def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
@@ -55,7 +57,7 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         raise InputError("there is no recording to examine: give at least one file")
     faults: list[DataFault] = []
     usable: list[Mask] = []
-    offsets: list[tuple[float, float]] = []
+    clocks: list[Clock] = []
     refusals: list[str] = []
     decided = decided_by(thresholds)
     examined = [_examined(recording, decided) for recording in recordings]
@@ -72,21 +74,20 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
                 f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
             ]
         usable.append(np.zeros_like(mask) if refused else mask)
-        offsets.append(clock)
+        clocks.append(clock)
         refusals += refused[:1]
-    return Integrity(
-        tuple(faults), tuple(usable), tuple(c[0] for c in offsets), tuple(c[1] for c in offsets), tuple(refusals)
-    )
+    offset_s, rate, seen_s = zip(*clocks, strict=True)
+    return Integrity(tuple(faults), tuple(usable), offset_s, rate, seen_s, tuple(refusals))
 
 
 def _examined(
     recording: Recording, thresholds: Thresholds, dropped_to: Array = NONE
-) -> tuple[list[Finding], Mask, tuple[float, float]]:
-    """The findings of one recording, its usable samples, its clock's offset and rate; ``dropped_to`` as in `View`."""
+) -> tuple[list[Finding], Mask, Clock]:
+    """The findings of one recording, its usable samples, its clock; ``dropped_to`` as in `View`."""
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
     if findings:
-        return findings, ~usable, (0.0, 0.0)
+        return findings, ~usable, UNSEEN
     findings = [finding for detect in OF_RECORDING for finding in detect(recording, thresholds)]
     for finding in findings:
         if finding.masks:
@@ -101,7 +102,7 @@ def _examined(
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
     if view is None:
-        return findings, usable, (0.0, 0.0)
+        return findings, usable, UNSEEN
     for detect in OF_VIEW:
         bad = ~usable[view.index]
         for finding in detect(view, bad):
@@ -110,7 +111,7 @@ def _examined(
                 usable &= ~finding.at
         if any(finding.severity == "fatal" for finding in findings):
             break
-    return findings, usable, (view.offset_s, view.rate)
+    return findings, usable, (view.offset_s, view.rate, view.lag_seen_s)
 
 
 def _lacking(recording: Recording) -> str | None:

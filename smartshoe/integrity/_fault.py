@@ -61,16 +61,18 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Integrity:
-    """What `examine` found: one entry a recording in ``usable``, ``clock_offset_s`` and ``clock_rate``.
+    """What `examine` found: one entry a recording in ``usable``, ``clock_offset_s``, ``clock_rate``, ``lag_seen_s``.
 
     ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
     held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
-    recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``refusals`` says in a sentence
-    each, in their order, why the recordings without a usable sample are of no use.
+    recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``lag_seen_s`` is the lag at
+    which the reading follows best, of a clock or of the unit, NaN where none stands out. ``refusals`` says in a
+    sentence each, in their order, why the recordings without a usable sample are of no use.
     """
 
     faults: tuple[DataFault, ...]
     usable: tuple[Mask, ...]
     clock_offset_s: tuple[float, ...]
     clock_rate: tuple[float, ...]
+    lag_seen_s: tuple[float, ...]
     refusals: tuple[str, ...]

@@ -14,6 +14,7 @@ from numba import njit
 _LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
 _BISECTIONS = 50
 STEPS, CLOSE = 60, 1e-9  # of Newton's for a first loading: a step that is less leaves about its square
+EASED = 1e-3  # of the width: within it the corner of a root is rounded
 NO_LOAD = 1e30  # stands for a load before the first one
 CYCLE_ENDS = 0.05  # of the cycle's height
 
@@ -405,6 +406,21 @@ def rise(largest, raised, width):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def softness(below, wide, power):  # type: ignore[no-untyped-def]
+    """Share of the softening that is there ``below`` M^2, tanh(x^power), x = below/wide, and its slope in x.
+
+    A power that is no 1 has its corner at the largest load rounded by EASED.
+    """
+    x = below / wide
+    if power == 1.0:
+        bend = 1.0 - 2.0 / (math.exp(2.0 * x) + 1.0)  # tanh
+        return bend, 1.0 - bend * bend
+    eased = (x + EASED) ** power
+    bend = 1.0 - 2.0 / (math.exp(2.0 * (eased - EASED**power)) + 1.0)
+    return bend, (1.0 - bend * bend) * power * eased / (x + EASED)
+
+
+@njit(cache=True)
 def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untyped-def]
     """phi of a first loading, own phi + arm u = ``load`` >= 0 and u = phi rise(phi), and the slope of the load in u.
 
@@ -426,10 +442,8 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def softened_undone(signal, strength, width, widening, raised, dead_zone, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u (1 - strength tanh((M^2 rise^2 - u^2)/(width + widening M^2)))/rise of the ``signal`` u (n,).
-
-    M is the largest out.
+def softened_undone(signal, strength, width, widening, raised, power, dead_zone, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u (1 - strength softness(M^2 rise^2 - u^2))/rise of the ``signal`` u (n,), M the largest out.
 
     ``state`` (1,): that largest, less ``dead_zone``.
     """
@@ -440,7 +454,7 @@ def softened_undone(signal, strength, width, widening, raised, dead_zone, state,
             f = first_loading(u, raised, width, 0.0, 1.0, u)[0]
         else:
             below = max(largest * largest * more * more - u * u, 0.0)
-            f = u * (1.0 - strength * math.tanh(below / (width + widening * largest * largest))) / more
+            f = u * (1.0 - strength * softness(below, width + widening * largest * largest, power)[0]) / more
         largest = max(largest, f - dead_zone)
         out[k] = f
     state[0] = largest

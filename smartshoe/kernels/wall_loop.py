@@ -11,7 +11,7 @@ import math
 
 from numba import njit
 
-from smartshoe.kernels.memory import first_loading, newton, rise
+from smartshoe.kernels.memory import first_loading, newton, rise, softness
 
 CLOSE = 1e-8  # of full scale: a step of Newton's that is less leaves about its square
 STEPS = 30
@@ -62,14 +62,14 @@ def compressed(load, ratio, wall, share, decay, now, before, out):  # type: igno
 
 
 @njit(cache=True)
-def softened(load, strength, width, widening, raised, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi r(M) = u (1 - strength tanh((M^2 r(M)^2 - u^2)/wide)).
+def softened(load, strength, width, widening, raised, power, largest, dead_zone, share, decay, now, before, out):  # type: ignore[no-untyped-def]
+    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi r(M) = u (1 - strength softness(M^2 r(M)^2 - u^2)).
 
-    wide = ``width`` + ``widening`` M^2; M is the largest phi so far, ``largest`` before the record, and counts less
-    ``dead_zone``; r is `rise`.
+    `softness` of ``power``, wide = ``width`` + ``widening`` M^2; M is the largest phi so far, ``largest`` before the
+    record, and counts less ``dead_zone``; r is `rise`.
     """
     # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
-    bound = strength / width * (3.0 + 2.0 / width)
+    bound = strength / width * (3.0 + 2.0 / width) if power == 1.0 else 1e-10 / (CLOSE * CLOSE)
     arm = held = 0.0
     u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
     most, more, wide = 0.0, 1.0, width
@@ -87,15 +87,15 @@ def softened(load, strength, width, widening, raised, largest, dead_zone, share,
             straight = given / (1.0 + beside)
             low, high = straight, most * more
             if f <= 0.0:
-                lost = min(strength * math.tanh(high * high / wide), 0.95)  # more leaves nothing that could pull
+                lost = min(strength * softness(high * high, wide, power)[0], 0.95)  # more leaves nothing to pull
                 low, high = given / (1.0 - lost + beside), straight
             u = min(max(u + (f - known) / slope, low), high)
             for _ in range(STEPS):
-                bend = 1.0 - 2.0 / (math.exp(2.0 * max(most * most * more * more - u * u, 0.0) / wide) + 1.0)  # tanh
+                bend, steep = softness(max(most * most * more * more - u * u, 0.0), wide, power)
                 slope = 1.0 - strength * bend + beside
                 off = u * slope - given
                 if bend > 0.0:
-                    slope += 2.0 * strength / wide * u * u * (1.0 - bend * bend)
+                    slope += 2.0 * strength / wide * u * u * steep
                 u, low, high, step = newton(u, off, slope, low, high)
                 if bound * step * step <= 1e-10:
                     break

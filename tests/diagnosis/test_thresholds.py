@@ -104,7 +104,8 @@ def test_hold_is_how_long_a_first_rest_shows_a_zero() -> None:
 def test_same_is_how_far_lags_of_one_delay_differ() -> None:
     pair = [_pressed(TRIANGLE), _pressed(TRIANGLE)]
     usable = tuple(one.sensor.present for one in pair)
-    lagging: Any = SimpleNamespace(clock_offset_s=(1.0, 1.4), clock_rate=(0.0, 0.0), usable=usable)
+    lags_s = (1.0, 1.4)
+    lagging: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0, 0.0), lag_seen_s=lags_s, usable=usable)
     each, shared = decides("same", 0.2, 0.4, lambda t: [one.name for one, _ in aligned(pair, lagging, t).parts])
     assert (each, shared) == ([], ["delay"])
 

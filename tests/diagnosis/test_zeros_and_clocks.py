@@ -156,6 +156,29 @@ def test_an_offset_that_a_drift_of_the_zero_may_have_come_by_is_its_past(sign: f
         assert found.is_past == is_past
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_tare_is_told_where_a_drift_may_have_come_by_what_is_read_beyond_the_load(sign: float) -> None:
+    """The unit may bear the load that is shown: a drift that is known explains more than a tare and an offset."""
+    duration_s = float(TIME_S[-1])
+
+    def told(moved: float, *runs: Recording) -> list[tuple[str, bool]]:
+        sessions, scale = _sessions(*runs)
+        drift = np.array([sign * moved / duration_s, 0.0, 0.0, 1.0])
+        drifting = baseline_of(sessions, scale).with_part(effect("zero_drift"), drift)
+        return [(one.effect.name, one.is_past) for one in zeros_of(sessions, drifting, scale, 0.0, 0.0, STANDARD)]
+
+    shown = [_run(tare=0.018, offset=0.018 + 0.03 * sign, seed=seed) for seed in (1, 2)]
+    both = {"load_cell_tare", "zero_offset"}
+    assert told(0.006, *shown) == [("zero_offset", True)]
+    assert {name for name, _ in told(0.002, *shown)} == both  # more than an order of magnitude
+    assert {name for name, _ in told(-0.006, *shown)} == both  # it drifts the other way
+    # A unit of which it is known that nothing presses it, and a load cell that shows a pull.
+    known = [one.with_channel(replace(one.load, name="command", role="command", values=FULL_N * PRESSED)) for one in shown]
+    assert {name for name, _ in told(0.006, *known)} == both
+    pulled = [_run(tare=-0.018, offset=-0.018 + 0.03 * sign, seed=seed) for seed in (1, 2)]
+    assert {name for name, _ in told(0.006, *pulled)} == both
+
+
 def test_an_offset_within_what_slow_noise_makes_of_a_rest_is_none() -> None:
     noise = replace(GaussMarkov(0.0, 1.5, 0.0, 0.0, 0.0, 0.0, STANDARD), rms=0.02)
     sessions, scale = _sessions(_run(offset=0.03, seed=1), _run(offset=0.03, seed=2))
@@ -208,7 +231,7 @@ def test_a_lag_comes_to_a_step_by_its_time_constant() -> None:
 # -- two clocks -------------------------------------------------------------------------------------------------
 def _told(offset_s: tuple[float, ...], rate: tuple[float, ...], runs: list[Recording]) -> Any:
     usable = tuple(one.sensor.present for one in runs)
-    integrity: Any = SimpleNamespace(clock_offset_s=offset_s, clock_rate=rate, usable=usable)
+    integrity: Any = SimpleNamespace(clock_offset_s=offset_s, clock_rate=rate, lag_seen_s=offset_s, usable=usable)
     return aligned(runs, integrity, STANDARD)
 
 
@@ -247,7 +270,7 @@ def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
     runs = [_late(0.6), _run()]
     masks = [one.sensor.present.copy() for one in runs]
     masks[0][500:520] = False
-    integrity: Any = SimpleNamespace(clock_offset_s=(0.6, 0.0), clock_rate=(0.0, 0.0), usable=tuple(masks))
+    integrity: Any = SimpleNamespace(clock_offset_s=(0.6, 0.0), clock_rate=(0.0, 0.0), lag_seen_s=(0.6, 0.0), usable=tuple(masks))
     lost = np.flatnonzero(~aligned(runs, integrity, STANDARD).usable[0][:1400])
     assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
     assert lost.size == pytest.approx(20, abs=1)

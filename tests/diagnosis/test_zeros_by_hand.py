@@ -254,10 +254,10 @@ def _run(name: str = "run", size: int = 400) -> Recording:
     return Recording.from_arrays(time_s=T[:size] + 3.0, force_n=T[:size], pressure_mbar=10.0 * T[:size], name=name)
 
 
-def _aligned(lags_s: tuple[float, ...], rates: tuple[float, ...]) -> Any:
+def _aligned(lags_s: tuple[float, ...], rates: tuple[float, ...], seen_s: tuple[float, ...] | None = None) -> Any:
     runs = [_run(f"run_{k}") for k in range(len(lags_s))]
     usable = tuple(np.ones(400, dtype=bool) for _ in runs)
-    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=rates, usable=usable)
+    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=rates, lag_seen_s=seen_s or lags_s, usable=usable)
     return aligned(runs, integrity, STANDARD)
 
 
@@ -275,6 +275,24 @@ def test_lags_within_a_quarter_of_the_largest_are_one_delay(sign: float) -> None
     assert len(_aligned((sign * 0.999 * upper,) * 2, (0.0, 0.0)).parts) == 1
     assert _aligned((0.0, 0.0), (0.0, 0.0)).says == ()
     assert _aligned((), ()).parts == ()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_lag_is_shared_with_a_recording_that_is_seen_to_follow_by_it_or_in_which_none_is_seen(sign: float) -> None:
+    """A recording of slow or few movements tells no clock alone."""
+    for seen, is_one in ((0.8, True), (0.76, True), (0.74, False), (0.0, False), (1.3, True), (1.34, False)):
+        found = _aligned((sign, 0.0), (0.0, 0.0), (sign, sign * seen))
+        assert [(one.name, float(value[0])) for one, value in found.parts] == [("delay", sign)] * is_one
+        assert found.moved == (frozenset() if is_one else {0})
+    ((one, value),) = _aligned((sign, 0.0), (0.0, 0.0), (sign, float("nan"))).parts
+    assert (one.name, list(value)) == ("delay", [sign])
+
+
+def test_a_lag_that_wanders_by_less_than_a_quarter_is_one_delay_and_no_parting_of_clocks() -> None:
+    half = 0.5 * T[-1]
+    for wanders, is_one in ((0.12, True), (0.15, False)):  # from the middle to either end
+        found = _aligned((1.0, 1.0), (wanders / half, -wanders / half))
+        assert [one.name for one, _ in found.parts] == ["delay"] * is_one
 
 
 def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_was_taken() -> None:

@@ -18,11 +18,12 @@ from smartshoe.models.elements import Arm
 
 
 class MullinsSoftening(Effect):
-    """f r(M) = u (1 - c tanh((M^2 r(M)^2 - u^2)/(width + beta M^2))), r(M) = 1 + a tanh(M^2/width), M the largest load.
+    """f r = u (1 - c tanh(((M^2 r^2 - u^2)/(width + beta M^2))^power)), r = 1 + a tanh(M^2/width), M the largest load.
 
     c makes the first loading follow the stiff curve and all below it softer (Ogden and Roxburgh 1999; with beta, as
-    Mars 2004 and finite-element codes have it), a makes the wall softer by what it has borne, the first loading
-    included (damage, Simo 1987): ``at_once`` is the share of the latter.
+    Mars 2004 and finite-element codes have it; by the root of the distance, Beatty and Krishnaswamy 2000), a makes the
+    wall softer by what it has borne, the first loading included (damage, Simo 1987): ``at_once`` is the share of the
+    latter.
     ``gained`` is what the gain rises at half of full scale after full scale, for a share of 0.
     """
 
@@ -40,9 +41,12 @@ class MullinsSoftening(Effect):
                         absent=0.0, natural="both"),
         EffectParameter("widening", "1", "beta: by how much the width grows with M^2", None, 0.0, 3.0, 0.5,
                         absent=0.0, natural="lower"),
+        EffectParameter("power", "1", "of the distance to M^2: 1 by energy, 0.5 by its root", None, 0.5, 1.0, 0.75,
+                        absent=1.0, natural="both"),
     )  # fmt: skip
     shapes = tuple(
-        {"width": width, "at_once": at_once, "widening": 0.0} for width, at_once in ((0.1, 0.0), (0.5, 0.0), (0.5, 1.0))
+        {"width": width, "at_once": at_once, "widening": 0.0, "power": power}
+        for width, at_once, power in ((0.1, 0.0, 1.0), (0.5, 0.0, 1.0), (0.5, 1.0, 1.0), (0.5, 0.0, 0.5))
     )
     exposed_by = by("peaks", "repeats")
     separated_by = {
@@ -72,18 +76,21 @@ class MullinsSoftening(Effect):
         return _undone(*_amounts(values))
 
 
-def _undone(strength: float, width: float, widening: float, raised: float) -> Undone:
+def _undone(strength: float, width: float, widening: float, raised: float, power: float) -> Undone:
     """The inverse, of `_amounts`."""
-    from smartshoe.kernels.memory import CLOSE, STEPS, softened_undone
+    from smartshoe.kernels.memory import CLOSE, EASED, STEPS, softened_undone
 
     def body(of: Mapping[str, str]) -> str:
         most, per_width, a = of["largest"], c_number(1.0 / width), c_number(raised)
+        rounded = f"pow(share + {c_number(EASED)}, {c_number(power)}) - {c_number(EASED**power)}"
+        eased = "share" if power == 1.0 else rounded
         return f"""{{
     const double rise = 1.0 + {a} * tanh({most} * {most} * {per_width}), highest = {most} * rise;
     if (x < highest) {{
         const double below = highest * highest - x * x;
         const double wide = {c_number(width)} + {c_number(widening)} * {most} * {most};
-        x *= (1.0 - {c_number(strength)} * tanh((below > 0.0 ? below : 0.0) / wide)) / rise;
+        const double share = (below > 0.0 ? below : 0.0) / wide;
+        x *= (1.0 - {c_number(strength)} * tanh({eased})) / rise;
     }} else {{
         const double u = x;
         double low = u / (1.0 + {a}), high = u;
@@ -109,19 +116,21 @@ def _undone(strength: float, width: float, widening: float, raised: float) -> Un
     }}
 }}"""
 
-    constants = (strength, width, widening, raised, LEAST_DEAD_ZONE)
+    constants = (strength, width, widening, raised, power, LEAST_DEAD_ZONE)
     return Undone(softened_undone, constants, np.zeros(1), ("largest",), body)
 
 
-def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, float]:
-    """What is lost below the largest load, its width, what that grows by, and the most that a first loading rises.
+def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, float, float]:
+    """What is lost below the largest load, its width, what that grows by, the most that a first loading rises, power.
 
     Beside an arm of ``share``: one that pushes leaves a tenth of the wall's own stiffness, at least, softened or not.
     """
-    gained, width, at_once, widening = (float(value) for value in values)
+    from smartshoe.kernels.memory import softness
+
+    gained, width, at_once, widening, power = (float(value) for value in values)
     below = (1.0 - at_once) * gained
-    lost = below / (1.0 + below) / math.tanh(0.75 / (width + widening))
+    lost = below / (1.0 + below) / softness(0.75, width + widening, power)[0]
     raised = min(at_once * gained / math.tanh(0.75 / width), most_beside(share))
     if share < 0.0:
         lost = min(lost, max(0.9 + share * (1.0 + raised), 0.0))
-    return lost, width, widening, raised
+    return lost, width, widening, raised, power
