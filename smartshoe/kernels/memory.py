@@ -292,8 +292,10 @@ def cycles_done(load, least, state, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def conditioned_undone(signal, strength, per_cycle, by_way, least, width, rounds, settled, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out (1 + strength (1 - exp(-n per_cycle))) = ``signal`` (n,), n = (1 - by_way) N + by_way L/2.
+def conditioned_undone(signal, strength, per_cycle, by_way, stretch, least, width, rounds, settled, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out (1 + strength (1 - exp(-n))) = ``signal`` (n,).
+
+    n = (1 - by_way) (N per_cycle)^stretch + by_way L/2 per_cycle.
 
     N are the cycles of out, as in `cycles_done`, L is the way of its play of ``width``. Each sample is sought in at
     most ``rounds``, until one moves it by no more than ``settled``. ``state`` (5,): N, trough and peak of the cycle,
@@ -307,8 +309,8 @@ def conditioned_undone(signal, strength, per_cycle, by_way, least, width, rounds
                 guess = f
                 z = f if place >= NO_LOAD else min(max(place, f - width), f + width)
                 moved = gone if place >= NO_LOAD else gone + 0.5 * abs(z - place)
-                done = (1.0 - by_way) * count + by_way * moved
-                f = signal[k] / (1.0 - strength * math.expm1(-done * per_cycle))
+                done = (1.0 - by_way) * (count * per_cycle) ** stretch + by_way * moved * per_cycle
+                f = signal[k] / (1.0 - strength * math.expm1(-done))
                 if abs(f - guess) <= settled:
                     break
             if ended:

@@ -142,7 +142,7 @@ def test_the_baseline_is_found_wherever_its_pole_is(share: float, rate: float) -
 
 
 def test_a_fit_finds_an_effects_parameter_within_its_error_bar() -> None:
-    truth = MODEL.with_part(effect("gain_drift"), np.array([2e-4, 0.0, 60.0, 0.0]))
+    truth = MODEL.with_part(effect("gain_drift"), np.array([2e-4, 0.0, 60.0, 0.0, 1.0]))
     sessions, scale = sessions_of(recording(truth))
     start = baseline_of(sessions, scale).with_part(effect("gain_drift"))
     found = fit(likelihood_of(sessions, start), start)

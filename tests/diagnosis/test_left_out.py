@@ -109,7 +109,7 @@ def test_the_truth_stands_and_what_is_not_there_or_only_fits_does_not() -> None:
     assert not left_out.stands(plain, plain)
     # Two recordings that a drift of the gain happens to fit, each in its own way.
     rising, falling = (
-        MODEL.with_part(effect("gain_drift"), np.array([slope, 0.0, 60.0, 0.0])) for slope in (0.002, -0.0004)
+        MODEL.with_part(effect("gain_drift"), np.array([slope, 0.0, 60.0, 0.0, 1.0])) for slope in (0.002, -0.0004)
     )
     chance = _sessions([rising, falling])
     model, bare = _fitted(chance, "gain_drift"), _fitted(chance)

@@ -24,7 +24,8 @@ MEMORIES = (
     ("load_unload_asymmetry", np.array([0.02, 0.005])),
     ("mullins_softening", np.array([0.03, 0.3, 0.0, 0.0, 1.0])),
     ("mullins_softening", np.array([0.03, 0.3, 0.7, 1.0, 0.6])),
-    ("cycle_conditioning", np.array([0.03, 3.0, 0.0])),
+    ("cycle_conditioning", np.array([0.03, 3.0, 0.0, 1.0])),
+    ("cycle_conditioning", np.array([0.03, 3.0, 0.4, 0.5])),
 )
 turning_points = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=8)
 
@@ -234,7 +235,7 @@ def test_by_the_root_of_the_distance_a_wall_is_soft_at_once() -> None:
 
 
 def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not() -> None:
-    values = np.array([0.1, 2.0, 0.0])
+    values = np.array([0.1, 2.0, 0.0, 1.0])
     load = between([0.3, 0.0, 1.0, 0.0, 0.5, 0.49, 0.5, 0.0, 0.2, 0.0, 0.03, 0.0, 0.5], 137)
     out = run("cycle_conditioning", values, load)
     assert out[-1] / load[-1] == pytest.approx(1.0 + 0.1 * -np.expm1(-4.0 / 2.0), rel=1e-12)
@@ -245,8 +246,8 @@ def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not()
     [
         ("mullins_softening", np.array([0.05, 0.3, 0.0, 0.5, 0.7]), "largest_load"),
         ("mullins_softening", np.array([0.05, 0.3, 1.0, 0.0, 1.0]), "largest_load"),
-        ("cycle_conditioning", np.array([0.05, 3.0, 0.0]), "cycles"),
-        ("cycle_conditioning", np.array([0.05, 3.0, 1.0]), "way"),
+        ("cycle_conditioning", np.array([0.05, 3.0, 0.0, 1.0]), "cycles"),
+        ("cycle_conditioning", np.array([0.05, 3.0, 1.0, 1.0]), "way"),
         ("permanent_set", np.array([1e-3, 1.0]), "dose"),
     ],
 )
@@ -261,7 +262,7 @@ def test_a_recording_that_continues_another_begins_where_it_ended(name: str, val
 
 def test_by_the_way_a_gain_settles_within_a_cycle_and_keeps_still_in_holds() -> None:
     load = between([0.8, 0.8, 0.2, 0.2, 1.0])
-    gained = run("cycle_conditioning", np.array([0.1, 2.0, 1.0]), load)[1:] / load[1:] - 1.0
+    gained = run("cycle_conditioning", np.array([0.1, 2.0, 1.0, 1.0]), load)[1:] / load[1:] - 1.0
     way = 0.5 * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(load)))])[1:]
     assert np.max(np.abs(gained - 0.1 * -np.expm1(-way / 2.0))) < 0.1 / 2.0 * 3 * LEAST_DEAD_ZONE
     still = np.diff(load[1:]) == 0.0
@@ -269,10 +270,23 @@ def test_by_the_way_a_gain_settles_within_a_cycle_and_keeps_still_in_holds() -> 
     assert np.all(np.diff(gained)[still] == 0.0)
 
 
+def test_a_stretched_settling_is_fast_at_first_and_for_long_not_over() -> None:
+    load = between([1.0, 0.0] * 12, 40)
+    at = 40 * (2 * np.array([1, 2, 4, 11]) + 1)  # the peaks after so many cycles
+
+    def gained(stretch: float) -> Array:
+        return run("cycle_conditioning", np.array([0.1, 2.0, 0.0, stretch]), load)[at] - 1.0
+
+    assert gained(0.5) == pytest.approx(0.1 * -np.expm1(-np.sqrt(np.array([0.5, 1.0, 2.0, 5.5]))), rel=1e-12)
+    assert gained(0.5)[0] > gained(1.0)[0]
+    assert gained(0.5)[1] == pytest.approx(gained(1.0)[1])  # 63 % of it after as many cycles, of either
+    assert gained(0.5)[3] < gained(1.0)[3]
+
+
 @pytest.mark.parametrize(("height", "counted"), [(0.085, True), (0.075, False)])
 def test_a_cycle_counts_from_eight_percent_of_full_scale_on(height: float, counted: bool) -> None:
     load = between([height, 0.0, height, 0.0, 0.5], 50)
-    gain = run("cycle_conditioning", np.array([0.1, 2.0, 0.0]), load)[-1] / load[-1]
+    gain = run("cycle_conditioning", np.array([0.1, 2.0, 0.0, 1.0]), load)[-1] / load[-1]
     assert gain == pytest.approx(1.0 + 0.1 * -np.expm1(-2.0 / 2.0) if counted else 1.0, rel=1e-12)
 
 

@@ -148,8 +148,8 @@ def test_signs_are_those_of_the_documentation() -> None:
     assert _sign("zero_offset", [0.01]) > 0
     assert _sign("load_cell_tare", [0.01]) > 0
     assert _sign("zero_drift", [1e-3, 0.0, 0.0, 1.0]) > 0
-    assert _sign("gain_drift", [1e-3, 0.0, 0.0, 0.0]) > 0
-    assert _sign("gain_drift", [1e-3, 0.0, 0.0, 0.0], at=0.0) == 0
+    assert _sign("gain_drift", [1e-3, 0.0, 0.0, 0.0, 1.0]) > 0
+    assert _sign("gain_drift", [1e-3, 0.0, 0.0, 0.0, 1.0], at=0.0) == 0
     assert _sign("warm_up", [0.01, 5.0, 1.0]) > 0
     assert _sign("cross_talk", [0.01]) > 0
     assert _sign("saturation", [0.5, 0.4, 0.01, 0.0]) < 0
@@ -240,17 +240,18 @@ def test_a_recording_that_continues_another_carries_the_clock_on(name: str) -> N
 
 
 @given(rate=st.floats(-1e-3, 1e-3), exponent=st.floats(0.4, 2.0), time_s=st.floats(0.0, 1e4))
-def test_a_zero_drifts_by_a_power_of_the_time(rate: float, exponent: float, time_s: float) -> None:
+def test_a_zero_and_a_gain_drift_by_a_power_of_the_time(rate: float, exponent: float, time_s: float) -> None:
     """Of all exponents alike a hundred times the rate in 100 s; of the root of time twice in four times as long."""
-    drift = effect("zero_drift")
 
-    def moved(at_s: float) -> float:
-        times_s = np.array([0.0, at_s])
-        values = np.array([rate, 0.0, 0.0, exponent])
-        return float(drift.apply(np.zeros(2), Conditions(times_s, np.zeros(2), 1.0), values)[1])
+    def moved(name: str, at_s: float) -> float:
+        drift, times_s = effect(name), np.array([0.0, at_s])
+        values = drift.start({"exponent": exponent, "temperature_lag": 0.0})
+        values[0] = rate
+        return float(drift.apply(np.ones(2), Conditions(times_s, np.zeros(2), 1.0), values)[1]) - 1.0
 
-    assert moved(100.0) == pytest.approx(100.0 * rate)
-    assert moved(4.0 * time_s) == pytest.approx(4.0**exponent * moved(time_s))
+    for name in ("zero_drift", "gain_drift"):
+        assert moved(name, 100.0) == pytest.approx(100.0 * rate, abs=1e-12)
+        assert moved(name, 4.0 * time_s) == pytest.approx(4.0**exponent * moved(name, time_s), abs=1e-12)
 
 
 def test_a_thermometers_noise_is_not_added_to_the_reading() -> None:
@@ -294,8 +295,8 @@ def test_a_gain_goes_with_the_temperature_from_recording_to_recording(
     p, gain = np.full(time_s.size, 0.5), effect("gain_drift")
     here, first = (Conditions(time_s, p, 0.1, temperature_k=begun + within_k) for begun in (begins_k, 0.0))
     counts_k = begins_k if abs(begins_k) >= 0.2 else 0.0  # less than a cheap probe tells
-    moved = gain.apply(p, here, np.array([0.0, coefficient, 0.0, share]))
-    alone = gain.apply(p, first, np.array([0.0, coefficient, 0.0, 0.0]))
+    moved = gain.apply(p, here, np.array([0.0, coefficient, 0.0, share, 1.0]))
+    alone = gain.apply(p, first, np.array([0.0, coefficient, 0.0, 0.0, 1.0]))
     assert np.allclose(moved - alone, 0.5 * coefficient * share * counts_k, rtol=0, atol=1e-12)
     # A zero of each recording's own is told anyway.
     zero = effect("zero_drift")
@@ -323,7 +324,7 @@ def test_a_file_from_before_sensors_lagged_behind_a_temperature_has_no_such_lag_
     assert ExtendedModel.from_dict(before).to_dict() == stored
     gain = {"drift_rate": 1e-5, "temperature_coefficient": 2e-3, "temperature_lag": 60.0}
     told = ExtendedModel.from_dict({**stored, "effects": {"gain_drift": gain}})
-    assert told.to_dict()["effects"]["gain_drift"] == {**gain, "carried_over": 0.0}
+    assert told.to_dict()["effects"]["gain_drift"] == {**gain, "carried_over": 0.0, "exponent": 1.0}
     with pytest.raises(KeyError):
         ExtendedModel.from_dict({**stored, "effects": {"zero_drift": {"drift_rate": 1e-5}}})
 

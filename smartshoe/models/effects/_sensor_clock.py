@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -30,18 +29,29 @@ TEMPERATURE_LAG = EffectParameter(
 TEMPERATURE_LAGS = ({"temperature_lag": SMOOTHED_S}, {"temperature_lag": 60.0})  # a bare die's, and a housing's
 
 
+FIRST_S = 100.0  # over which the rate of a drift is the mean one, whatever its exponent
+EXPONENT = EffectParameter("exponent", "1", "power of the time, 1 for a steady drift", None, 0.4, 2.0, 0.05, absent=1.0)
+
+
 def running_time_s(conditions: Conditions) -> Array:
     """(n,) seconds since the unit rested and was zeroed, through the recordings that this one continues."""
     return conditions.kept("running_time_s", (), lambda: conditions.time_s + conditions.before.get("time_s", 0.0))
 
 
-def drift(
-    conditions: Conditions, values: Array, grown: Callable[[Array], Array] | None = None, carried_over: float = 0.0
-) -> Array:
+def grown(time_s: Array, exponent: float) -> Array:
+    """(n,) the time that a steady drift would take to come as far."""
+    return time_s if exponent == 1.0 else np.asarray(FIRST_S * (time_s / FIRST_S) ** exponent)
+
+
+def grown_in_c(exponent: float) -> str:
+    """A C expression of ``t`` in s: `grown`. A steady drift costs firmware no power."""
+    return "t" if exponent == 1.0 else f"{c_number(FIRST_S)} * pow(t / {c_number(FIRST_S)}, {c_number(exponent)})"
+
+
+def drift(conditions: Conditions, values: Array, exponent: float, carried_over: float = 0.0) -> Array:
     """(n,) a rate ``values[0]`` in 1/s times the time and a coefficient ``values[1]`` in 1/K times the temperature.
 
-    ``grown`` (n,) of the time stands for it where the drift is none of a steady pace.
-    The sensor's body follows the temperature that was logged by a first-order lag of ``values[2]`` s, and is as warm as
+    The time is `grown` by ``exponent``. The sensor's body follows the temperature that was logged by a first-order lag of ``values[2]`` s, and is as warm as
     that where the recording begins. The coefficient does nothing without a temperature that moves, the rate nothing
     where that temperature rises as evenly as a clock. ``carried_over`` is the share that counts of what the recording
     begins warmer than the first of all.
@@ -54,7 +64,7 @@ def drift(
         moved += values[1] * carried_over * conditions.begins_warmer_k
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
         time_s = running_time_s(conditions)
-        moved += values[0] * (time_s if grown is None else grown(time_s))
+        moved += values[0] * grown(time_s, exponent)
     return moved
 
 

@@ -18,10 +18,11 @@ MEMBERS = ("count", "trough", "peak", "place", "gone")
 
 
 class CycleConditioning(Effect):
-    """f (1 + m (1 - exp(-n/n0))), n = (1 - w) N + w L/2.
+    """f (1 + m (1 - exp(-n))), n = (1 - w) (N/n0)^stretch + w L/(2 n0).
 
     N are the cycles of 8 % of full scale and more that are over (shakedown by counting), L is the way that the load has
-    gone up and down, in full scales (endochronic, Valanis 1971): one cycle to full scale is one of either.
+    gone up and down, in full scales (endochronic, Valanis 1971): one cycle to full scale is one of either. A stretch
+    below 1 is of many numbers of cycles at once (Kohlrausch's, over cycles): fast at first, and for long not over.
     """
 
     name, family, stage, place = "cycle_conditioning", "softening", "wall", "wall"
@@ -33,8 +34,12 @@ class CycleConditioning(Effect):
         ),
         EffectParameter("by_way", "1", "w: share that goes by the load's way, not by cycles", None, 0.0, 1.0, 0.5,
                         absent=0.0, natural="both"),
+        EffectParameter("stretch", "1", "exponent of the settling by cycles, 1 for a single number of them", None, 0.3,
+                        1.0, 0.2, absent=1.0, natural="upper"),
     )  # fmt: skip
-    shapes = tuple({"cycles": cycles, "by_way": by_way} for cycles in (1.0, 4.0, 16.0) for by_way in (0.0, 1.0))
+    shapes = tuple(
+        {"cycles": cycles, "by_way": by_way, "stretch": 1.0} for cycles in (1.0, 4.0, 16.0) for by_way in (0.0, 1.0)
+    )
     exposed_by = by("repeats", "pauses")
     separated_by = {
         "gain_drift": by("pauses", "temperature"),
@@ -46,21 +51,24 @@ class CycleConditioning(Effect):
         """The load with the gain so far; ``before["cycles"]`` and ``before["way"]`` count along."""
         if values[0] == 0.0:
             return signal.copy()
-        gained, cycles, by_way = (float(value) for value in values)
-        done, gone = _done(conditions)
-        count = done + by_way * (gone - done)
-        return signal * (1.0 - gained * np.expm1(count * (-1.0 / cycles)))
+        gained, cycles, by_way, stretch = (float(value) for value in values)
+        done, gone = (of / cycles for of in _done(conditions))
+        count = (1.0 - by_way) * done**stretch + by_way * gone
+        return signal * (1.0 - gained * np.expm1(-count))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Divide by the gain so far, counting cycles and way of what comes out; exact but for what counts as noise."""
         from smartshoe.kernels.memory import CYCLE_ENDS, conditioned_undone
 
-        gained, per_cycle, by_way = float(values[0]), 1.0 / float(values[1]), float(values[2])
+        gained, per_cycle, by_way, stretch = float(values[0]), 1.0 / float(values[1]), *map(float, values[2:])
         width = LEAST_DEAD_ZONE
 
         def body(of: Mapping[str, str]) -> str:
             count, trough, peak, place, gone = (of[name] for name in MEMBERS)
-            n = f"({c_number(1.0 - by_way)} * {count} + {c_number(by_way)} * moved)"
+            counted = f"{count} * {c_number(per_cycle)}"
+            # A settling with one number of cycles costs firmware no power.
+            counted = counted if stretch == 1.0 else f"pow({counted}, {c_number(stretch)})"
+            n = f"({c_number(1.0 - by_way)} * {counted} + {c_number(by_way * per_cycle)} * moved)"
             seek = f"""for (k = 0; k < {MOST_ROUNDS}; k++) {{
         const double guess = x;
         if ({place} >= {NO_LOAD}) {{
@@ -70,7 +78,7 @@ class CycleConditioning(Effect):
             z = z > x + {c_number(width)} ? x + {c_number(width)} : z;
             moved = {gone} + 0.5 * fabs(z - {place});
         }}
-        x = given / (1.0 - {c_number(gained)} * expm1(-{n} * {c_number(per_cycle)}));
+        x = given / (1.0 - {c_number(gained)} * expm1(-{n}));
         if (fabs(x - guess) <= {c_number(SETTLED)}) {{
             break;
         }}
@@ -101,7 +109,7 @@ class CycleConditioning(Effect):
 }}"""
 
         start = np.array([0.0, NO_LOAD, NO_LOAD, NO_LOAD, 0.0])
-        constants = (gained, per_cycle, by_way, LEAST_HEIGHT, width, MOST_ROUNDS, SETTLED)
+        constants = (gained, per_cycle, by_way, stretch, LEAST_HEIGHT, width, MOST_ROUNDS, SETTLED)
         return Undone(conditioned_undone, constants, start, MEMBERS, body)
 
 

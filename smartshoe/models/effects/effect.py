@@ -55,11 +55,12 @@ class EffectParameter:
     channel: Exposure | Literal[""] = ""
     kind_ends: Literal["", "lower", "upper", "both"] = ""
     absent: float | None = None
-    natural: Literal["", "lower", "both"] = ""
+    natural: Literal["", "lower", "upper", "both"] = ""
 
     def is_stretched(self, value: float) -> bool:
         """Whether a value lies at a bound that is not a natural one."""
-        return (value <= self.lower and not self.natural) or (value >= self.upper and self.natural != "both")
+        below, above = self.natural not in ("lower", "both"), self.natural not in ("upper", "both")
+        return (below and value <= self.lower) or (above and value >= self.upper)
 
     def is_where_kind_ends(self, value: float) -> bool:
         """Whether a value lies at a bound beyond which the effect is of another kind."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import TEMPERATURE_LAG, TEMPERATURE_LAGS, drift
+from smartshoe.models.effects._sensor_clock import EXPONENT, TEMPERATURE_LAG, TEMPERATURE_LAGS, drift, grown, grown_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -14,9 +14,9 @@ LEAST_GAIN = 0.01
 
 
 class GainDrift(Effect):
-    """P (1 + g t); with the temperature logged, P (1 + g t + g_T dT).
+    """P (1 + g T (t/T)^m), T = 100 s; with the temperature logged, + g_T dT in the bracket.
 
-    dT is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead
+    What grows by diffusion through what has grown comes with the root of time (Deal and Grove 1965). dT is of the sensor's body, which follows the logged temperature by a first-order lag: a probe in the air is ahead
     of a die in its package. g_T is inert without a temperature that moves, g where the temperature is a straight line
     in time. dT is counted from where a recording begins, and ``carried_over`` of what that is warmer than the first
     recording's beginning is added: 0 where the span is set anew each time, 1 for one sensor in rooms of any warmth.
@@ -41,8 +41,9 @@ class GainDrift(Effect):
             "carried_over", "1", "share of the temperature between recordings that counts", None, 0.0, 1.0, 0.5,
             channel="temperatures", absent=0.0, natural="both",
         ),
+        EXPONENT,
     )  # fmt: skip
-    shapes = tuple({**at, "carried_over": share} for share in (0.0, 1.0) for at in TEMPERATURE_LAGS)
+    shapes = tuple({**at, "carried_over": share, "exponent": 1.0} for share in (0.0, 1.0) for at in TEMPERATURE_LAGS)
     exposed_by = by("repeats", "peaks", "pauses")
     separated_by = {
         "coloured_noise": by("repeats"),
@@ -54,17 +55,17 @@ class GainDrift(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the first session's start."""
-        return signal + signal * drift(conditions, values, carried_over=float(values[3]))
+        return signal + signal * drift(conditions, values, float(values[4]), float(values[3]))
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """Divide by the gain; exact while that stays above a hundredth of its first value.
 
         None with a temperature coefficient: a stream carries no temperature.
         """
-        rate, coefficient = (float(value) for value in values[:2])
+        rate, coefficient, _, _, exponent = (float(value) for value in values)
         if coefficient != 0.0:
             return None
         return Memoryless(
-            lambda signal, time_s: signal / np.maximum(1.0 + rate * time_s, LEAST_GAIN),
-            f"x /= fmax(1.0 + {c_number(rate)} * t, {c_number(LEAST_GAIN)});",
+            lambda signal, time_s: signal / np.maximum(1.0 + rate * grown(time_s, exponent), LEAST_GAIN),
+            f"x /= fmax(1.0 + {c_number(rate)} * {grown_in_c(exponent)}, {c_number(LEAST_GAIN)});",
         )

@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_clock import TEMPERATURE_LAG, TEMPERATURE_LAGS, drift
+from smartshoe.models.effects._sensor_clock import EXPONENT, TEMPERATURE_LAG, TEMPERATURE_LAGS, drift, grown, grown_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
-
-FIRST_S = 100.0  # over which the rate is the mean one, whatever the exponent
-
 
 class ZeroDrift(Effect):
     """+ d T (t/T)^m, T = 100 s; with the temperature logged, + b_T dT.
@@ -37,7 +34,7 @@ class ZeroDrift(Effect):
             channel="temperature",
         ),
         TEMPERATURE_LAG,
-        EffectParameter("exponent", "1", "power of the time, 1 for a steady drift", None, 0.4, 2.0, 0.05, absent=1.0),
+        EXPONENT,
     )
     shapes = (*({**lag, "exponent": 1.0} for lag in TEMPERATURE_LAGS), {**TEMPERATURE_LAGS[0], "exponent": 0.5})
     exposed_by = by("rests", "idle", "pauses")
@@ -54,20 +51,12 @@ class ZeroDrift(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the drift since the session's start."""
-        return signal + drift(conditions, values, lambda time_s: _grown(time_s, float(values[3])))
+        return signal + drift(conditions, values, float(values[3]))
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """Subtract the drift; exact. None with a temperature coefficient: a stream carries no temperature."""
         rate, coefficient, _, exponent = (float(value) for value in values)
         if coefficient != 0.0:
             return None
-        # A steady drift costs firmware no power.
-        power = f"{c_number(FIRST_S)} * pow(t / {c_number(FIRST_S)}, {c_number(exponent)})"
-        grown = "t" if exponent == 1.0 else power
-        body = f"x -= {c_number(rate)} * {grown};"
-        return Memoryless(lambda signal, time_s: signal - rate * _grown(time_s, exponent), body)
-
-
-def _grown(time_s: Array, exponent: float) -> Array:
-    """(n,) the time that a steady drift would take to come as far."""
-    return time_s if exponent == 1.0 else np.asarray(FIRST_S * (time_s / FIRST_S) ** exponent)
+        body = f"x -= {c_number(rate)} * {grown_in_c(exponent)};"
+        return Memoryless(lambda signal, time_s: signal - rate * grown(time_s, exponent), body)
