@@ -34,7 +34,8 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     usable = tuple(np.ones(600, dtype=bool) for _ in runs)
 
     def integrity(lag_s: float) -> Any:
-        return SimpleNamespace(clock_offset_s=(lag_s,) * 3, clock_rate=(0.0,) * 3, lag_seen_s=(lag_s,) * 3, usable=usable)
+        lags_s = (lag_s,) * 3
+        return SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0,) * 3, lag_seen_s=lags_s, usable=usable)
 
     found = _prepared(runs, 2, integrity(0.0), STANDARD)
     assert [bool(one.held_out.all()) for one in found.sessions] == [False, False, True]

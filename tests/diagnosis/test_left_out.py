@@ -194,7 +194,7 @@ def test_effects_that_fit_by_their_difference_undo_one_another(reverse: float) -
     together = MODEL.with_part(drift, np.array([per_s, 0.0, 0.0, 1.0])).with_part(warm, along)
     assert cancelling(sessions, together, STANDARD) == []
     # A small one beside them has no part in it.
-    beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0, 3.0, 0.0]))
+    beside = against.with_part(gain, np.array([0.01 * abs(per_s), 0.0, 3.0, 0.0, 1.0]))
     assert cancelling(sessions, beside, STANDARD) == ["zero_drift", "warm_up"]
     assert cancelling(sessions, MODEL, STANDARD) == []
     assert cancelling(sessions, MODEL.with_part(warm, slow), STANDARD) == []

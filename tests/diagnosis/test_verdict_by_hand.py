@@ -61,8 +61,8 @@ def test_a_lag_that_a_fit_sees_otherwise_is_said(sign: float, lag_s: float, off_
     [
         ("second_relaxation", [0.1, 119.9], [0.1, 120.0], "second relaxation has its time constant at 120 s"),
         ("second_relaxation", [0.1, 0.051], [0.1, 0.05], "second relaxation has its time constant at 0.05 s"),
-        ("cycle_conditioning", [0.1, 49.9, 0.0], [0.1, 50.0, 0.0], "cycle conditioning has its cycles at 50,"),
-        ("cycle_conditioning", [0.1, 0.51, 0.0], [0.1, 0.5, 0.0], "cycle conditioning has its cycles at 0.5,"),
+        ("cycle_conditioning", [0.1, 49.9, 0, 1], [0.1, 50.0, 0, 1], "cycle conditioning has its cycles at 50,"),
+        ("cycle_conditioning", [0.1, 0.51, 0, 1], [0.1, 0.5, 0, 1], "cycle conditioning has its cycles at 0.5,"),
         ("power_law_creep", [0.1, 0.79], [0.1, 0.8], "power law creep has its exponent at 0.8,"),
         ("power_law_creep", [0.1, 0.02], [0.1, 0.8], "exponent"),  # logarithmic creep is creep
         ("warm_up", [0.1, 300.0, 1.4], None, ""),  # ever slower, it drifts as any of its kind

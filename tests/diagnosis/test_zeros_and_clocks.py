@@ -173,8 +173,8 @@ def test_no_tare_is_told_where_a_drift_may_have_come_by_what_is_read_beyond_the_
     assert {name for name, _ in told(0.002, *shown)} == both  # more than an order of magnitude
     assert {name for name, _ in told(-0.006, *shown)} == both  # it drifts the other way
     # A unit of which it is known that nothing presses it, and a load cell that shows a pull.
-    known = [one.with_channel(replace(one.load, name="command", role="command", values=FULL_N * PRESSED)) for one in shown]
-    assert {name for name, _ in told(0.006, *known)} == both
+    command = replace(shown[0].load, name="command", role="command", values=FULL_N * PRESSED)
+    assert {name for name, _ in told(0.006, *(one.with_channel(command) for one in shown))} == both
     pulled = [_run(tare=-0.018, offset=-0.018 + 0.03 * sign, seed=seed) for seed in (1, 2)]
     assert {name for name, _ in told(0.006, *pulled)} == both
 
@@ -270,7 +270,10 @@ def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
     runs = [_late(0.6), _run()]
     masks = [one.sensor.present.copy() for one in runs]
     masks[0][500:520] = False
-    integrity: Any = SimpleNamespace(clock_offset_s=(0.6, 0.0), clock_rate=(0.0, 0.0), lag_seen_s=(0.6, 0.0), usable=tuple(masks))
+    lags_s = (0.6, 0.0)
+    integrity: Any = SimpleNamespace(
+        clock_offset_s=lags_s, clock_rate=(0.0, 0.0), lag_seen_s=lags_s, usable=tuple(masks)
+    )
     lost = np.flatnonzero(~aligned(runs, integrity, STANDARD).usable[0][:1400])
     assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
     assert lost.size == pytest.approx(20, abs=1)

@@ -257,7 +257,8 @@ def _run(name: str = "run", size: int = 400) -> Recording:
 def _aligned(lags_s: tuple[float, ...], rates: tuple[float, ...], seen_s: tuple[float, ...] | None = None) -> Any:
     runs = [_run(f"run_{k}") for k in range(len(lags_s))]
     usable = tuple(np.ones(400, dtype=bool) for _ in runs)
-    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=rates, lag_seen_s=seen_s or lags_s, usable=usable)
+    seen_s = seen_s or lags_s
+    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=rates, lag_seen_s=seen_s, usable=usable)
     return aligned(runs, integrity, STANDARD)
 
 

@@ -190,7 +190,13 @@ def test_a_damaged_wall_is_straight_below_its_largest_load_and_bends_beyond() ->
 )  # fmt: skip
 @settings(max_examples=40)
 def test_softened_rubber_bears_the_load_to_the_last_digit(
-    gained: float, width: float, at_once: float, widening: float, power: float, before: float, loads: list[float],
+    gained: float,
+    width: float,
+    at_once: float,
+    widening: float,
+    power: float,
+    before: float,
+    loads: list[float],
     noise: float,
 ) -> None:
     """The kernel against bisection, sample by sample: steep bends, jumps, pulls, whatever came before."""

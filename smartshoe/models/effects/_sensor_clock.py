@@ -51,10 +51,10 @@ def grown_in_c(exponent: float) -> str:
 def drift(conditions: Conditions, values: Array, exponent: float, carried_over: float = 0.0) -> Array:
     """(n,) a rate ``values[0]`` in 1/s times the time and a coefficient ``values[1]`` in 1/K times the temperature.
 
-    The time is `grown` by ``exponent``. The sensor's body follows the temperature that was logged by a first-order lag of ``values[2]`` s, and is as warm as
-    that where the recording begins. The coefficient does nothing without a temperature that moves, the rate nothing
-    where that temperature rises as evenly as a clock. ``carried_over`` is the share that counts of what the recording
-    begins warmer than the first of all.
+    The time is `grown` by ``exponent``. The sensor's body follows the temperature that was logged by a first-order lag
+    of ``values[2]`` s, and is as warm as that where the recording begins. The coefficient does nothing without a
+    temperature that moves, the rate nothing where that temperature rises as evenly as a clock. ``carried_over`` is the
+    share that counts of what the recording begins warmer than the first of all.
     """
     warmer_k = _warmer_k(conditions)
     moved = np.zeros(conditions.time_s.size)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_clock import EXPONENT, TEMPERATURE_LAG, TEMPERATURE_LAGS, drift, grown, grown_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
+
 
 class ZeroDrift(Effect):
     """+ d T (t/T)^m, T = 100 s; with the temperature logged, + b_T dT.
