@@ -40,7 +40,8 @@ def with_a_latency(state: State, sessions: Sequence[Session]) -> State:
     """
     likelihood = state.likelihood(sessions)
     bare = with_usual_arm(state.fit.model)
-    late = [one for one in available(likelihood.sessions) if one.is_latency and one.name not in bare.names]
+    effects = available(likelihood.sessions, state.thresholds)
+    late = [one for one in effects if one.is_latency and one.name not in bare.names]
     return state_at(
         min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost),
         sessions,

@@ -8,9 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-
-import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import (
@@ -29,14 +26,13 @@ from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, load_cycles
 from smartshoe.diagnosis._settling import Progress, better_from, law_or_block, listed, score_of, settled, simpler
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect, Effect
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.signals.loading import turning_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,15 +249,6 @@ def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
     fitted = [session for session in sessions if session.fitted.any()]
     return len(fitted) if len(fitted) > 1 else load_cycles(fitted, thresholds)
-
-
-def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
-    """How often the load rises in recordings of which anything is fitted."""
-    count = 0
-    for load in (session.conditions.load for session in sessions if session.fitted.any()):
-        points = turning_points(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9))
-        count += sum(bool(load[b] > load[a]) for a, b in pairwise(points))
-    return count
 
 
 def _screening(evidence: Evidence) -> tuple[tuple[tuple[str, float], ...], Array]:

@@ -83,7 +83,7 @@ def _law_of(
     flexible = likelihood.cost(about)
     explained = min(nothing.cost, likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
-    for law in available(likelihood.sessions):
+    for law in available(likelihood.sessions, thresholds):
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
             continue
         # A law that stands beside the block may do without it.

@@ -13,6 +13,7 @@ from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
@@ -67,7 +68,7 @@ class Member:
 def members_of(
     evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
 ) -> tuple[Member, ...]:
-    chosen = [evidence.given.candidates[member] for member in best.members]
+    chosen, thresholds = [evidence.given.candidates[member] for member in best.members], evidence.thresholds
     less = [fit(likelihood, _without(one.name, extended.model), FEW_STEPS) for one in chosen]
     whole = _left(likelihood, extended)
     added = np.array([_left(likelihood, one) - whole for one in less]).reshape(len(less), whole.size)
@@ -75,10 +76,10 @@ def members_of(
     sizes = np.sqrt(np.diag(inner) / max(whole.size, 1))
     likeness = cosines(inner)
     np.fill_diagonal(likeness, 0.0)
-    departures = evidence.thresholds.departure * np.array(best.departed) * sizes
+    departures = thresholds.departure * np.array(best.departed) * sizes
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
-        is_material = sizes[k] > evidence.thresholds.material
+        is_material = sizes[k] > thresholds.material
         is_ended = bool(extended.model.part(one.name).kind_ends_at)
         made.append(
             Member(
@@ -87,7 +88,7 @@ def members_of(
                 best.departed[k],
                 alternatives(evidence, best, member, refused),
                 less[k],
-                _other_laws(one, less[k], likelihood, extended, is_ended=is_ended) if is_material else (),
+                _other_laws(one, less[k], likelihood, extended, thresholds, is_ended=is_ended) if is_material else (),
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
@@ -115,11 +116,11 @@ def _without(name: str, model: ExtendedModel) -> ExtendedModel:
 
 
 def _other_laws(
-    one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit, *, is_ended: bool
+    one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit, thresholds: Thresholds, *, is_ended: bool
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
     of_curves = _is_any_curve(one.effect, is_ended)
-    channels = {e.name for e in available(likelihood.sessions)}
+    channels = {e.name for e in available(likelihood.sessions, thresholds)}
     found = []
     for law in catalogue().values():
         is_other = law.is_memoryless if of_curves else law.slot == one.effect.slot

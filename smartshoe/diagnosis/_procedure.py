@@ -15,7 +15,7 @@ from smartshoe.diagnosis._characteristic import characteristic_of, conductance_o
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._force import force_error, force_of, undoes
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
-from smartshoe.diagnosis._inference import Inference, infer, load_cycles
+from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
@@ -23,7 +23,16 @@ from smartshoe.diagnosis._parameters import in_unit, joint_parameters, parameter
 from smartshoe.diagnosis._ranges import beyond, ranges_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, pastless, prepare, thinning
+from smartshoe.diagnosis._session import (
+    Scale,
+    Session,
+    at_full_rate,
+    full_scale,
+    load_cycles,
+    pastless,
+    prepare,
+    thinning,
+)
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (

@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, load_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
@@ -63,16 +63,17 @@ class Candidate:
         )
 
 
-def available(sessions: Sequence[Session]) -> list[Effect]:
+def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
     """Physical effects and flexible blocks whose channels were logged throughout.
 
     Not those that shift load or reading by one value, which no waveform tells from a recording's own offset
-    (`smartshoe.diagnosis._zero`).
+    (`smartshoe.diagnosis._zero`); nor those that only later load cycles show, where no recording has any.
     """
     has = logged_channels(sessions)
+    has_cycles = any(load_cycles([one], thresholds) > 1 for one in sessions)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
-    return [e for e in found if e.needs <= has and not e.is_refinement]
+    return [e for e in found if e.needs <= has and not e.is_refinement and (has_cycles or not e.needs_cycles)]
 
 
 def logged_channels(sessions: Sequence[Session]) -> set[str]:
@@ -204,7 +205,7 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     """The columns about ``model``."""
     fitted = tuple(session for session in sessions if session.fitted.any())
     inside = {part.name: part for part in model.parts}
-    outside = [e for e in available(fitted) if e.name not in inside]
+    outside = [e for e in available(fitted, thresholds) if e.name not in inside]
     channels = logged_channels(fitted)
     candidates: list[Candidate] = []
     place = 4

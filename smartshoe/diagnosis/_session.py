@@ -372,6 +372,20 @@ def _neighbour(recording: Recording) -> Channel | None:
     return others[0] if others else None
 
 
+def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
+    """How often the load rises in recordings of which anything is fitted."""
+    return sum(_rises(session.conditions, thresholds) for session in sessions if session.fitted.any())
+
+
+def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
+    def count() -> Array:
+        load = conditions.load
+        points = turning_points(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9))
+        return np.array([sum(bool(load[b] > load[a]) for a, b in pairwise(points))])
+
+    return int(conditions.kept("rises", (thresholds.cycle,), count)[0])
+
+
 def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     load = conditions.load
     # Of full scale, or of the record's own span where that is less.

@@ -113,7 +113,7 @@ def test_a_latency_is_the_best_that_is_not_there_yet_beside_a_usual_arm(monkeypa
         begun.append((one.name, bare.names, bare.relaxing_share, bare.relaxation_rate_per_s))
         return one.name
 
-    monkeypatch.setattr(_arms, "available", lambda sessions: late)
+    monkeypatch.setattr(_arms, "available", lambda sessions, thresholds: late)
     monkeypatch.setattr(_arms, "begun_with", begin)
     monkeypatch.setattr(_arms, "fit", lambda likelihood, name: SimpleNamespace(model=name, cost=-len(name)))
     monkeypatch.setattr(_arms, "state_at", lambda found, *given: found.model)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import t as student
+from told_evidence import WAVE, session_of
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
@@ -110,22 +111,38 @@ def test_a_slot_is_a_family_or_the_one_that_is_imitated() -> None:
 
 def test_an_effect_needs_its_channel_in_every_session() -> None:
     def session(**more: Any) -> Any:
-        plain = {"temperature_k": None, "neighbour": None, "begins_warmer_k": 0.0}
-        return SimpleNamespace(conditions=SimpleNamespace(**{**plain, **more}))
+        told = session_of(WAVE)
+        return replace(told, conditions=replace(told.conditions, **more))
 
-    bare, beside, warm = session(), session(neighbour=1), session(temperature_k=1)
+    bare, beside, warm = session(), session(neighbour=WAVE), session(temperature_k=WAVE)
 
     def told(*sessions: Any) -> set[str]:
-        return {one.name for one in available(sessions)}
+        return {one.name for one in available(sessions, STANDARD)}
 
     assert told(beside) - told(bare) == {"cross_talk"}
     assert told(beside, bare) == told(bare)
     assert told(warm) >= told(bare)
-    for one in available([bare]):
+    for one in available([bare], STANDARD):
         assert one.is_physical
         assert one.shifts is None
         assert not one.is_refinement
         assert not one.needs
+
+
+def test_what_only_later_load_cycles_show_is_not_looked_for_where_no_recording_has_any() -> None:
+    """A strip that is pulled once a file shows nothing of softening, nor of a gain that settles or drifts."""
+    once = session_of(np.interp(np.arange(200), [0, 100, 199], [0.0, 1.0, 0.0]))
+    twice = session_of(np.interp(np.arange(200), [0, 50, 100, 150, 199], [0.0, 1.0, 0.1, 0.6, 0.0]))
+
+    def told(*sessions: Any) -> set[str]:
+        return {one.name for one in available(sessions, STANDARD)}
+
+    memories = {"mullins_softening", "cycle_conditioning", "gain_drift", "flexible_softening", "flexible_gain_drift"}
+    assert told(twice) - told(once, once) == memories
+    assert told(once, twice) == told(twice)
+    assert all(effect(name).needs_cycles for name in memories)
+    # Peaks of many heights show a curve as well, but so does every loading.
+    assert not effect("sensor_nonlinearity").needs_cycles
 
 
 # -- columns ----------------------------------------------------------------------------------------------------------

@@ -235,10 +235,10 @@ def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> Non
         time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * load, pressure_2_mbar=35.0 * load
     )
     alone, both = prepared(pressed(load))[0], prepared(beside)[0]
-    assert "cross_talk" not in {one.name for one in available(alone)}
-    assert "cross_talk" in {one.name for one in available(both)}
-    assert "cross_talk" not in {one.name for one in available([*alone, *both])}
-    found = available(alone)
+    assert "cross_talk" not in {one.name for one in available(alone, STANDARD)}
+    assert "cross_talk" in {one.name for one in available(both, STANDARD)}
+    assert "cross_talk" not in {one.name for one in available([*alone, *both], STANDARD)}
+    found = available(alone, STANDARD)
     assert all(one.is_physical and one.shifts is None and not one.is_refinement for one in found)
     assert {"delay", "linear_leak", "dead_band"} <= {one.name for one in found}
 

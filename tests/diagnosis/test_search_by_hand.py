@@ -207,7 +207,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     monkeypatch.setattr(_members, "alternatives", lambda *given: given[2:])
     monkeypatch.setattr(_members, "begun_with", lambda law, model, likelihood: model.with_part(law))
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
-    monkeypatch.setattr(_members, "available", lambda sessions: laws)
+    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
     extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0)
     likelihood: Any = SimpleNamespace(sessions=())
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from told_evidence import WAVE, session_of
 
 from smartshoe.diagnosis import Thresholds, _laws
 from smartshoe.models.effects import blocks, catalogue, effect
@@ -144,7 +145,7 @@ def test_a_law_that_stands_beside_a_block_may_do_without_it(costs: dict[str, tup
     state: Any = SimpleNamespace(
         thresholds=STANDARD, fit=SimpleNamespace(model=both), evidence=SimpleNamespace(odds=10.0)
     )
-    likelihood: Any = SimpleNamespace(cost=lambda model: NOTHING_COST - 1.0, sessions=())
+    likelihood: Any = SimpleNamespace(cost=lambda model: NOTHING_COST - 1.0, sessions=(session_of(WAVE),))
     member: Any = SimpleNamespace(effect=block, name=block.name)
     costs["gain_drift"] = (0.0, USUAL)  # of a second one, were it tried
     assert _laws._law_of(member, state, state.fit.model, MODEL, likelihood) is None

@@ -17,7 +17,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import UsageError
 from smartshoe.models.core import Core
-from smartshoe.models.effects.exposure import CLOCK, Exposure
+from smartshoe.models.effects.exposure import CLOCK, LATER_CYCLES, Exposure
 from smartshoe.models.elements import Arm, Element
 
 Place = Literal["machine", "contact", "wall", "core", "gas", "sensor", "logger"]
@@ -223,6 +223,11 @@ class Effect(ABC):
     def slot(self) -> str:
         """Of what there is one in a set: a law, or a flexible block in its place, of each family."""
         return self.imitates or self.family
+
+    @property
+    def needs_cycles(self) -> bool:
+        """Whether it is a memory that nothing but later load cycles show."""
+        return not self.is_memoryless and bool(self.exposed_by) and self.exposed_by <= LATER_CYCLES
 
     @property
     def goes_with_the_clock(self) -> bool:

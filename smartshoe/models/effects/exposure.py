@@ -40,6 +40,8 @@ CHANNELS: frozenset[Exposure] = frozenset(
 """Words that ask for a channel and not for a load history."""
 CLOCK: frozenset[Exposure] = frozenset({"idle", "pauses", "shuffled_loads"})
 """What tells an effect that goes with time, or with what was borne so far, from one that goes with the load."""
+LATER_CYCLES: frozenset[Exposure] = frozenset({"peaks", "pauses", "repeats", "shuffled_loads"})
+"""Of what a recording of a single load cycle shows nothing."""
 WORDS: frozenset[str] = frozenset(get_args(Exposure))
 
 

@@ -45,8 +45,8 @@ class MullinsSoftening(Effect):
                         absent=1.0, natural="both"),
     )  # fmt: skip
     shapes = tuple(
-        {"width": width, "at_once": at_once, "widening": 0.0, "power": power}
-        for width, at_once, power in ((0.1, 0.0, 1.0), (0.5, 0.0, 1.0), (0.5, 1.0, 1.0), (0.5, 0.0, 0.5))
+        {"width": width, "at_once": at_once, "widening": 0.0, "power": 1.0}
+        for width, at_once in ((0.1, 0.0), (0.5, 0.0), (0.5, 1.0))
     )
     exposed_by = by("peaks", "repeats")
     separated_by = {
