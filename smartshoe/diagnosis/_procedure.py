@@ -37,6 +37,7 @@ from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
     crept_of,
+    departure_of,
     elsewhere_of,
     few_cycles_of,
     known_error,
@@ -238,6 +239,7 @@ def _diagnosed(
     )
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
+    unclear += [(one, said) for one in names if (said := departure_of(one, names))]
     names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
     cycles = load_cycles(sessions, thresholds)
     surest = sorted(names, key=lambda one: -one.confidence)[:cycles]

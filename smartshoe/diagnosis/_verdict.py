@@ -71,6 +71,19 @@ def few_cycles_of(name: Name, cycles: int) -> str:
     )
 
 
+def departure_of(name: Name, names: Sequence[Name]) -> str | None:
+    """What is said of an effect beside a surer one of its mechanism, of whose law it may be the departure."""
+    alike = (one for one in names if one.effect.mechanism == name.effect.mechanism != "")
+    surest = max(alike, key=lambda one: one.confidence, default=name)
+    if surest is name:
+        return None
+    said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
+    return (
+        f"{said} fits beside {other}, but both are {name.effect.mechanism}, of which no law is exact: it may be how the"
+        " other's law departs, so that it is not named"
+    )
+
+
 def known_error(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
     """Rms, shares of full scale, that faults of all samples add to a recording that is fitted, the most of all."""
     units = {one.index: one.recording.sensor.unit for one in sessions if one.fitted.any()}

@@ -209,6 +209,18 @@ def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts
     assert said.startswith("delay fits, but readings were moved to the load's clock before")
 
 
+def test_of_two_effects_of_one_mechanism_the_surer_is_named(parts: Any) -> None:
+    """Friction that grows with the load and friction that does not are limits of one law."""
+    for sure, named in ((0.8, ["play_hysteresis"]), (0.95, ["load_unload_asymmetry"])):
+        other = "load unload asymmetry" if sure < 0.9 else "play hysteresis"
+        parts.sizes |= {"play_hysteresis": 0.1, "load_unload_asymmetry": 0.1}
+        parts.names = [_name("play_hysteresis"), _name("delay"), _name("load_unload_asymmetry", confidence=sure)]
+        parts.seen.clear()
+        told = _run_diagnosis(parts)
+        assert {one.name for one in told.causes} == {*named, "delay"}
+        assert any(said.startswith(f"{other} fits beside") for said in told.limits)
+
+
 def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The surest of them; and one that is none for a reason of its own counts for nothing."""
     for cycles, sure, named in ((1, 0.8, ["linear_leak"]), (2, 0.8, ["delay", "linear_leak"]), (1, 0.95, ["delay"])):

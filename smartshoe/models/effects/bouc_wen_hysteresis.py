@@ -26,6 +26,7 @@ class BoucWenHysteresis(Effect):
 
     name, family, stage, place = "bouc_wen_hysteresis", "hysteresis", "wall", "wall"
     is_steep_undone = True
+    mechanism = "friction"
     says = "the reading lies lower while loading than while unloading, at any rate, and friction is there at any load"
     parameters = (
         EffectParameter("half_height", "FS_load", "friction of a long slide without load", 0.0, 0.0, 0.4, 0.01),

@@ -13,6 +13,7 @@ class LoadUnloadAsymmetry(Effect):
 
     name, family, stage, place = "load_unload_asymmetry", "asymmetry", "wall", "wall"
     is_steep_undone = True
+    mechanism = "friction"
     says = "unloading has another gain than loading: the reading jumps where the load turns, in proportion to the load"
     parameters = (
         EffectParameter("lost_gain", "1", "share of the gain that unloading lacks", 0.0, -0.6, 0.6, 0.01),
