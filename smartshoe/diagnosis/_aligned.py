@@ -45,12 +45,11 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity, thresholds: T
         return plain
     delay, drift = effect("delay"), effect("clock_drift")
     duration_s = np.array([recording.duration_s for recording in recordings])
-    shared = _one_pair(lags, rates, duration_s, thresholds)
-    if shared is None:
-        shared = _one_lag(lags, rates, seen, duration_s, thresholds)
-    if shared is not None and abs(shared[0]) < delay.parameters[0].upper:
-        late, parting = (delay, np.array([shared[0]])), (drift, np.array([shared[1]]))
-        return replace(plain, parts=(parting, late) if shared[1] else (late,))
+    pair = _one_pair(lags, rates, duration_s, thresholds)
+    before_s, rate = pair or (_one_lag(lags, rates, seen, duration_s, thresholds), 0.0)
+    if before_s is not None and abs(before_s) < delay.parameters[0].upper:
+        late, parting = (delay, np.array([before_s])), (drift, np.array([rate]))
+        return replace(plain, parts=(parting, late) if pair else (late,))
     made, usable, says, moved = [], [], [], []
     for place, recording, mask, offset_s, rate in zip(places, recordings, masks, lags, rates, strict=True):
         if offset_s or rate:
@@ -84,10 +83,8 @@ def _one_pair(lags_s: Array, rates: Array, duration_s: Array, thresholds: Thresh
     return (before_s, rate) if hidden.all() and fits.all() else None
 
 
-def _one_lag(
-    lags_s: Array, rates: Array, seen_s: Array, duration_s: Array, thresholds: Thresholds
-) -> tuple[float, float] | None:
-    """The lag in s that all recordings share, and 0 for its growth.
+def _one_lag(lags_s: Array, rates: Array, seen_s: Array, duration_s: Array, thresholds: Thresholds) -> float | None:
+    """The lag in s that all recordings share.
 
     A recording of which no clock is told alone, as of slow or few movements, shares what its reading is seen to follow
     by (``seen_s``), or anything where that is seen of none.
@@ -98,7 +95,7 @@ def _one_lag(
     all_seen = np.concatenate([told - grown, told + grown, seen_s[~is_told & np.isfinite(seen_s)]])
     if np.ptp(all_seen) > thresholds.same * np.max(np.abs(all_seen)):
         return None
-    return float(np.mean(told)), 0.0
+    return float(np.mean(told))
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:

@@ -68,7 +68,8 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
     `softness` of ``power``, wide = ``width`` + ``widening`` M^2; M is the largest phi so far, ``largest`` before the
     record, and counts less ``dead_zone``; r is `rise`.
     """
-    # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
+    # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that. A root has
+    # no such bound near its corner: a step of CLOSE is the last there.
     bound = strength / width * (3.0 + 2.0 / width) if power == 1.0 else 1e-10 / (CLOSE * CLOSE)
     arm = held = 0.0
     u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
