@@ -71,12 +71,10 @@ def _one_pair(lags_s: Array, rates: Array, duration_s: Array, thresholds: Thresh
     One pair of clocks: where some recordings show that they part, they part in all; in the others by less than a
     sensor's own lag would hide.
     """
-    shown = (lags_s != 0.0) | (rates != 0.0)
+    shown, seen = _shown(lags_s, rates, duration_s)
     if abs(float(np.sum(np.sign(rates)))) < np.sum(shown):
         return None
-    grown = 0.5 * rates * duration_s
     places = np.concatenate([0.0 * duration_s[shown], duration_s[shown]])
-    seen = np.concatenate([(lags_s - grown)[shown], (lags_s + grown)[shown]])
     rate, before_s = (float(one) for one in np.polyfit(places, seen, 1))
     hidden = np.abs(before_s + rate * duration_s[~shown]) < thresholds.settled_s
     fits = np.abs(seen - before_s - rate * places) <= thresholds.same * np.max(np.abs(seen))
@@ -89,13 +87,18 @@ def _one_lag(lags_s: Array, rates: Array, seen_s: Array, duration_s: Array, thre
     A recording of which no clock is told alone, as of slow or few movements, shares what its reading is seen to follow
     by (``seen_s``), or anything where that is seen of none.
     """
-    is_told = (lags_s != 0.0) | (rates != 0.0)
-    grown = 0.5 * (rates * duration_s)[is_told]
-    told = lags_s[is_told]
-    all_seen = np.concatenate([told - grown, told + grown, seen_s[~is_told & np.isfinite(seen_s)]])
-    if np.ptp(all_seen) > thresholds.same * np.max(np.abs(all_seen)):
+    shown, ends_s = _shown(lags_s, rates, duration_s)
+    every_s = np.concatenate([ends_s, seen_s[~shown & np.isfinite(seen_s)]])
+    if np.ptp(every_s) > thresholds.same * np.max(np.abs(every_s)):
         return None
-    return float(np.mean(told))
+    return float(np.mean(lags_s[shown]))
+
+
+def _shown(lags_s: Array, rates: Array, duration_s: Array) -> tuple[Mask, Array]:
+    """Which recordings (r,) show a clock of their own, and the lags in s at the beginnings, then ends, of those."""
+    shown = (lags_s != 0.0) | (rates != 0.0)
+    grown = 0.5 * rates * duration_s
+    return shown, np.concatenate([(lags_s - grown)[shown], (lags_s + grown)[shown]])
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:

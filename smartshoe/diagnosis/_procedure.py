@@ -239,12 +239,13 @@ def _diagnosed(
     )
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
+    names = _less(names, unclear)
     unclear += [(one, said) for one in names if (said := departure_of(one, names))]
-    names = tuple(one for one in names if one not in [left_open for left_open, _ in unclear])
+    names = _less(names, unclear)
     cycles = load_cycles(sessions, thresholds)
     surest = sorted(names, key=lambda one: -one.confidence)[:cycles]
     unclear += [(one, few_cycles_of(one, cycles)) for one in names if one not in surest]
-    names = tuple(one for one in names if one in surest)
+    names = _less(names, unclear)
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
     names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
@@ -253,7 +254,7 @@ def _diagnosed(
     past = [past_of(one, scale) for one in zeros if one.is_past]
     zeros = tuple(one for one in zeros if not one.is_past)
     crept = [(one, tare) for one in names if (tare := creeping(zeros, one.effect, one.member.size, thresholds))]
-    names = tuple(one for one in names if one not in [drift for drift, _ in crept])
+    names = _less(names, crept)
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
     causes = [_cause(name, found, fine, best, given, thresholds) for name in names]
     causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
@@ -317,6 +318,11 @@ def _diagnosed(
         traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),
         thresholds=thresholds,
     )
+
+
+def _less(names: Sequence[Name], left_open: Sequence[tuple[Name, object]]) -> tuple[Name, ...]:
+    """``names`` without those that are left open, for reasons that stand beside them."""
+    return tuple(one for one in names if one not in [name for name, _ in left_open])
 
 
 def _percent_less(after: float, before: float) -> float:

@@ -9,6 +9,7 @@ powers and stop operators must fit the reading much better on the shifted clock 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -28,21 +29,23 @@ WINDOWS = 8  # at most: octants of the load's movement
 OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # what a bank of plays spans about the share that stands still
 
 
-def align(view: View) -> View:
-    """The view with its load on the reading's clock, where the clocks differ; else as it was."""
+def align(view: View) -> tuple[View, float]:
+    """The view with its load on the reading's clock, where the clocks differ; else as it was, with all it has found.
+
+    And the lag in s by which the reading follows best, of a clock or of the unit: NaN where none stands out.
+    """
     followed = _followed(view)
     if followed is None:
-        return view
-    if followed.places.size:
-        view = replace(view, lag_seen_s=_middle(followed.best, followed.weights))
+        return view, math.nan
+    seen_s = _middle(followed.best, followed.weights)
     line = _lag_line(view, followed)
     if line is None:
-        return view
+        return view, seen_s
     offset_s, rate = line
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
     moved = view.time_s - offset_s - rate * (view.time_s - middle)
     load = np.interp(moved, view.time_s, view.load.values)
-    return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate)
+    return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate), seen_s
 
 
 def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
@@ -102,7 +105,7 @@ def _followed(view: View) -> _Followed | None:
         places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s, given)
         if weights.size and float(np.median(weights)) >= 1.0 - given.same:
             break
-    return _Followed(grid, load, reading, smooth_s, places, smallest, best, weights)
+    return _Followed(grid, load, reading, smooth_s, places, smallest, best, weights) if places.size else None
 
 
 def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
@@ -115,7 +118,7 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
     before, repeating = None, _repeats_itself(load, given)
     # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
     for lags, earned in ((of.smallest, 1.0 - given.same), (of.best, 1.0 / given.clear)):
-        if places.size == 0 or np.max(np.abs(lags)) <= least:
+        if np.max(np.abs(lags)) <= least:
             continue
         offered = []
         for offset_s, rate in _lines(places - middle, lags, weights, 0.5 * duration_s):

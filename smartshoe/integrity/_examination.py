@@ -103,6 +103,7 @@ def _examined(
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
     if view is None:
         return findings, usable, UNSEEN
+    view, seen_s = align(view)
     for detect in OF_VIEW:
         bad = ~usable[view.index]
         for finding in detect(view, bad):
@@ -111,7 +112,7 @@ def _examined(
                 usable &= ~finding.at
         if any(finding.severity == "fatal" for finding in findings):
             break
-    return findings, usable, (view.offset_s, view.rate, view.lag_seen_s)
+    return findings, usable, (view.offset_s, view.rate, seen_s)
 
 
 def _lacking(recording: Recording) -> str | None:
@@ -134,7 +135,7 @@ def _lacking(recording: Recording) -> str | None:
 
 
 def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> View | None:
-    """The recording where load and reading are both present, on one clock, the reading rising with load."""
+    """The recording where load and reading are both present, the reading rising with load; None where hardly ever."""
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
     if index.size < thresholds.least_samples:
@@ -146,7 +147,7 @@ def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> Vi
     turned = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
     if turned:
         view = replace(view, reading=Signal(-reading, thresholds), sign=-1)
-    return align(view)
+    return view
 
 
 def _fault(number: int, recording: Recording, finding: Finding) -> DataFault:

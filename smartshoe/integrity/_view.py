@@ -115,8 +115,7 @@ class View:
 
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
-    ``lag_seen_s`` is how much later the reading follows best, NaN where none stands out. ``dropped_to`` (v,) are the
-    values, as recorded, to which this unit is known to drop out.
+    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out.
     """
 
     recording: Recording
@@ -128,7 +127,6 @@ class View:
     thresholds: Thresholds
     offset_s: float = 0.0
     rate: float = 0.0
-    lag_seen_s: float = float("nan")
     dropped_to: Array = field(default_factory=lambda: np.zeros(0))
 
     @cached_property

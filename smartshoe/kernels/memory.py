@@ -305,12 +305,12 @@ def conditioned_undone(signal, strength, per_cycle, by_way, stretch, least, widt
     for k in range(signal.size):
         f, ended, moved, z = signal[k], False, gone, place
         for _ in range(2):  # again where a cycle ends with it
+            counted = (1.0 - by_way) * (count * per_cycle) ** stretch
             for _ in range(rounds):
                 guess = f
                 z = f if place >= NO_LOAD else min(max(place, f - width), f + width)
                 moved = gone if place >= NO_LOAD else gone + 0.5 * abs(z - place)
-                done = (1.0 - by_way) * (count * per_cycle) ** stretch + by_way * moved * per_cycle
-                f = signal[k] / (1.0 - strength * math.expm1(-done))
+                f = signal[k] / (1.0 - strength * math.expm1(-(counted + by_way * moved * per_cycle)))
                 if abs(f - guess) <= settled:
                     break
             if ended:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
+from test_effects_wall import soft_by_twin
 
 from smartshoe.arrays import Array
 from smartshoe.kernels.memory import _along, _place_of, bouc_wen_branch
@@ -205,12 +206,8 @@ def test_softened_rubber_bears_the_load_to_the_last_digit(
     out = run("mullins_softening", values, load, noise, largest_load=before)
     zone = dead_zone(Conditions(np.zeros(1), load, STEP_S, noise))
     below, raised = (1.0 - at_once) * gained, at_once * gained / np.tanh(0.75 / width)
-
-    def soft(share: float) -> float:
-        return float(np.tanh(share if power == 1.0 else (share + 1e-3) ** power - 1e-3**power))
-
-    amount = below / (1.0 + below) / soft(0.75 / (width + widening))
-    assume(amount * soft((1.5 * (1.0 + raised)) ** 2 / width) < 0.95)  # else it bears no load
+    amount = below / (1.0 + below) / soft_by_twin(0.75 / (width + widening), power)
+    assume(amount * soft_by_twin((1.5 * (1.0 + raised)) ** 2 / width, power) < 0.95)  # else it bears no load
 
     def rise(most: float) -> float:
         return float(1.0 + raised * np.tanh(most * most / width))
@@ -225,7 +222,7 @@ def test_softened_rubber_bears_the_load_to_the_last_digit(
         highest, given_, wide = most * rise(most), f * rise(most), width + widening * most * most
 
         def off(v: float, f: float = given_, most: float = highest, wide: float = wide) -> float:
-            return float(v * (1.0 - amount * soft(max(most**2 - v * v, 0.0) / wide)) - f)
+            return float(v * (1.0 - amount * soft_by_twin(max(most**2 - v * v, 0.0) / wide, power)) - f)
 
         low, high = (given_, highest) if f > 0.0 else (20.0 * given_, given_)
         assert u == pytest.approx(brentq(off, low, high, xtol=1e-14), abs=1e-10)

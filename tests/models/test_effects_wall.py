@@ -298,12 +298,12 @@ def _softened(trial: float, most: float, values: Array) -> float:
     highest = most * rise(most)
     if trial >= highest:
         return float(brentq(lambda phi: phi * rise(phi) - trial, 0.0, trial, xtol=1e-15)) if trial else 0.0
-    whole = _soft(0.75 / (width + widening), power)
-    lost = below / (1.0 + below) / whole * _soft(max(highest**2 - trial**2, 0.0) / wide, power)
+    whole = soft_by_twin(0.75 / (width + widening), power)
+    lost = below / (1.0 + below) / whole * soft_by_twin(max(highest**2 - trial**2, 0.0) / wide, power)
     return float(trial * (1.0 - lost) / rise(most))
 
 
-def _soft(share: float, power: float) -> float:
+def soft_by_twin(share: float, power: float) -> float:
     """tanh(x^power), the corner of a power below 1 rounded within a thousandth."""
     return float(np.tanh(share if power == 1.0 else (share + 1e-3) ** power - 1e-3**power))
 

@@ -27,8 +27,6 @@ TEMPERATURE_LAG = EffectParameter(
     natural="lower",
 )
 TEMPERATURE_LAGS = ({"temperature_lag": SMOOTHED_S}, {"temperature_lag": 60.0})  # a bare die's, and a housing's
-
-
 FIRST_S = 100.0  # over which the rate of a drift is the mean one, whatever its exponent
 EXPONENT = EffectParameter("exponent", "1", "power of the time, 1 for a steady drift", None, 0.4, 2.0, 0.05, absent=1.0)
 

@@ -65,11 +65,11 @@ class CycleConditioning(Effect):
 
         def body(of: Mapping[str, str]) -> str:
             count, trough, peak, place, gone = (of[name] for name in MEMBERS)
-            counted = f"{count} * {c_number(per_cycle)}"
-            # A settling with one number of cycles costs firmware no power.
-            counted = counted if stretch == 1.0 else f"pow({counted}, {c_number(stretch)})"
-            n = f"({c_number(1.0 - by_way)} * {counted} + {c_number(by_way * per_cycle)} * moved)"
-            seek = f"""for (k = 0; k < {MOST_ROUNDS}; k++) {{
+            share = f"{count} * {c_number(per_cycle)}"
+            # A settling with one number of cycles costs firmware no power, another one power a sample.
+            share = share if stretch == 1.0 else f"pow({share}, {c_number(stretch)})"
+            seek = f"""counted = {c_number(1.0 - by_way)} * {share};
+    for (k = 0; k < {MOST_ROUNDS}; k++) {{
         const double guess = x;
         if ({place} >= {NO_LOAD}) {{
             z = x;
@@ -78,14 +78,14 @@ class CycleConditioning(Effect):
             z = z > x + {c_number(width)} ? x + {c_number(width)} : z;
             moved = {gone} + 0.5 * fabs(z - {place});
         }}
-        x = given / (1.0 - {c_number(gained)} * expm1(-{n}));
+        x = given / (1.0 - {c_number(gained)} * expm1(-(counted + {c_number(by_way * per_cycle)} * moved)));
         if (fabs(x - guess) <= {c_number(SETTLED)}) {{
             break;
         }}
     }}"""
             return f"""{{
     const double given = x;
-    double moved = {gone}, z = x;
+    double moved = {gone}, z = x, counted;
     int k;
     {seek}
     if ({trough} >= {NO_LOAD}) {{

@@ -56,7 +56,7 @@ class GainDrift(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal times the gain since the first session's start."""
-        return signal + signal * drift(conditions, values, float(values[4]), float(values[3]))
+        return signal + signal * drift(conditions, values, float(values[4]), carried_over=float(values[3]))
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """Divide by the gain; exact while that stays above a hundredth of its first value.
