@@ -68,7 +68,7 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Columns ``seen`` (n, k) a session, over what is fitted; ``past`` (k, 2), their products with its nuisances."""
+    """Columns ``seen`` (n, k) a session, over what is fitted; ``past`` (k, l), their products with its l nuisances."""
 
     seen: Sequence[Array]
     past: Sequence[Array]
@@ -97,15 +97,16 @@ class Evidence:
         self._of_all = of_all
         self._seen: dict[tuple[Members, bool], Posterior] = {}
         self._extensions: dict[Members, list[tuple[float, int, Array]]] = {}
+        parts = list(zip(given.products, given.nuisance_counts, strict=True))
         self._inverse = [
             np.linalg.inv(
-                ridged(products[-2:, -2:] + noise_sd**2 * nuisance_precision(one, given.model, self.thresholds))
+                ridged(products[-n:, -n:] + noise_sd**2 * nuisance_precision(one, given.model, self.thresholds))
             )
-            for products, one in zip(given.products, given.sessions, strict=True)
+            for (products, n), one in zip(parts, given.sessions, strict=True)
         ]
-        own_past = [products[:-2, -2:] for products in given.products]
+        own_past = [products[:-n, -n:] for products, n in parts]
         self._all = _Columns(given.seen, own_past)
-        self.gram = self._free(np.sum([one[:-2, :-2] for one in given.products], axis=0), own_past, own_past)
+        self.gram = self._free(np.sum([products[:-n, :-n] for products, n in parts], axis=0), own_past, own_past)
         # The visible part of each column: what the baseline's own changes cannot follow.
         own = slice(1, 1 + given.own)
         raw = given.gram
@@ -140,7 +141,7 @@ class Evidence:
     def _free(self, products: Array, left: Sequence[Array], right: Sequence[Array]) -> Array:
         """(l, r) inner products, in units of the noise's variance, with what nuisances follow taken out.
 
-        ``left`` (l, 2) and ``right`` (r, 2) a session are the columns' inner products with its nuisances.
+        ``left`` (l, k) and ``right`` (r, k) a session are the columns' inner products with its nuisances.
         """
         parts = zip(left, right, self._inverse, strict=True)
         return np.asarray((products - sum(a @ inverse @ b.T for a, b, inverse in parts)) / self.noise_sd**2)
@@ -214,8 +215,9 @@ class Evidence:
         given, absorbed = self.given, self._absorbed[:, columns] @ weights
         found = []
         for every, rows, own, products in zip(whole, given.rows, given.nuisances, given.products, strict=True):
-            known = products[-2:, columns] @ weights - products[-2:, 1 : 1 + given.own] @ absorbed
-            followed = own @ np.linalg.solve(ridged(products[-2:, -2:]), known)
+            past = products[-own.shape[1] :]
+            known = past[:, columns] @ weights - past[:, 1 : 1 + given.own] @ absorbed
+            followed = own @ np.linalg.solve(ridged(past[:, -own.shape[1] :]), known)
             found.append(every - rows[:, 1 : 1 + given.own] @ absorbed - followed)
         return found
 
@@ -242,6 +244,14 @@ class Evidence:
                 pull, fall = self._solved(members, self._strengths(members, pull), of_any_law=of_any_law)
             self._seen[asked] = self._described(members, pull, fall)
         return self._seen[asked]
+
+    def score_beside(self, members: Members) -> float:
+        """The score of a set with what the freedom of the nuisances costs, but for the offsets', whose prior is flat.
+
+        -2 log of the evidence under any choice of the other nuisances: these can be weighed against one another.
+        """
+        free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
+        return self.posterior(members).score - float(sum(free))
 
     @cached_property
     def of_whole_effects(self) -> Evidence:

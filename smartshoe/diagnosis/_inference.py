@@ -25,6 +25,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._own_gains import are_told, gains_of, may_differ, with_own_gains
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, load_cycles
 from smartshoe.diagnosis._settling import Progress, better_from, law_or_block, listed, score_of, settled, simpler
@@ -42,7 +43,8 @@ class Inference:
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
     ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
     one is idle, and others undo one another without it. ``alone``: the effect that does most by itself, where no
-    member is sure.
+    member is sure. ``own_gains``: where recordings differ by it, each one's name and the share by which its gain lies
+    beside that of all.
     """
 
     baseline: Fit
@@ -55,12 +57,16 @@ class Inference:
     can_validate: bool = True
     undone: tuple[str, ...] = ()
     alone: Effect | None = None
+    own_gains: tuple[tuple[str, float], ...] = ()
 
 
 def infer(
     start: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, progress: Progress, is_unit: bool = True
 ) -> Inference:
-    """The effects in the fitted part of ``sessions``, beside the baseline ``start``; none where it is no unit's."""
+    """The effects in the fitted part of ``sessions``, beside the baseline ``start``; none where it is no unit's.
+
+    Where gains of the recordings' own are told, what there is beside these.
+    """
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
     given, evidence, best = searched(plain.model, sessions, thresholds)
@@ -69,24 +75,21 @@ def infer(
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, likeness, (), can_validate)
-    state = State(given, evidence, best, plain)
+    begun = State(given, evidence, best, plain)
     if is_stretched(plain.model):
-        state = simpler(with_a_latency(state, sessions), state, sessions)
-    begun = state
-    state = settled(state, sessions, progress)
-    if is_beyond_memory(state.fit.model, thresholds):
-        progress("beginning anew from arms as units have")
-        state = better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
-    if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
-        progress("trying other relaxation rates of the baseline")
-        state = better_from(with_another_pole(state, sessions), state, sessions, progress)
-    if state.fit.model.relaxing_share < 0.0:
-        state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
+        begun = simpler(with_a_latency(begun, sessions), begun, sessions)
+    state = _sought(begun, sessions, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
     with_blocks, lawful = state, with_laws(state, plain.model, sessions)
     if lawful is not state:
         state = law_or_block(settled(lawful, sessions, progress), state, sessions)
+    if not any(one.own_gain_sd for one in sessions) and may_differ(sessions):
+        gained = with_own_gains(sessions, thresholds)
+        if are_told(state, sessions, gained):
+            progress("giving each recording a gain of its own")
+            beside = infer(start, gained, thresholds, progress)
+            return replace(beside, own_gains=gains_of(gained, beside.fit.model))
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
@@ -127,6 +130,20 @@ def infer(
         undone=found.undone,
         alone=alone,
     )
+
+
+def _sought(begun: State, sessions: Sequence[Session], progress: Progress) -> State:
+    """What settles from ``begun``, also with other arms of the baseline where it came to one that effects had bent."""
+    state = settled(begun, sessions, progress)
+    if is_beyond_memory(state.fit.model, begun.thresholds):
+        progress("beginning anew from arms as units have")
+        state = better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
+    if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
+        progress("trying other relaxation rates of the baseline")
+        state = better_from(with_another_pole(state, sessions), state, sessions, progress)
+    if state.fit.model.relaxing_share < 0.0:
+        state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
+    return state
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 The model is linearised about a fit. Its own parameters, each effect of the catalogue at each point of its shapes, and
 each flexible block give columns; an effect that is already in the model gives its whole contribution. Each recording
-has nuisances of its own, an offset and what an earlier load left in the relaxing arm; they are marginalised exactly
-(flat and Gaussian priors), so that no zero is ever assumed.
+has nuisances of its own, an offset, what an earlier load left in the relaxing arm and, where they differ by it, a gain;
+they are marginalised exactly (flat and Gaussian priors), so that no zero is ever assumed.
 """
 
 from __future__ import annotations
@@ -84,22 +84,26 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
     return logged | ({"temperatures"} if begin_apart else set())
 
 
-def nuisances(session: Session, pole_per_s: float) -> Array:
-    """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording."""
+def nuisances(session: Session, pole_per_s: float, read: Array | None = None) -> Array:
+    """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording.
+
+    (n, 3) of a recording with a gain of its own: by how much that moves what a model has ``read`` (n,).
+    """
     time_s = session.conditions.time_s
-    return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0]))])
+    own = [] if read is None else [session.own_gain_sd * read]
+    return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0])), *own])
 
 
 def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
     """(2, 2) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
 
     A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
-    rest still carries some of what went before.
+    rest still carries some of what went before. (3, 3) where the recording's gain is its own.
     """
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
     sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    return np.diag([0.0, 1.0 / sd**2])
+    return np.diag([0.0, 1.0 / sd**2, *([1.0] if session.own_gain_sd else [])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +130,16 @@ class Linearised:
 
     @cached_property
     def nuisances(self) -> tuple[Array, ...]:
-        """(n, 2) a session: what is its own."""
-        return tuple(nuisances(session, self.model.pole_per_s) for session in self.sessions)
+        """(n, k) a session: what is its own."""
+        pole_per_s, read = self.model.pole_per_s, self.model.simulate
+        return tuple(
+            nuisances(one, pole_per_s, read(one.conditions) if one.own_gain_sd else None) for one in self.sessions
+        )
+
+    @property
+    def nuisance_counts(self) -> list[int]:
+        """k, a session."""
+        return [own.shape[1] for own in self.nuisances]
 
     @cached_property
     def past(self) -> tuple[Array, ...]:
@@ -141,13 +153,13 @@ class Linearised:
 
     @cached_property
     def products(self) -> tuple[Array, ...]:
-        """(m + 2, m + 2) a session: inner products over what is fitted, the nuisances' last."""
+        """(m + k, m + k) a session: inner products over what is fitted, the k nuisances' last."""
         return tuple(_products(seen, past) for seen, past in zip(self.seen, self.past, strict=True))
 
     @cached_property
     def gram(self) -> Array:
         """(m, m) inner products of the target and all columns, in order, over all sessions; flat nuisances are out."""
-        return np.asarray(sum(_without_last(products) for products in self.products))
+        return np.asarray(sum(_without_last(*one) for one in zip(self.products, self.nuisance_counts, strict=True)))
 
     @cached_property
     def factors(self) -> tuple[Array, ...]:
@@ -171,7 +183,8 @@ class Linearised:
 
 def marginal(rows: Array, session: Session, pole_per_s: float) -> Array:
     """(m, m) inner products of ``rows`` (n, m) over the fitted samples with the session's nuisances taken out."""
-    return _without_last(_products(rows[session.fitted], nuisances(session, pole_per_s)[session.fitted]))
+    past = nuisances(session, pole_per_s)[session.fitted]
+    return _without_last(_products(rows[session.fitted], past), past.shape[1])
 
 
 def where(mask: Mask, columns: Array) -> Array:
@@ -184,10 +197,10 @@ def _products(seen: Array, past: Array) -> Array:
     return np.block([[seen.T @ seen, cross], [cross.T, past.T @ past]])
 
 
-def _without_last(products: Array) -> Array:
-    """(m, m) inner products (m + 2, m + 2) with what the last two columns follow taken out."""
-    last, cross = products[-2:, -2:], products[-2:, :-2]
-    return np.asarray(products[:-2, :-2] - cross.T @ np.linalg.solve(ridged(last), cross))
+def _without_last(products: Array, count: int) -> Array:
+    """(m, m) inner products (m + count, m + count) with what the last ``count`` columns follow taken out."""
+    last, cross = products[-count:, -count:], products[-count:, :-count]
+    return np.asarray(products[:-count, :-count] - cross.T @ np.linalg.solve(ridged(last), cross))
 
 
 def ridged(inner: Array) -> Array:

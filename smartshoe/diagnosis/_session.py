@@ -66,7 +66,8 @@ class Session:
     ``reading`` (n,); ``usable`` (n,) False where a sample is missing or faulty; ``held_out`` (n,) True where it is
     left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a part of the time where there are few.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
-    ``quiet`` is the load at the full rate.
+    ``quiet`` is the load at the full rate. ``own_gain_sd``: standard deviation, as a share, by which the gain of one
+    recording lies beside that of all; 0 where they share one.
     """
 
     recording: Recording
@@ -79,6 +80,7 @@ class Session:
     resting: Mask
     thinned: int
     quiet: Quiet
+    own_gain_sd: float = 0.0
 
     @property
     def fitted(self) -> Mask:

@@ -211,6 +211,18 @@ def crept_of(drift: Name, tare: Zero) -> str:
     )
 
 
+def own_gains_of(found: Inference) -> list[str]:
+    """What is said of recordings of which each has a gain of its own."""
+    if not found.own_gains:
+        return []
+    low, high = (of(found.own_gains, key=lambda one: one[1]) for of in (min, max))
+    return [
+        f"each recording has a gain of its own, from {100 * low[1]:+.2g} % in {low[0]} to {100 * high[1]:+.2g} % in"
+        f" {high[0]} beside that of all, as where a unit is taken out and put back: what is named is told beside these"
+        " gains, and no model foresees that of another recording (leave the unit in place, or calibrate it each time)"
+    ]
+
+
 def refusals_of(found: Inference) -> list[str]:
     """What is said of effects that are not named for what others do: taken out again, or undone by one another."""
     if not found.can_validate:

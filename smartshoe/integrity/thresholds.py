@@ -32,7 +32,10 @@ class Thresholds:
         "second laboratory and own truths: 0.05 to 0.4",
     )
     strength_sd: float = threshold(
-        0.03, "share of full scale", "prior standard deviation of an effect that is there", "effects.md: 0.1 to 10 %"
+        0.03,
+        "share of full scale",
+        "prior standard deviation of an effect that is there, and of a gain of a recording's own",
+        "effects.md: 0.1 to 10 %",
     )
     false_name: float = threshold(0.02, "probability", "of an effect where there is none", "issue: floor of 2 %")
     unknown_past: float = threshold(

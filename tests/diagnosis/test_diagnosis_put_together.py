@@ -94,7 +94,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
         can_validate=True, refused=(), undone=(), alone=None, screening=tuple((f"n{k}", float(k)) for k in range(6)),
-        likeness=np.eye(6),
+        likeness=np.eye(6), own_gains=(),
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size = "memory", 0.07

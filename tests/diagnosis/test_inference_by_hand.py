@@ -56,7 +56,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         names = tuple(told.names.get(name, ()))
         fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name, names=names))
         return SimpleNamespace(
-            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0),
+            name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0), thresholds=STANDARD,
             likelihood=lambda sessions: "likelihood",
         )  # fmt: skip
 
@@ -120,6 +120,26 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
         assert (found.screening, found.likeness, found.likelihood) == ("screening", "likeness", "likelihood")
         assert found.baseline is found.fit
+
+
+def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
+    flow: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, told = [], [True]
+    shared, own = [SimpleNamespace(own_gain_sd=0.0)], [SimpleNamespace(own_gain_sd=0.03)]
+    monkeypatch.setattr(_inference, "may_differ", lambda sessions: told[0] is not None)
+    monkeypatch.setattr(_inference, "with_own_gains", lambda sessions, thresholds: own)
+    monkeypatch.setattr(_inference, "gains_of", lambda sessions, model: (sessions, model))
+    monkeypatch.setattr(
+        _inference, "are_told", lambda state, sessions, gained: bool(asked.append((sessions, gained)) or told[0])
+    )
+    found = infer(MODEL, shared, STANDARD, flow.said.append)  # type: ignore[arg-type]
+    assert found.own_gains == (own, "settled first")
+    assert asked == [(shared, own)]  # beside gains they are not asked for again
+    assert "giving each recording a gain of its own" in flow.said
+    for told[0] in (False, None):
+        assert infer(MODEL, shared, STANDARD, flow.said.append).own_gains == ()  # type: ignore[arg-type]
+    assert len(asked) == 2
 
 
 def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> None:

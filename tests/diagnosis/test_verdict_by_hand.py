@@ -22,6 +22,7 @@ from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,
     other_kind_of,
+    own_gains_of,
     parted_clocks,
     past_of,
     verdict_of,
@@ -300,3 +301,11 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
     assert found.fit.model.names == names
     gone = () if len(names) > 1 else ("b",)
     assert (found.members(), found.refused) == ((tuple(range(len(names))), gone), gone)
+
+
+def test_gains_of_their_own_are_said_with_the_recordings_that_lie_farthest_apart() -> None:
+    found: Any = SimpleNamespace(own_gains=(("b", 0.0021), ("a", -0.0134), ("c", 0.0113)))
+    (said,) = own_gains_of(found)
+    assert said.startswith("each recording has a gain of its own, from -1.3 % in a to +1.1 % in c beside that of all,")
+    found.own_gains = ()
+    assert own_gains_of(found) == []

@@ -1,0 +1,159 @@
+"""A gain of each recording's own: marginalised exactly, weighed as one hypothesis more, told where it accounts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from smartshoe import Recording
+from smartshoe.diagnosis import Thresholds
+from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._own_gains import are_told, gains_of, may_differ, with_own_gains
+from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
+from smartshoe.diagnosis._session import Scale, Session, prepare
+from smartshoe.diagnosis._state import state_at
+from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.units import MILLIBAR
+
+Array = NDArray[np.float64]
+
+STEP_S, SD, SPAN_MBAR = 0.1, 0.002, 140.0
+STANDARD = Thresholds()
+MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, SPAN_MBAR, "mbar")
+CURVED = MODEL.with_part(effect("gas_compression"), np.array([0.08]))
+TIME_S = np.arange(0.0, 40.0, STEP_S)
+
+
+def _run(number: int, gain: float, **metadata: str) -> Recording:
+    rng = np.random.default_rng([number, 7])
+    corners = np.zeros(9)
+    corners[1::2] = rng.uniform(0.5, 1.0, 4)
+    load = np.interp(TIME_S, 5.0 * np.arange(9), corners)
+    share = (1.0 + gain) * CURVED.simulate(Conditions(TIME_S, load, STEP_S)) + SD * rng.standard_normal(TIME_S.size)
+    return Recording.from_arrays(
+        time_s=TIME_S, force_n=800.0 * load, pressure_mbar=SPAN_MBAR * share, name=f"run_{number}", metadata=metadata
+    )
+
+
+def _sessions(*runs: Recording) -> list[Session]:
+    usable = [one.sensor.present for one in runs]
+    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), 4, STANDARD)
+
+
+@pytest.fixture(scope="module")
+def sessions() -> list[Session]:
+    return _sessions(_run(0, 0.02), _run(1, -0.01), _run(2, -0.01))
+
+
+@pytest.fixture(scope="module")
+def gained(sessions: list[Session]) -> list[Session]:
+    return with_own_gains(sessions, STANDARD)
+
+
+def _wide(sessions: list[Session], model: ExtendedModel) -> tuple[Array, ...]:
+    """Nuisances (n, 2 or 3) over what is fitted, a session each, times the standard deviations of their priors."""
+    made = []
+    for one in sessions:
+        read = model.simulate(one.conditions) if one.own_gain_sd else None
+        sds = np.concatenate([[1e3], np.diag(nuisance_precision(one, model, STANDARD))[1:] ** -0.5])
+        made.append((nuisances(one, model.pole_per_s, read) * sds)[one.fitted])
+    return tuple(made)
+
+
+def _density(given: Linearised, sessions: list[Session], member: int | None) -> float:
+    """-2 log density of the target, every prior written out in one covariance; the equation exact."""
+    prior = np.full(given.rows[0].shape[1] - 1, STANDARD.material)
+    prior[: given.own] = 1.0
+    if member is not None:
+        prior[[c - 1 for c in given.candidates[member].columns]] = STANDARD.strength_sd
+    z = np.concatenate([rows[s.fitted, 1:] * prior for rows, s in zip(given.rows, sessions, strict=True)])
+    y = np.concatenate([rows[s.fitted, 0] for rows, s in zip(given.rows, sessions, strict=True)])
+    covariance = z @ z.T + SD**2 * np.eye(y.size)
+    first = 0
+    for wide in _wide(sessions, given.model):
+        there = slice(first, first + wide.shape[0])
+        covariance[there, there] += wide @ wide.T
+        first += wide.shape[0]
+    return float(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1])
+
+
+def test_evidence_with_and_without_gains_differs_as_the_explicit_densities_do(
+    sessions: list[Session], gained: list[Session]
+) -> None:
+    given = linearised(MODEL, sessions, STANDARD)
+    (curve,) = (k for k, one in enumerate(given.candidates) if one.name == "gas_compression")
+    plain, beside = Evidence(given, SD), Evidence(replace(given, sessions=tuple(gained)), SD)
+    for member in (None, curve):
+        members = () if member is None else (member,)
+        # Of one equation that is taken for exact: departures are no matter of gains.
+        fast = [one.score_beside(members) - one.posterior(members).score + one.exact(members).score
+                for one in (plain, beside)]  # fmt: skip
+        slow = [_density(given, some, member) for some in (sessions, gained)]
+        assert fast[0] - fast[1] == pytest.approx(slow[0] - slow[1], abs=0.1 + 1e-4 * abs(slow[0] - slow[1]))
+
+
+def test_a_fits_cost_is_the_squared_error_with_every_nuisance_written_out(gained: list[Session]) -> None:
+    likelihood, expected = Likelihood(gained, SD, MODEL, STANDARD), 0.0
+    for one, wide in zip(gained, _wide(gained, CURVED), strict=True):
+        left = (one.reading - CURVED.simulate(one.conditions))[one.fitted]
+        expected += float(left @ np.linalg.solve(wide @ wide.T + SD**2 * np.eye(left.size), left))
+    assert likelihood.cost(CURVED) == pytest.approx(expected, rel=1e-3)
+
+
+def test_gains_and_the_effect_beside_them_come_out_of_a_fit(gained: list[Session]) -> None:
+    start = MODEL.with_part(effect("gas_compression"), effect("gas_compression").begun())
+    found = fit(Likelihood(gained, SD, MODEL, STANDARD), start)
+    gains = gains_of(gained, found.model)
+    assert [name for name, _ in gains] == ["run_0", "run_1", "run_2"]
+    shares = np.array([share for _, share in gains])
+    assert_allclose(shares - shares.mean(), [0.02, -0.01, -0.01], atol=0.002)
+    (value,) = found.model.part("gas_compression").values
+    assert value == pytest.approx(0.08, abs=0.01)
+
+
+def test_without_gains_the_offset_and_past_are_all_that_is_a_recordings_own(sessions: list[Session]) -> None:
+    for one in sessions:
+        own, added = own_of(one, MODEL, one.reading - MODEL.simulate(one.conditions))
+        assert own.size == 2
+        assert added.shape == one.reading.shape
+
+
+def test_a_unit_that_stays_in_place_has_one_gain() -> None:
+    assert may_differ(_sessions(_run(0, 0.0), _run(1, 0.0)))
+    assert not may_differ(_sessions(_run(0, 0.0)))
+    assert not may_differ(_sessions(_run(0, 0.0), _run(1, 0.0, continues="run_0")))
+
+
+@pytest.mark.parametrize(
+    ("gains", "found", "is_told"),
+    [
+        ((0.008, -0.004, -0.004), MODEL, False),  # beside a curve that is not fitted they are not what is left
+        ((0.008, -0.004, -0.004), CURVED, True),
+        ((0.1, -0.05, -0.05), MODEL, True),
+        ((0.0, 0.0, 0.0), CURVED, False),
+        ((0.004, -0.002, -0.002), CURVED, False),  # no more than small imperfections add up to
+    ],
+)
+def test_gains_are_told_where_they_account_for_most_of_what_is_left(
+    gains: tuple[float, ...], found: ExtendedModel, is_told: bool
+) -> None:
+    sessions = _sessions(*(_run(k, gain) for k, gain in enumerate(gains)))
+    fitted = fit(Likelihood(sessions, SD, found, STANDARD), found)
+    state = state_at(fitted, sessions, STANDARD)
+    assert are_told(state, sessions, with_own_gains(sessions, STANDARD)) is is_told
+
+
+def test_gains_take_the_place_of_drifts_that_make_no_more_of_the_data() -> None:
+    """Of two recordings, a gain that goes with the time beside one that goes with the cycles is told no longer."""
+    sessions = _sessions(_run(0, 0.015), _run(1, -0.015))
+    model = CURVED.with_part("gain_drift").with_part("cycle_conditioning")
+    fitted = fit(Likelihood(sessions, SD, model, STANDARD), model)
+    state = state_at(fitted, sessions, STANDARD)
+    assert are_told(state, sessions, with_own_gains(sessions, STANDARD))

@@ -1,0 +1,67 @@
+"""Units that are taken out and put back: each recording has a gain of its own, hidden beside an effect or alone."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+from bank import PLAIN, within_reach
+
+from smartshoe.diagnosis import Diagnosis, diagnose
+from smartshoe.recording import Recording
+
+GAINS = (0.015, -0.010, 0.004, 0.007, -0.005)
+ONE_FILE = pytest.mark.parametrize("recordings", [2, 3])
+
+
+def _put_back(recording: Recording, by: float) -> Recording:
+    """The reading about its rest times one plus ``by``."""
+    reading = recording.sensors[0]
+    zero = float(reading.values[:50].mean())
+    return recording.with_channel(replace(reading, values=zero + (1.0 + by) * (reading.values - zero)))
+
+
+def _diagnosed(effects: dict[str, float], seed: int, recordings: int, moved: bool = True) -> Diagnosis:
+    case = within_reach(effects, PLAIN[seed % len(PLAIN)], seed, recordings=recordings)
+    gains = GAINS if moved else (0.0,) * len(GAINS)
+    fitted = [_put_back(one, by) for one, by in zip(case.recordings, gains, strict=False)]
+    return diagnose(fitted, [_put_back(one, by) for one, by in zip(case.hold_out, gains[3:], strict=False)])
+
+
+def _told(found: Diagnosis) -> list[str]:
+    return [said for said in found.limits if "a gain of its own" in said]
+
+
+@ONE_FILE
+@pytest.mark.parametrize("seed", [10, 11, 12, 13])
+def test_gains_are_told_and_nothing_is_named_for_them(seed: int, recordings: int) -> None:
+    found = _diagnosed({}, seed, recordings)
+    (said,) = _told(found)
+    low, high = (float(one) for one in re.findall(r"([+-][0-9.]+) % in", said))
+    # Two recordings' gains lie 1.25 % on either side of their mean, three's from -1.3 to 1.2 %; small imperfections
+    # of the unit move that.
+    assert low == pytest.approx(-1.27, abs=0.35)
+    assert high == pytest.approx(1.22, abs=0.35)
+    assert not [cause.name for cause in found.causes if cause.confidence > 0.5 and cause.size > 1.5e-3]
+
+
+@ONE_FILE
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [
+        ("wall_hardening", "static_curve"), ("play_hysteresis", "hysteresis"), ("second_relaxation", "relaxation"),
+        ("mullins_softening", "softening"), ("gain_drift", "gain_drift"), ("linear_leak", "leak"),
+    ],
+)  # fmt: skip
+def test_an_effect_is_named_beside_gains(name: str, family: str, recordings: int) -> None:
+    """Without the gains, two recordings that differ let no effect stand: it is not the same in both."""
+    found = _diagnosed({name: 1.0}, 14, recordings)
+    assert _told(found)
+    assert family in {cause.effect.family for cause in found.causes if cause.confidence > 0.5}
+
+
+@pytest.mark.parametrize("effects", [{}, {"wall_hardening": 1.0}, {"gain_drift": 1.0}, {"cycle_conditioning": 1.0}])
+@pytest.mark.parametrize("seed", [20, 21, 22])
+def test_a_unit_that_stays_in_place_is_told_no_gains(effects: dict[str, float], seed: int) -> None:
+    assert not _told(_diagnosed(effects, seed, 2, moved=False))
