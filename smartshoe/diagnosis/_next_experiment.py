@@ -45,14 +45,20 @@ def next_experiment(
     """For the most doubtful cause: the shortest protocol that tells it clearly better than this data, or a channel.
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
-    Where no cause is in doubt and something is left (``open_``), or none can be told, what this data never showed;
-    else None.
+    Where no cause is in doubt, but recordings have gains of their own, one of them again. Where none is, and something
+    is left (``open_``), or none can be told, what this data never showed; else None.
     """
     if worse:
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
     doubtful = [(cause, cause.part) for cause in causes if cause.equivalents and cause.part is not None]
+    if not doubtful and found.own_gains:
+        says = (
+            "record one of these again twice, once without moving the unit and once after taking it out and putting it"
+            " back: whether the gain is the mounting's, and how far that moves it"
+        )
+        return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
     if not doubtful:
         is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)
         return _unseen(found, causes, excitation) if is_open else None

@@ -226,6 +226,7 @@ def _next(
     margins: dict[str, float],
     open_: bool = False,
     can_validate: bool = True,
+    own_gains: tuple[tuple[str, float], ...] = (),
 ) -> Any:
     def margin(truth: Any, rival: Any, protocol: Any, noise_sd: float, like: Any) -> float:
         assert (truth.model.names, rival, noise_sd, like) == (("linear_leak", "dead_band"), "other", 0.01, "session")
@@ -240,8 +241,9 @@ def _next(
     monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: "unseen")
     model = MODEL.with_part("linear_leak").with_part("dead_band")
     found: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=model), likelihood=SimpleNamespace(noise_sd=0.01), can_validate=can_validate
-    )
+        fit=SimpleNamespace(model=model), likelihood=SimpleNamespace(noise_sd=0.01), can_validate=can_validate,
+        own_gains=own_gains,
+    )  # fmt: skip
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
     return next_experiment(found, causes, ["session"], excitation, open_=open_)  # type: ignore[list-item]
 
@@ -305,6 +307,17 @@ def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytes
     assert _next(monkeypatch, [], {}, can_validate=False) == "unseen"  # nothing can be told of a single load cycle
     assert _next(monkeypatch, [sure, elsewhere], {}) == "unseen"  # a zero that is no part of the model
     assert _next(monkeypatch, [], {}) is None
+
+
+def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and_moved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sure, gains = _cause("linear_leak", 0.02, ()), (("first", 0.01), ("second", -0.01))
+    again = _next(monkeypatch, [sure], {}, own_gains=gains)
+    assert (again.separates, again.protocol, again.channel) == (("linear_leak",), "repeat", None)
+    assert "once without moving the unit and once after taking it out" in again.says
+    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), rivals=(("orifice_leak", 1.0),))]
+    assert _next(monkeypatch, doubtful, {"steps": 1e3}, own_gains=gains).protocol == "steps"
 
 
 def test_a_law_that_a_block_stands_for_is_parted_from_its_rival_in_the_blocks_place(
