@@ -21,7 +21,7 @@ from smartshoe.diagnosis._arms import (
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, without
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
@@ -175,11 +175,11 @@ class _Judged:
         return members_of(self.evidence, self.best, self.refused, self.likelihood, self.fit)
 
 
-def _judged(state: State, plain: Fit, sessions: Sequence[Session], left_out: LeftOut | None = None) -> _Judged:
-    """What of a state's effects predicts what is left out, fitted at last; ``left_out`` where it is known."""
+def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
+    """What of a state's effects predicts what is left out, fitted at last."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     likelihood, most = state.likelihood(sessions), error_of(sessions, plain.model)
-    left_out = left_out or LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
+    left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
     whole = fit(likelihood, with_members(given, best, extended.model, likelihood))
     extended = left_out.following(whole)
     refused = [name for name in whole.model.names if name not in extended.model.names]
@@ -192,7 +192,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session], left_out: Lef
         extended = fit(likelihood, model)
     undone = cancelling(sessions, extended.model, state.thresholds)
     if undone:
-        less = {name: without(extended, name) for name in undone}
+        less = {name: fit(likelihood, extended.model.without(name)) for name in undone}
         idle = min(undone, key=lambda name: less[name].cost)
         if error_of(sessions, less[idle].model) ** 2 > state.thresholds.clear * error_of(sessions, extended.model) ** 2:
             undone = []  # each is needed, though they pull in opposite ways
@@ -206,7 +206,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session], left_out: Lef
     extra = [name for name in extended.model.names if name not in plain.model.names]
     following = len(extra)
     while extra and (error_of(sessions, extended.model) >= most or not left_out.stands(extended.model, plain.model)):
-        less = {name: without(extended, name) for name in extra}
+        less = {name: fit(likelihood, extended.model.without(name), FEW_STEPS) for name in extra}
         worst = min(extra, key=lambda name: float(left_out.errors(less[name].model).sum()))
         refused.append(worst)
         extra.remove(worst)
@@ -249,7 +249,7 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
         if best.score >= nothing.score:
             continue
         one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
-        judged = _judged(State(begun.given, begun.evidence, best, one), plain, sessions, left_out)
+        judged = _judged(State(begun.given, begun.evidence, best, one), plain, sessions)
         removed = before**2 - error_of(sessions, judged.fit.model) ** 2
         if not judged.is_stepped_down and removed > thresholds.tolerable**2:
             standing.append((begun.given.candidates[k].effect, judged))

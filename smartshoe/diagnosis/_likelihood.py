@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged, where
@@ -42,7 +41,6 @@ class Likelihood:
         self._rows: list[Array] = []  # what is left and its slopes, a session, where they were last asked for
         self._scales = np.zeros(0)
         self._precision = [nuisance_precision(session, like, thresholds) for session in self.sessions]
-        self.less: dict[tuple[ExtendedModel, str], Fit] = {}  # of `without`
         self._pole_per_s = math.nan
         self._past: list[Array] = []
         self._inverse: list[Array] = []
@@ -205,14 +203,6 @@ def fit(
     return Fit(model, cost, likelihood)
 
 
-def without(found: Fit, name: str) -> Fit:
-    """``found``, fitted again without an effect as far as it takes to tell what that gains; kept."""
-    known, key = found.likelihood.less, (found.model, name)
-    if key not in known:
-        known[key] = fit(found.likelihood, within_bounds(found.model).without(name), beside=found.cost)
-    return known[key]
-
-
 def _about(model: ExtendedModel, logarithmic: Mask) -> Array:
     """(p,) what the steps' prior is about: where a shape begins, where a flexible block's weight is null."""
     about = _stepped(model.theta, logarithmic).copy()
@@ -258,19 +248,13 @@ def _bounded_step(
         part = normal[np.ix_(index, index)] + damping * np.diag(diagonal[index])
         root = np.sqrt(np.diag(part))
         step[:] = 0.0
-        step[index] = _solved(part / np.outer(root, root), right[index] / root) / root
+        step[index] = np.linalg.lstsq(part / np.outer(root, root), right[index] / root, rcond=1e-12)[0] / root
         step = np.where(logarithmic, np.clip(step, -1.0, 1.0), step)
         outward = ((theta <= low) & (step < 0)) | ((theta >= high) & (step > 0))
         if not (outward & free).any():
             break
         free &= ~outward
     return step
-
-
-def _solved(matrix: Array, right: Array) -> Array:
-    """(p,) by Cholesky's factors; by singular values where rounding has left a damped matrix indefinite."""
-    _, found, failed = dposv(matrix, right)
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-12)[0] if failed else found)
 
 
 def _inverse(normal: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, without
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
 from smartshoe.integrity.thresholds import Thresholds
@@ -69,7 +69,7 @@ def members_of(
     evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
 ) -> tuple[Member, ...]:
     chosen, thresholds = [evidence.given.candidates[member] for member in best.members], evidence.thresholds
-    less = [_less(one.name, extended) for one in chosen]
+    less = [fit(likelihood, _without(one.name, extended.model), FEW_STEPS) for one in chosen]
     whole = _left(likelihood, extended)
     added = np.array([_left(likelihood, one) - whole for one in less]).reshape(len(less), whole.size)
     inner = added @ added.T
@@ -107,13 +107,12 @@ def _is_any_curve(effect: Effect, is_ended: bool) -> bool:
     return effect.is_memoryless and (effect.is_flexible or is_ended)
 
 
-def _less(name: str, found: Fit) -> Fit:
-    """``found`` without an effect; without any curve where it is one that lies where its kind ends: it bends others."""
-    part = found.model.part(name)
+def _without(name: str, model: ExtendedModel) -> ExtendedModel:
+    """``model`` without an effect; without any curve where it is one that lies where its kind ends: it bends others."""
+    part = model.part(name)
     if not (part.effect.is_memoryless and part.kind_ends_at):
-        return without(found, name)
-    rest = tuple(one for one in found.model.parts if not one.effect.is_memoryless)
-    return fit(found.likelihood, replace(found.model, parts=rest), FEW_STEPS)
+        return model.without(name)
+    return replace(model, parts=tuple(one for one in model.parts if not one.effect.is_memoryless))
 
 
 def _other_laws(
@@ -128,7 +127,7 @@ def _other_laws(
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         start = begun_with(law, less.model, likelihood)
-        fitted = fit(likelihood, start, FEW_STEPS, beside=extended.cost)
+        fitted = fit(likelihood, start, FEW_STEPS)
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))

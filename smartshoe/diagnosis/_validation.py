@@ -10,7 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, within_bounds, without
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, within_bounds
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
@@ -56,7 +56,7 @@ class LeftOut:
             rows, gains, less = self._rows_of(start), {}, {}
             for name in failing:
                 own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in self._rest]
-                less[name] = without(found, name)
+                less[name] = fit(found.likelihood, start.without(name), beside=found.cost)
                 gains[name] = self._squares([less[name].model] * len(own)) - self._squares(own)
             failing = [name for name in failing if _in_standard_errors(gains[name]) < self.thresholds.validated]
             if failing:

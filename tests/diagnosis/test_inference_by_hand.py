@@ -201,7 +201,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     monkeypatch.setattr(
         _inference,
         "_judged",
-        lambda one, plain, sessions, left_out: SimpleNamespace(fit=one, is_stepped_down=one.model in stepped),
+        lambda one, plain, sessions: SimpleNamespace(fit=one, is_stepped_down=one.model in stepped),
     )
 
     class Left:
@@ -299,15 +299,6 @@ class _Judge:
             "fit",
             lambda likelihood, model, *steps: SimpleNamespace(
                 model=model, how=steps, cost=self.costs.get(model.names, 0.0)
-            ),
-        )
-        monkeypatch.setattr(
-            _inference,
-            "without",
-            lambda found, name: SimpleNamespace(
-                model=found.model.without(name),
-                how="without",
-                cost=self.costs.get(found.model.without(name).names, 0.0),
             ),
         )
         monkeypatch.setattr(_inference, "cancelling", lambda *given: self.undone.pop() if self.undone else [])

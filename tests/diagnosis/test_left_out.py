@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from smartshoe.diagnosis import Thresholds, _likelihood, _validation
+from smartshoe.diagnosis import Thresholds, _validation
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, without
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._session import Session, full_scale, prepare
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, cancelling, error_of
 from smartshoe.models.effects import Conditions, effect
@@ -176,21 +176,9 @@ def test_of_two_that_fail_that_one_goes_first_that_gains_least(monkeypatch: pyte
             fitted.append(start.names)
         return fit(likelihood, start, steps, *known, **beside)
 
-    monkeypatch.setattr(_likelihood, "fit", kept)
+    monkeypatch.setattr(_validation, "fit", kept)
     assert impossible.following(fit(Likelihood(sessions, SD, MODEL, STANDARD), model)).model.names == ()
     assert fitted == [("delay",), ("gas_compression",), ()]  # without each of them, then without the curve beside none
-
-
-def test_a_fit_without_an_effect_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    sessions = _sessions([_curved(0.1)] * 2)
-    found = fit(Likelihood(sessions, SD, MODEL, STANDARD), _fitted(sessions, "gas_compression", "delay"))
-    less = without(found, "delay")
-    assert less.model.names == ("gas_compression",)
-    # What it gains is known to a hundredth: a fit to its end falls by no more.
-    rest = fit(Likelihood(sessions, SD, MODEL, STANDARD), less.model)
-    assert less.cost - rest.cost <= 0.02 * max(less.cost - found.cost, 1.0)
-    monkeypatch.setattr(_likelihood, "fit", lambda *given, **more: pytest.fail("fitted again"))
-    assert without(found, "delay") is less
 
 
 @pytest.mark.parametrize("reverse", [1.0, -1.0])

@@ -288,11 +288,6 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
         _inference, "fit", lambda _, one, *steps: SimpleNamespace(model=one, cost=costs.get(one.names, 9.0))
     )
     monkeypatch.setattr(
-        _inference,
-        "without",
-        lambda found, name: _inference.fit(None, found.model.without(name)),  # type: ignore[arg-type]
-    )
-    monkeypatch.setattr(
         _inference, "cancelling", lambda sessions, one, thresholds: list(one.names) if len(one.names) > 1 else []
     )
     monkeypatch.setattr(_inference, "extrapolating", lambda *given: None)
