@@ -15,7 +15,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State
-from smartshoe.diagnosis._validation import fitted_rms
+from smartshoe.diagnosis._validation import LeftOut, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -36,7 +36,8 @@ def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session
 
     Against them are the odds against an effect, and they must move the reading by more than small imperfections of a
     good unit together. With them, either fewer effects leave no more, or they account for the larger part of what is
-    left: else they take up what equations miss where recordings are of other loads or rates.
+    left; and what is left out in turn is foreseen with half the squared error: else they take up what equations miss
+    where recordings are of other loads or rates.
     """
     evidence, members, thresholds = state.evidence, state.start, state.thresholds
     beside = Evidence(replace(evidence.given, sessions=_fitted(gained)), evidence.noise_sd)
@@ -53,7 +54,13 @@ def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session
         return False
     before, after = _left_by(state.fit.model, sessions, thresholds), _left_by(model, gained, thresholds)
     is_simpler = len(kept) < len(members) and after <= before
-    return is_simpler or thresholds.clear * after**2 <= before**2
+    if not is_simpler and thresholds.clear * after**2 > before**2:
+        return False
+    before, after = (
+        float(LeftOut(some, evidence.noise_sd, one, thresholds).errors(one).sum())
+        for some, one in ((sessions, state.fit.model), (gained, model))
+    )
+    return thresholds.clear * after <= before
 
 
 def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[tuple[str, float], ...]:
