@@ -253,6 +253,29 @@ class Evidence:
         free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
         return self.posterior(members).score - float(sum(free))
 
+    def falls_beside(self, members: Members, columns: Sequence[Array]) -> Array:
+        """By how much a set's score falls (k,) with each of further ``columns`` (n, k) a session, of unit prior."""
+        given = self.given
+        seen = [where(one.fitted, part) for one, part in zip(given.sessions, columns, strict=True)]
+        added = _Columns(seen, [part.T @ own for part, own in zip(seen, given.past, strict=True)])
+        cross = self._between(self._all, added)
+        half = self._taken_out(cross)
+        free = cross - self._half.T @ half
+        best = self.posterior(members)
+        index, sds = self._widened(best.members, best.strengths)
+        departures = [self._departures[member] for member in best.members]
+        strengths = index[: index.size - self._directions * len(departures)]
+        also = [self._between(one.columns, added) - one.half.T @ half for one in departures]
+        beside = sds[:, None] * np.vstack([free[strengths], *also])
+        factor, pull, _ = self._moved(index, sds)
+        taken = solve_triangular(factor, beside, lower=True, check_finite=False) if index.size else beside
+        power = np.sum([np.einsum("nk,nk->k", part, part) for part in seen], axis=0)
+        for past, inverse in zip(added.past, self._inverse, strict=True):
+            power -= np.einsum("kl,lm,km->k", past, inverse, past)
+        left = np.maximum(power / self.noise_sd**2 - np.sum(half**2, axis=0) - np.sum(taken**2, axis=0), 0.0)
+        asked = free[0] - beside.T @ pull
+        return np.asarray(asked**2 / (1.0 + left) - np.log1p(left))
+
     @cached_property
     def of_whole_effects(self) -> Evidence:
         """The same where equations depart in all that their effects add."""

@@ -26,7 +26,7 @@ LEAST = float(np.finfo(float).tiny)  # squared error, so that none has a logarit
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
     """Offset and initial state (2,) of a recording under ``model``, and what they add to its reading (n,).
 
-    The initial state is bounded by what an arm can hold: its share of the whole load. (3,) where its gain is its own.
+    The initial state is bounded by what an arm can hold: its share of the whole load. After them its own gains, if any.
     """
     mask = session.fitted if session.fitted.any() else session.usable
     read = session.reading - residual if session.own_gain_sd else None
@@ -34,8 +34,8 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     seen = columns[mask]
     held = max(abs(model.relaxing_share * model.gain), 1e-6)
     variance = float(np.var(residual[mask])) if mask.any() else 0.0
-    known = [1e-9, variance / held**2 + 1e-9, variance][: columns.shape[1]]
-    inner = seen.T @ seen + np.diag(known)
+    gains = [variance] * (columns.shape[1] - 2)
+    inner = seen.T @ seen + np.diag([1e-9, variance / held**2 + 1e-9, *gains])
     found = np.asarray(np.linalg.solve(inner, seen.T @ residual[mask]), dtype=np.float64)
     return found, columns @ found
 

@@ -25,7 +25,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._own_gains import are_told, gains_of, may_differ, with_own_gains
+from smartshoe.diagnosis._own_gains import OwnGain, gains_of, with_likelier_gains
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, load_cycles
 from smartshoe.diagnosis._settling import Progress, better_from, law_or_block, listed, score_of, settled, simpler
@@ -43,8 +43,7 @@ class Inference:
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
     ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
     one is idle, and others undo one another without it. ``alone``: the effect that does most by itself, where no
-    member is sure. ``own_gains``: where recordings differ by it, each one's name and the share by which its gain lies
-    beside that of all.
+    member is sure. ``own_gains``: those of the recordings, where they differ by them.
     """
 
     baseline: Fit
@@ -57,7 +56,7 @@ class Inference:
     can_validate: bool = True
     undone: tuple[str, ...] = ()
     alone: Effect | None = None
-    own_gains: tuple[tuple[str, float], ...] = ()
+    own_gains: tuple[OwnGain, ...] = ()
 
 
 def infer(
@@ -84,12 +83,10 @@ def infer(
     with_blocks, lawful = state, with_laws(state, plain.model, sessions)
     if lawful is not state:
         state = law_or_block(settled(lawful, sessions, progress), state, sessions)
-    if not any(one.own_gain_sd for one in sessions) and may_differ(sessions):
-        gained = with_own_gains(sessions, thresholds)
-        if are_told(state, sessions, gained):
-            progress("giving each recording a gain of its own")
-            beside = infer(start, gained, thresholds, progress)
-            return replace(beside, own_gains=gains_of(gained, beside.fit.model))
+    if (gained := with_likelier_gains(state, sessions)) is not None:
+        progress("giving each recording a gain of its own")
+        beside = infer(start, gained, thresholds, progress)
+        return replace(beside, own_gains=beside.own_gains or gains_of(gained, beside.fit.model))
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}

@@ -11,6 +11,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
+from smartshoe.diagnosis._own_gains import changes_of
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
@@ -58,6 +59,12 @@ def next_experiment(
             "record one of these again twice, once without moving the unit and once after taking it out and putting it"
             " back: whether the gain is the mounting's, and how far that moves it"
         )
+        if changes := changes_of(found.own_gains):
+            first = changes[0]
+            says = (
+                f"record {first.recording} again, and watch unit, cable and logger at {first.begins_s:.4g} s: whether"
+                " the gain changes there each time"
+            )
         return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
     if not doubtful:
         is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)

@@ -1,13 +1,18 @@
 """Whether each recording has a gain of its own, as where a unit is taken out and put back between recordings.
 
-What goes with the time or the cycles of a recording would be taken for it: two drifts together make of two recordings
-what either has throughout. So a gain a recording is weighed against what was found, as one more hypothesis.
+Or other ones in its course, as where it slips. What goes with the time or the cycles of a recording would be taken for
+it: two drifts together make of two recordings what either has throughout, and one drift makes half of what changes at a
+moment. So such gains are weighed against what was found, as one more hypothesis.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
 
 from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
@@ -19,16 +24,65 @@ from smartshoe.diagnosis._validation import LeftOut, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
+# Resolutions: how many moments of a recording a gain may change at, and how often.
+MOMENTS = 60
+MOST_CHANGES = 2
 
-def may_differ(sessions: Sequence[Session]) -> bool:
-    """Whether a unit may have been moved between what is fitted: nothing carries on from another recording."""
+
+@dataclass(frozen=True)
+class OwnGain:
+    """A gain of a ``recording`` from ``begins_s`` on; ``share`` by which it lies beside that of all."""
+
+    recording: str
+    begins_s: float
+    share: float
+
+
+def with_likelier_gains(state: State, sessions: Sequence[Session]) -> list[Session] | None:
+    """The same sessions with gains of their own where these are told, else with gains that change; else None.
+
+    Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise.
+    """
+    if any(one.gain_changes for one in sessions) or not may_differ(state, sessions):
+        return None
+    gained = [replace(one, own_gain_sd=state.thresholds.strength_sd) for one in sessions]
+    if not sessions[0].own_gain_sd and are_told(state, sessions, gained):
+        return gained
+    gained = with_changes(state, gained)
+    return gained if any(one.gain_changes for one in gained) and are_told(state, sessions, gained) else None
+
+
+def may_differ(state: State, sessions: Sequence[Session]) -> bool:
+    """Whether gains may be what is wrong: of several recordings of which none carries on from another.
+
+    More is left than small imperfections of a good unit add up to, or something was found that goes with cycles.
+    """
     fitted = _fitted(sessions)
-    return len(fitted) > 1 and not any("continues" in one.recording.metadata for one in fitted)
+    if len(fitted) < 2 or any("continues" in one.recording.metadata for one in fitted):
+        return False
+    goes_with_cycles = any(part.effect.needs_cycles for part in state.fit.model.parts)
+    return goes_with_cycles or _left_by(state.fit.model, fitted, state.thresholds) > state.thresholds.tolerable
 
 
-def with_own_gains(sessions: Sequence[Session], thresholds: Thresholds) -> list[Session]:
-    """The same sessions, each with a gain of its own."""
-    return [replace(one, own_gain_sd=thresholds.strength_sd) for one in sessions]
+def with_changes(state: State, gained: Sequence[Session]) -> list[Session]:
+    """``gained``, each with another gain from each moment on where that is likelier, one after the other."""
+    evidence, gained = state.evidence, list(gained)
+    for _ in range(MOST_CHANGES * len(_fitted(gained))):
+        fitted = _fitted(gained)
+        beside = Evidence(replace(evidence.given, sessions=fitted), evidence.noise_sd)
+        moments = [[(j + 1) * one.reading.size // (MOMENTS + 1) for j in range(MOMENTS)] for one in fitted]
+        columns = [np.zeros((one.reading.size, MOMENTS * len(fitted)), order="F") for one in fitted]
+        for k, (one, own) in enumerate(zip(fitted, columns, strict=True)):
+            read = one.own_gain_sd * evidence.given.model.simulate(one.conditions)
+            for j, at in enumerate(moments[k]):
+                own[at:, MOMENTS * k + j] = read[at:]
+        falls = beside.falls_beside(_needed(beside, state.start), columns)
+        k, j = divmod(int(np.argmax(falls)), MOMENTS)
+        if falls.max() < _odds_of_a_change(beside):
+            break
+        changes = tuple(sorted({*fitted[k].gain_changes, moments[k][j]}))
+        gained = [replace(one, gain_changes=changes) if one is fitted[k] else one for one in gained]
+    return gained
 
 
 def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session]) -> bool:
@@ -42,7 +96,9 @@ def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session
     evidence, members, thresholds = state.evidence, state.start, state.thresholds
     beside = Evidence(replace(evidence.given, sessions=_fitted(gained)), evidence.noise_sd)
     kept = _needed(beside, members)
-    if beside.score_beside(kept) + beside.odds >= evidence.score_beside(members):
+    changes = sum(len(one.gain_changes) for one in _fitted(gained))
+    odds = changes * _odds_of_a_change(beside) + (0.0 if sessions[0].own_gain_sd else beside.odds)
+    if beside.score_beside(kept) + odds >= evidence.score_beside(members):
         return False
     model = state.fit.model
     for name in {*model.names} - {beside.given.candidates[m].name for m in kept}:
@@ -63,10 +119,27 @@ def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session
     return thresholds.clear * after <= before
 
 
-def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[tuple[str, float], ...]:
-    """Each fitted recording's name, and the share by which its own gain lies beside the gain of all."""
-    each = [(one, own_of(one, model, one.reading - model.simulate(one.conditions))[0]) for one in _fitted(sessions)]
-    return tuple((one.recording.name, one.own_gain_sd * float(own[2])) for one, own in each)
+def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain, ...]:
+    """The gains of the fitted recordings, in order."""
+    found = []
+    for one in _fitted(sessions):
+        own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
+        for at, gain in zip((0, *one.gain_changes), own[2:], strict=True):
+            begins_s = float(one.recording.time_s[0] + one.conditions.time_s[at])
+            found.append(OwnGain(one.recording.name, begins_s, one.own_gain_sd * float(gain)))
+    return tuple(found)
+
+
+def changes_of(gains: Sequence[OwnGain]) -> tuple[OwnGain, ...]:
+    """Where gains change within a recording: when, and by what share, the largest first."""
+    pairs = [(one, other) for one, other in pairwise(gains) if one.recording == other.recording]
+    changes = [replace(other, share=other.share - one.share) for one, other in pairs]
+    return tuple(sorted(changes, key=lambda one: -abs(one.share)))
+
+
+def _odds_of_a_change(evidence: Evidence) -> float:
+    """-2 log prior odds against a change: of one effect among all, at one of the moments of the recordings."""
+    return evidence.odds + 2.0 * math.log(MOMENTS * len(evidence.given.sessions))
 
 
 def _needed(evidence: Evidence, members: Members) -> Members:

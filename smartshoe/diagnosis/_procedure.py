@@ -306,7 +306,7 @@ def _diagnosed(
             *(said for _, said in unclear),
             *past,
             *(crept_of(*one) for one in crept),
-            *own_gains_of(found),
+            *own_gains_of(found.own_gains),
             *refusals_of(found),
         ),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,

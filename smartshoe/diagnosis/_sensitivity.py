@@ -87,10 +87,11 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
 def nuisances(session: Session, pole_per_s: float, read: Array | None = None) -> Array:
     """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording.
 
-    (n, 3) of a recording with a gain of its own: by how much that moves what a model has ``read`` (n,).
+    Of a recording with a gain of its own, after them: by how much that moves what a model has ``read`` (n,), one column
+    for each part of it that has one.
     """
     time_s = session.conditions.time_s
-    own = [] if read is None else [session.own_gain_sd * read]
+    own = [] if read is None else [session.own_gain_sd * read * part for part in session.gain_parts]
     return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0])), *own])
 
 
@@ -98,12 +99,12 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     """(2, 2) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
 
     A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
-    rest still carries some of what went before. (3, 3) where the recording's gain is its own.
+    rest still carries some of what went before. One more row for each gain of its own.
     """
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
     sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    return np.diag([0.0, 1.0 / sd**2, *([1.0] if session.own_gain_sd else [])])
+    return np.diag([0.0, 1.0 / sd**2, *([1.0] * len(session.gain_parts) if session.own_gain_sd else [])])
 
 
 @dataclass(frozen=True, eq=False)

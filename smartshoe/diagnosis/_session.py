@@ -67,7 +67,8 @@ class Session:
     left out of every fit; ``cycle`` (n,) the number of the load cycle, or of a part of the time where there are few.
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
     ``quiet`` is the load at the full rate. ``own_gain_sd``: standard deviation, as a share, by which the gain of one
-    recording lies beside that of all; 0 where they share one.
+    recording lies beside that of all; 0 where they share one. ``gain_changes``: the samples from which on it is
+    another, in order.
     """
 
     recording: Recording
@@ -81,6 +82,13 @@ class Session:
     thinned: int
     quiet: Quiet
     own_gain_sd: float = 0.0
+    gain_changes: tuple[int, ...] = ()
+
+    @property
+    def gain_parts(self) -> tuple[Mask, ...]:
+        """(n,) each: the samples of one gain."""
+        at = np.arange(self.reading.size)
+        return tuple((at >= a) & (at < b) for a, b in pairwise((0, *self.gain_changes, at.size)))
 
     @property
     def fitted(self) -> Mask:

@@ -13,6 +13,7 @@ from smartshoe.diagnosis._arms import arms_of, is_stretched
 from smartshoe.diagnosis._held_out import Errors, Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
+from smartshoe.diagnosis._own_gains import OwnGain, changes_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale, Session
@@ -22,6 +23,8 @@ from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
+
+SAID = 4  # changes of a gain that are said one by one
 
 
 def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds: Thresholds) -> str | None:
@@ -211,15 +214,20 @@ def crept_of(drift: Name, tare: Zero) -> str:
     )
 
 
-def own_gains_of(found: Inference) -> list[str]:
-    """What is said of recordings of which each has a gain of its own."""
-    if not found.own_gains:
+def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
+    """What is said of recordings of which each has a gain of its own, or several."""
+    if not gains:
         return []
-    low, high = (of(found.own_gains, key=lambda one: one[1]) for of in (min, max))
+    told = "what is named is told beside these gains, and no model foresees that of another recording"
+    if changes := changes_of(gains):
+        few = [f"by {100 * one.share:+.2g} % at {one.begins_s:.4g} s in {one.recording}" for one in changes[:SAID]]
+        more = f" and {len(changes) - SAID} times more" if len(changes) > SAID else ""
+        return [f"the gain changes {', '.join(few)}{more}, as where a unit slips or is set anew: {told}"]
+    low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
     return [
-        f"each recording has a gain of its own, from {100 * low[1]:+.2g} % in {low[0]} to {100 * high[1]:+.2g} % in"
-        f" {high[0]} beside that of all, as where a unit is taken out and put back: what is named is told beside these"
-        " gains, and no model foresees that of another recording (leave the unit in place, or calibrate it each time)"
+        f"each recording has a gain of its own, from {100 * low.share:+.2g} % in {low.recording} to"
+        f" {100 * high.share:+.2g} % in {high.recording} beside that of all, as where a unit is taken out and put back:"
+        f" {told} (leave the unit in place, or calibrate it each time)"
     ]
 
 

@@ -17,6 +17,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
 from smartshoe.diagnosis._next_experiment import _in_place_of, expected_margin, next_experiment
+from smartshoe.diagnosis._own_gains import OwnGain
 from smartshoe.diagnosis.design import Design, _commanded, _compared, _not_followed, design
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -226,7 +227,7 @@ def _next(
     margins: dict[str, float],
     open_: bool = False,
     can_validate: bool = True,
-    own_gains: tuple[tuple[str, float], ...] = (),
+    own_gains: tuple[OwnGain, ...] = (),
 ) -> Any:
     def margin(truth: Any, rival: Any, protocol: Any, noise_sd: float, like: Any) -> float:
         assert (truth.model.names, rival, noise_sd, like) == (("linear_leak", "dead_band"), "other", 0.01, "session")
@@ -312,10 +313,12 @@ def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytes
 def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and_moved(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    sure, gains = _cause("linear_leak", 0.02, ()), (("first", 0.01), ("second", -0.01))
+    sure, gains = _cause("linear_leak", 0.02, ()), (OwnGain("first", 0.0, 0.01), OwnGain("second", 0.0, -0.01))
     again = _next(monkeypatch, [sure], {}, own_gains=gains)
     assert (again.separates, again.protocol, again.channel) == (("linear_leak",), "repeat", None)
     assert "once without moving the unit and once after taking it out" in again.says
+    slipped = _next(monkeypatch, [sure], {}, own_gains=(*gains, OwnGain("second", 83.21, 0.02)))
+    assert slipped.says.startswith("record second again, and watch unit, cable and logger at 83.21 s")
     doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), rivals=(("orifice_leak", 1.0),))]
     assert _next(monkeypatch, doubtful, {"steps": 1e3}, own_gains=gains).protocol == "steps"
 

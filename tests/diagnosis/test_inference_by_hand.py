@@ -102,6 +102,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "with_an_arm_that_creeps", named("creeping"))
     monkeypatch.setattr(_inference, "with_laws", lambda one, model, sessions: told.lawful or one)
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one, sessions: lawful if told.is_law else one)
+    monkeypatch.setattr(_inference, "with_likelier_gains", lambda state, sessions: None)
     monkeypatch.setattr(_inference, "_judged", judged)
     monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
@@ -125,21 +126,21 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
 def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
     flow: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked, told = [], [True]
-    shared, own = [SimpleNamespace(own_gain_sd=0.0)], [SimpleNamespace(own_gain_sd=0.03)]
-    monkeypatch.setattr(_inference, "may_differ", lambda sessions: told[0] is not None)
-    monkeypatch.setattr(_inference, "with_own_gains", lambda sessions, thresholds: own)
+    asked: list[Any] = []
+    gains: Any = {"shared": "own", "own": "changing", "changing": None}
+
+    def likelier(state: Any, sessions: Any) -> Any:
+        asked.append(sessions)
+        return gains[sessions]
+
+    monkeypatch.setattr(_inference, "with_likelier_gains", likelier)
     monkeypatch.setattr(_inference, "gains_of", lambda sessions, model: (sessions, model))
-    monkeypatch.setattr(
-        _inference, "are_told", lambda state, sessions, gained: bool(asked.append((sessions, gained)) or told[0])
-    )
-    found = infer(MODEL, shared, STANDARD, flow.said.append)  # type: ignore[arg-type]
-    assert found.own_gains == (own, "settled first")
-    assert asked == [(shared, own)]  # beside gains they are not asked for again
+    found = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
+    assert found.own_gains == ("changing", "settled first")  # those that were told at last
+    assert asked == ["shared", "own", "changing"]
     assert "giving each recording a gain of its own" in flow.said
-    for told[0] in (False, None):
-        assert infer(MODEL, shared, STANDARD, flow.said.append).own_gains == ()  # type: ignore[arg-type]
-    assert len(asked) == 2
+    gains["shared"] = None
+    assert infer(MODEL, "shared", STANDARD, flow.said.append).own_gains == ()  # type: ignore[arg-type]
 
 
 def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> None:

@@ -14,10 +14,10 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._own_gains import are_told, gains_of, may_differ, with_own_gains
+from smartshoe.diagnosis._own_gains import changes_of, gains_of, may_differ, with_likelier_gains
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Scale, Session, prepare
-from smartshoe.diagnosis._state import state_at
+from smartshoe.diagnosis._state import State, state_at
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -54,7 +54,7 @@ def sessions() -> list[Session]:
 
 @pytest.fixture(scope="module")
 def gained(sessions: list[Session]) -> list[Session]:
-    return with_own_gains(sessions, STANDARD)
+    return [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions]
 
 
 def _wide(sessions: list[Session], model: ExtendedModel) -> tuple[Array, ...]:
@@ -111,8 +111,8 @@ def test_gains_and_the_effect_beside_them_come_out_of_a_fit(gained: list[Session
     start = MODEL.with_part(effect("gas_compression"), effect("gas_compression").begun())
     found = fit(Likelihood(gained, SD, MODEL, STANDARD), start)
     gains = gains_of(gained, found.model)
-    assert [name for name, _ in gains] == ["run_0", "run_1", "run_2"]
-    shares = np.array([share for _, share in gains])
+    assert [one.recording for one in gains] == ["run_0", "run_1", "run_2"]
+    shares = np.array([one.share for one in gains])
     assert_allclose(shares - shares.mean(), [0.02, -0.01, -0.01], atol=0.002)
     (value,) = found.model.part("gas_compression").values
     assert value == pytest.approx(0.2, abs=0.01)
@@ -125,10 +125,19 @@ def test_without_gains_the_offset_and_past_are_all_that_is_a_recordings_own(sess
         assert added.shape == one.reading.shape
 
 
-def test_a_unit_that_stays_in_place_has_one_gain() -> None:
-    assert may_differ(_sessions(_run(0, 0.0), _run(1, 0.0)))
-    assert not may_differ(_sessions(_run(0, 0.0)))
-    assert not may_differ(_sessions(_run(0, 0.0), _run(1, 0.0, continues="run_0")))
+def _state(model: ExtendedModel, sessions: list[Session]) -> State:
+    return state_at(fit(Likelihood(sessions, SD, model, STANDARD), model), sessions, STANDARD)
+
+
+def test_gains_are_asked_for_where_more_is_left_than_imperfections_or_something_goes_with_cycles() -> None:
+    apart, alike = _sessions(_run(0, 0.02), _run(1, -0.02)), _sessions(_run(0, 0.0), _run(1, 0.0))
+    assert may_differ(_state(CURVED, apart), apart)
+    assert not may_differ(_state(CURVED, alike), alike)
+    assert may_differ(_state(CURVED.with_part("cycle_conditioning"), alike), alike)
+    alone = _sessions(_run(0, 0.02))
+    assert not may_differ(_state(MODEL, alone), alone)
+    in_place = _sessions(_run(0, 0.02), _run(1, -0.02, continues="run_0"))
+    assert not may_differ(_state(CURVED, in_place), in_place)
 
 
 @pytest.mark.parametrize(
@@ -145,15 +154,55 @@ def test_gains_are_told_where_they_account_for_most_of_what_is_left(
     gains: tuple[float, ...], found: ExtendedModel, is_told: bool
 ) -> None:
     sessions = _sessions(*(_run(k, gain) for k, gain in enumerate(gains)))
-    fitted = fit(Likelihood(sessions, SD, found, STANDARD), found)
-    state = state_at(fitted, sessions, STANDARD)
-    assert are_told(state, sessions, with_own_gains(sessions, STANDARD)) is is_told
+    state = _state(found, sessions)
+    assert (with_likelier_gains(state, sessions) is not None) is is_told
 
 
 def test_gains_take_the_place_of_drifts_that_make_no_more_of_the_data() -> None:
     """Of two recordings, a gain that goes with the time beside one that goes with the cycles is told no longer."""
     sessions = _sessions(_run(0, 0.015), _run(1, -0.015))
     model = CURVED.with_part("gain_drift").with_part("cycle_conditioning")
-    fitted = fit(Likelihood(sessions, SD, model, STANDARD), model)
-    state = state_at(fitted, sessions, STANDARD)
-    assert are_told(state, sessions, with_own_gains(sessions, STANDARD))
+    state = _state(model, sessions)
+    told = with_likelier_gains(state, sessions)
+    assert told is not None
+    assert all(one.own_gain_sd and not one.gain_changes for one in told)
+
+
+def test_a_gain_that_changes_is_told_with_the_moment() -> None:
+    """Each recording's own gain, and 3 % more from 21 s of one of them on."""
+    runs = [_run(k, gain) for k, gain in enumerate((0.01, -0.01, 0.0))]
+    reading = runs[1].sensors[0]
+    values = reading.values * np.where(runs[1].time_s >= 21.0, 1.03, 1.0)
+    sessions = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
+    apart = with_likelier_gains(_state(CURVED, sessions), sessions)
+    assert apart is not None  # first the gains, then in what is found beside them what changes
+    gained = with_likelier_gains(_state(CURVED, apart), apart)
+    assert gained is not None
+    assert [len(one.gain_changes) for one in gained] == [0, 1, 0]
+    assert with_likelier_gains(_state(CURVED, gained), gained) is None
+    model = fit(Likelihood(gained, SD, CURVED, STANDARD), CURVED).model
+    (change,) = changes_of(gains_of(gained, model))
+    assert change.recording == "run_1"
+    assert change.begins_s == pytest.approx(21.0, abs=1.0)
+    assert change.share == pytest.approx(0.03, abs=0.005)
+
+
+@pytest.mark.parametrize("is_changed", [True, False])
+def test_what_a_column_takes_off_a_score_is_what_the_score_with_it_says(is_changed: bool) -> None:
+    """A step beside a gain, or two gains apart, whose priors differ a little: nearly the same evidence."""
+    run = _run(0, 0.02)
+    grown = run.sensors[0].values * np.where((run.time_s >= run.time_s[-1] / 3.0) & is_changed, 1.02, 1.0)
+    sessions = _sessions(run.with_channel(replace(run.sensors[0], values=grown)), _run(1, -0.01))
+    gained = tuple(replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions)
+    given = replace(linearised(MODEL, sessions, STANDARD), sessions=gained)
+    (curve,) = (k for k, one in enumerate(given.candidates) if one.name == "gas_compression")
+    at = gained[0].reading.size // 3
+    column = STANDARD.strength_sd * MODEL.simulate(gained[0].conditions)
+    column[:at] = 0.0
+    added = [column[:, None], np.zeros((gained[1].reading.size, 1))]
+    changed = replace(given, sessions=(replace(gained[0], gain_changes=(at,)), gained[1]))
+    for members in ((), (curve,)):
+        (fall,) = Evidence(given, SD).falls_beside(members, added)
+        before, after = (Evidence(one, SD).score_beside(members) for one in (given, changed))
+        assert fall == pytest.approx(before - after, abs=2.0 + 0.05 * abs(fall))
+        assert (fall > 20.0) is is_changed

@@ -15,6 +15,7 @@ from smartshoe.diagnosis import _inference, _zero
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
+from smartshoe.diagnosis._own_gains import OwnGain, changes_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
@@ -304,8 +305,20 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
 
 
 def test_gains_of_their_own_are_said_with_the_recordings_that_lie_farthest_apart() -> None:
-    found: Any = SimpleNamespace(own_gains=(("b", 0.0021), ("a", -0.0134), ("c", 0.0113)))
-    (said,) = own_gains_of(found)
+    gains = [OwnGain("b", 0.0, 0.0021), OwnGain("a", 0.0, -0.0134), OwnGain("c", 0.0, 0.0113)]
+    (said,) = own_gains_of(gains)
     assert said.startswith("each recording has a gain of its own, from -1.3 % in a to +1.1 % in c beside that of all,")
-    found.own_gains = ()
-    assert own_gains_of(found) == []
+    assert own_gains_of([]) == []
+
+
+def test_of_gains_that_change_the_largest_changes_are_said() -> None:
+    shares = {"a": (0.01, -0.02), "b": (0.0, 0.005, 0.0), "c": (0.0,), "d": (0.0, 0.001, 0.003)}
+    gains = [OwnGain(name, 7.5 * k, share) for name, parts in shares.items() for k, share in enumerate(parts)]
+    assert [(one.recording, one.begins_s) for one in changes_of(gains)] == [
+        ("a", 7.5), ("b", 7.5), ("b", 15.0), ("d", 15.0), ("d", 7.5),
+    ]  # fmt: skip
+    (said,) = own_gains_of(gains)
+    assert said.startswith(
+        "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
+        " d and 1 times more, as where a unit slips or is set anew:"
+    )

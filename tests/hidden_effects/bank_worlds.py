@@ -78,7 +78,7 @@ def diagnosed(recordings: Sequence[Recording], hold_out: Sequence[Recording]) ->
 
 
 def _own(job: Job) -> dict[str, Any]:
-    from nearest import with_what_cannot_be_told
+    from cannot_be_told import with_what_cannot_be_told
 
     from simulators.hidden.cases import case
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from nearest import PLAIN, leaves
+from cannot_be_told import PLAIN, leaves
 
 from simulators.hidden._baseline import lagged
 from simulators.hidden._machine import Chain, Departed, Given, balanced, recorded
