@@ -169,22 +169,19 @@ def test_gains_take_the_place_of_drifts_that_make_no_more_of_the_data() -> None:
 
 
 def test_a_gain_that_changes_is_told_with_the_moment() -> None:
-    """Each recording's own gain, and 3 % more from 21 s of one of them on."""
-    runs = [_run(k, gain) for k, gain in enumerate((0.01, -0.01, 0.0))]
+    """4 % more from 21 s of one recording on."""
+    runs = [_run(k, 0.0) for k in range(3)]
     reading = runs[1].sensors[0]
-    values = reading.values * np.where(runs[1].time_s >= 21.0, 1.03, 1.0)
-    sessions = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
-    apart = with_likelier_gains(_state(CURVED, sessions), sessions)
-    assert apart is not None  # first the gains, then in what is found beside them what changes
-    gained = with_likelier_gains(_state(CURVED, apart), apart)
-    assert gained is not None
+    values = reading.values * np.where(runs[1].time_s >= 21.0, 1.04, 1.0)
+    gained = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
+    while (likelier := with_likelier_gains(_state(CURVED, gained), gained)) is not None:
+        gained = likelier  # gains of their own first, then in what is found beside them what changes
     assert [len(one.gain_changes) for one in gained] == [0, 1, 0]
-    assert with_likelier_gains(_state(CURVED, gained), gained) is None
     model = fit(Likelihood(gained, SD, CURVED, STANDARD), CURVED).model
     (change,) = changes_of(gains_of(gained, model))
     assert change.recording == "run_1"
     assert change.begins_s == pytest.approx(21.0, abs=1.0)
-    assert change.share == pytest.approx(0.03, abs=0.005)
+    assert change.share == pytest.approx(0.04, abs=0.005)
 
 
 @pytest.mark.parametrize("is_changed", [True, False])
@@ -205,4 +202,4 @@ def test_what_a_column_takes_off_a_score_is_what_the_score_with_it_says(is_chang
         (fall,) = Evidence(given, SD).falls_beside(members, added)
         before, after = (Evidence(one, SD).score_beside(members) for one in (given, changed))
         assert fall == pytest.approx(before - after, abs=2.0 + 0.05 * abs(fall))
-        assert (fall > 20.0) is is_changed
+        assert bool(fall > 20.0) is is_changed
