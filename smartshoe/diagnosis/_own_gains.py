@@ -20,7 +20,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State
-from smartshoe.diagnosis._validation import LeftOut, fitted_rms
+from smartshoe.diagnosis._validation import MOST_ALONE, LeftOut, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -31,11 +31,15 @@ MOST_CHANGES = 2
 
 @dataclass(frozen=True)
 class OwnGain:
-    """A gain of a ``recording`` from ``begins_s`` on; ``share`` by which it lies beside that of all."""
+    """A gain of a ``recording`` from ``begins_s`` on; ``share`` by which it lies beside that of all.
+
+    ``is_change``: the recording had another before.
+    """
 
     recording: str
     begins_s: float
     share: float
+    is_change: bool = False
 
 
 def with_likelier_gains(state: State, sessions: Sequence[Session]) -> list[Session] | None:
@@ -65,9 +69,13 @@ def may_differ(state: State, sessions: Sequence[Session]) -> bool:
 
 
 def with_changes(state: State, gained: Sequence[Session]) -> list[Session]:
-    """``gained``, each with another gain from each moment on where that is likelier, one after the other."""
+    """``gained``, each with another gain from each moment on where that is likelier, one after the other.
+
+    Of many recordings each is short, and gains of their own are all that is asked.
+    """
     evidence, gained = state.evidence, list(gained)
-    for _ in range(MOST_CHANGES * len(_fitted(gained))):
+    count = len(_fitted(gained))
+    for _ in range(MOST_CHANGES * count if count <= MOST_ALONE else 0):
         fitted = _fitted(gained)
         beside = Evidence(replace(evidence.given, sessions=fitted), evidence.noise_sd)
         moments = [[(j + 1) * one.reading.size // (MOMENTS + 1) for j in range(MOMENTS)] for one in fitted]
@@ -126,14 +134,13 @@ def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain
         own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
         for at, gain in zip((0, *one.gain_changes), own[2:], strict=True):
             begins_s = float(one.recording.time_s[0] + one.conditions.time_s[at])
-            found.append(OwnGain(one.recording.name, begins_s, one.own_gain_sd * float(gain)))
+            found.append(OwnGain(one.recording.name, begins_s, one.own_gain_sd * float(gain), at > 0))
     return tuple(found)
 
 
 def changes_of(gains: Sequence[OwnGain]) -> tuple[OwnGain, ...]:
     """Where gains change within a recording: when, and by what share, the largest first."""
-    pairs = [(one, other) for one, other in pairwise(gains) if one.recording == other.recording]
-    changes = [replace(other, share=other.share - one.share) for one, other in pairs]
+    changes = [replace(one, share=one.share - last.share) for last, one in pairwise(gains) if one.is_change]
     return tuple(sorted(changes, key=lambda one: -abs(one.share)))
 
 

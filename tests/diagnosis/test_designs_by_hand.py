@@ -317,7 +317,7 @@ def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and
     again = _next(monkeypatch, [sure], {}, own_gains=gains)
     assert (again.separates, again.protocol, again.channel) == (("linear_leak",), "repeat", None)
     assert "once without moving the unit and once after taking it out" in again.says
-    slipped = _next(monkeypatch, [sure], {}, own_gains=(*gains, OwnGain("second", 83.21, 0.02)))
+    slipped = _next(monkeypatch, [sure], {}, own_gains=(*gains, OwnGain("second", 83.21, 0.02, True)))
     assert slipped.says.startswith("record second again, and watch unit, cable and logger at 83.21 s")
     doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), rivals=(("orifice_leak", 1.0),))]
     assert _next(monkeypatch, doubtful, {"steps": 1e3}, own_gains=gains).protocol == "steps"

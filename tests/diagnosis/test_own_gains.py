@@ -14,7 +14,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._own_gains import changes_of, gains_of, may_differ, with_likelier_gains
+from smartshoe.diagnosis._own_gains import changes_of, gains_of, may_differ, with_changes, with_likelier_gains
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Scale, Session, prepare
 from smartshoe.diagnosis._state import State, state_at
@@ -203,3 +203,12 @@ def test_what_a_column_takes_off_a_score_is_what_the_score_with_it_says(is_chang
         before, after = (Evidence(one, SD).score_beside(members) for one in (given, changed))
         assert fall == pytest.approx(before - after, abs=2.0 + 0.05 * abs(fall))
         assert bool(fall > 20.0) is is_changed
+
+
+def test_of_many_recordings_no_changes_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A column for each moment of each recording would be too many."""
+    sessions = _sessions(*(_run(k, 0.0) for k in range(13)))
+    state = _state(CURVED, sessions)
+    monkeypatch.setattr(Evidence, "falls_beside", lambda *given: pytest.fail("asked for"))
+    gained = [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions]
+    assert with_changes(state, gained) == gained

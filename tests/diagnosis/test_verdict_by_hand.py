@@ -313,7 +313,7 @@ def test_gains_of_their_own_are_said_with_the_recordings_that_lie_farthest_apart
 
 def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     shares = {"a": (0.01, -0.02), "b": (0.0, 0.005, 0.0), "c": (0.0,), "d": (0.0, 0.001, 0.003)}
-    gains = [OwnGain(name, 7.5 * k, share) for name, parts in shares.items() for k, share in enumerate(parts)]
+    gains = [OwnGain(name, 7.5 * k, share, k > 0) for name, parts in shares.items() for k, share in enumerate(parts)]
     assert [(one.recording, one.begins_s) for one in changes_of(gains)] == [
         ("a", 7.5), ("b", 7.5), ("b", 15.0), ("d", 15.0), ("d", 7.5),
     ]  # fmt: skip
