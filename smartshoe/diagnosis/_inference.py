@@ -86,7 +86,10 @@ def infer(
     if (gained := with_likelier_gains(state, sessions)) is not None:
         progress("giving each recording a gain of its own")
         beside = infer(start, gained, thresholds, progress)
-        return replace(beside, own_gains=beside.own_gains or gains_of(gained, beside.fit.model))
+        own_gains = beside.own_gains or gains_of(gained, beside.fit.model)
+        # What stands for another recording is the gain of all, as without gains of their own.
+        extended = beside.fit if len(beside.fit.model.parts) > len(plain.model.parts) else plain
+        return replace(beside, baseline=plain, fit=extended, own_gains=own_gains)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}

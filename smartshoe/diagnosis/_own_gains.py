@@ -20,7 +20,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State
-from smartshoe.diagnosis._validation import MOST_ALONE, LeftOut, fitted_rms
+from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -75,7 +75,7 @@ def with_changes(state: State, gained: Sequence[Session]) -> list[Session]:
     """
     evidence, gained = state.evidence, list(gained)
     count = len(_fitted(gained))
-    for _ in range(MOST_CHANGES * count if count <= MOST_ALONE else 0):
+    for _ in range(MOST_CHANGES * count if count <= MOST_FOLDS else 0):
         fitted = _fitted(gained)
         beside = Evidence(replace(evidence.given, sessions=fitted), evidence.noise_sd)
         moments = [[(j + 1) * one.reading.size // (MOMENTS + 1) for j in range(MOMENTS)] for one in fitted]
