@@ -205,10 +205,12 @@ class Evidence:
         weights = np.ones(len(columns)) if len(columns) == 1 else self._direction(columns)
         whole = [rows[:, columns] @ weights for rows in given.rows]
         signatures = whole if self._of_all else self._visible(whole, columns, weights)
-        parts = zip(departures(given, signatures), given.sessions, strict=True)
-        seen = [where(one.fitted, part) for part, one in parts]
-        past = [part.T @ own for part, own in zip(seen, given.past, strict=True)]
-        return _Columns(seen, past)
+        return self._columns(departures(given, signatures))
+
+    def _columns(self, whole: Sequence[Array]) -> _Columns:
+        """``whole`` (n, k) a session, where it may be fitted."""
+        seen = [where(one.fitted, part) for one, part in zip(self.given.sessions, whole, strict=True)]
+        return _Columns(seen, [part.T @ own for part, own in zip(seen, self.given.past, strict=True)])
 
     def _visible(self, whole: Sequence[Array], columns: Sequence[int], weights: Array) -> list[Array]:
         """Of ``whole`` contributions (n,) a session what the baseline and the nuisances cannot follow."""
@@ -255,9 +257,7 @@ class Evidence:
 
     def falls_beside(self, members: Members, columns: Sequence[Array]) -> Array:
         """By how much a set's score falls (k,) with each of further ``columns`` (n, k) a session, of unit prior."""
-        given = self.given
-        seen = [where(one.fitted, part) for one, part in zip(given.sessions, columns, strict=True)]
-        added = _Columns(seen, [part.T @ own for part, own in zip(seen, given.past, strict=True)])
+        added = self._columns(columns)
         cross = self._between(self._all, added)
         half = self._taken_out(cross)
         free = cross - self._half.T @ half
@@ -269,7 +269,7 @@ class Evidence:
         beside = sds[:, None] * np.vstack([free[strengths], *also])
         factor, pull, _ = self._moved(index, sds)
         taken = solve_triangular(factor, beside, lower=True, check_finite=False) if index.size else beside
-        power = np.sum([np.einsum("nk,nk->k", part, part) for part in seen], axis=0)
+        power = np.sum([np.einsum("nk,nk->k", part, part) for part in added.seen], axis=0)
         for past, inverse in zip(added.past, self._inverse, strict=True):
             power -= np.einsum("kl,lm,km->k", past, inverse, past)
         left = np.maximum(power / self.noise_sd**2 - np.sum(half**2, axis=0) - np.sum(taken**2, axis=0), 0.0)

@@ -29,8 +29,7 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     The initial state is bounded by what an arm can hold: its share of the whole load. After them its own gains, if any.
     """
     mask = session.fitted if session.fitted.any() else session.usable
-    read = session.reading - residual if session.own_gain_sd else None
-    columns = nuisances(session, model.pole_per_s, read)
+    columns = nuisances(session, model.pole_per_s, session.reading - residual)
     seen = columns[mask]
     held = max(abs(model.relaxing_share * model.gain), 1e-6)
     variance = float(np.var(residual[mask])) if mask.any() else 0.0

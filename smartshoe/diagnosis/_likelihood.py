@@ -45,16 +45,15 @@ class Likelihood:
         self._past: list[Array] = []
         self._inverse: list[Array] = []
 
-    def _about(self, model: ExtendedModel, reads: Sequence[Array]) -> None:
-        """The sessions' nuisances: their memory fades with the pole of ``model``, which ``reads`` (n,) a session."""
+    def _about(self, model: ExtendedModel, left: Sequence[Array]) -> None:
+        """The sessions' nuisances: their memory fades with the pole of ``model``, which leaves ``left``, (n,) each."""
         if model.pole_per_s == self._pole_per_s and not any(one.own_gain_sd for one in self.sessions):
             return
         self._pole_per_s = model.pole_per_s
-        own = [
-            nuisances(one, model.pole_per_s, read if one.own_gain_sd else None)
-            for one, read in zip(self.sessions, reads, strict=True)
+        pasts = [
+            nuisances(one, model.pole_per_s, one.reading - rest)[one.fitted] / self.noise_sd
+            for one, rest in zip(self.sessions, left, strict=True)
         ]
-        pasts = [columns[one.fitted] / self.noise_sd for columns, one in zip(own, self.sessions, strict=True)]
         inner = [ridged(past.T @ past + precision) for past, precision in zip(pasts, self._precision, strict=True)]
         self._past, self._inverse = pasts, [np.asarray(np.linalg.inv(one), dtype=np.float64) for one in inner]
 
@@ -67,11 +66,12 @@ class Likelihood:
         """Sum of squares over what is fitted, in units of the noise's variance; infinite of a model that runs off."""
         traces = [model.trace(session.conditions) for session in self.sessions]
         self._last = model, traces  # the slopes of a step that is taken begin with them
-        self._about(model, [reading for reading, _ in traces])
         total = 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # a leak beside an arm that pushes grows without bounds
-            for k, (session, (reading, _)) in enumerate(zip(self.sessions, traces, strict=True)):
-                total += float(self._gram(k, (session.reading - reading)[:, None])[0, 0])
+            left = [session.reading - reading for session, (reading, _) in zip(self.sessions, traces, strict=True)]
+            self._about(model, left)
+            for k, rest in enumerate(left):
+                total += float(self._gram(k, rest[:, None])[0, 0])
         return total if math.isfinite(total) else math.inf
 
     def normal(self, model: ExtendedModel, rows: Sequence[Array] | None = None) -> tuple[float, Array, Array]:
@@ -101,7 +101,7 @@ class Likelihood:
         return self._last[1] if self._last is not None and self._last[0] is model else None
 
     def _products(self, model: ExtendedModel) -> tuple[float, Array, Array]:
-        self._about(model, [one.reading - rows[:, 0] for one, rows in zip(self.sessions, self._rows, strict=True)])
+        self._about(model, [rows[:, 0] for rows in self._rows])
         total = np.sum([self._with_memory(k, rows, model) for k, rows in enumerate(self._rows)], axis=0)
         self._scales = np.diag(total)[1:]
         return float(total[0, 0]), total[1:, 0], total[1:, 1:]

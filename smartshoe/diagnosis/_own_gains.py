@@ -18,6 +18,7 @@ from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._residual_structure import beyond_noise
+from smartshoe.diagnosis._search import needed
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, fitted_rms
@@ -42,18 +43,37 @@ class OwnGain:
     is_change: bool = False
 
 
-def with_likelier_gains(state: State, sessions: Sequence[Session]) -> list[Session] | None:
+@dataclass(frozen=True, eq=False)
+class _Gained:
+    """``sessions`` with gains of their own, the ``evidence`` beside these, and what of a state is ``kept`` in it."""
+
+    sessions: Sequence[Session]
+    evidence: Evidence
+    kept: Members
+
+    @classmethod
+    def of(cls, state: State, sessions: Sequence[Session]) -> _Gained:
+        evidence = Evidence(replace(state.given, sessions=_fitted(sessions)), state.evidence.noise_sd)
+        return cls(sessions, evidence, needed(evidence, state.start))
+
+    @property
+    def odds_of_a_change(self) -> float:
+        """-2 log prior odds against one: of one effect among all, at one of the moments of the recordings."""
+        return self.evidence.odds + 2.0 * math.log(MOMENTS * len(self.evidence.given.sessions))
+
+
+def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[Session] | None:
     """The same sessions with gains of their own where these are told, else with gains that change; else None.
 
     Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise.
     """
     if any(one.gain_changes for one in sessions) or not may_differ(state, sessions):
         return None
-    gained = [replace(one, own_gain_sd=state.thresholds.strength_sd) for one in sessions]
+    gained = _Gained.of(state, [replace(one, own_gain_sd=state.thresholds.strength_sd) for one in sessions])
     if not sessions[0].own_gain_sd and are_told(state, sessions, gained):
-        return gained
-    gained = with_changes(state, gained)
-    return gained if any(one.gain_changes for one in gained) and are_told(state, sessions, gained) else None
+        return gained.sessions
+    changing = with_changes(state, gained)
+    return changing.sessions if changing is not gained and are_told(state, sessions, changing) else None
 
 
 def may_differ(state: State, sessions: Sequence[Session]) -> bool:
@@ -68,33 +88,32 @@ def may_differ(state: State, sessions: Sequence[Session]) -> bool:
     return goes_with_cycles or _left_by(state.fit.model, fitted, state.thresholds) > state.thresholds.tolerable
 
 
-def with_changes(state: State, gained: Sequence[Session]) -> list[Session]:
+def with_changes(state: State, gained: _Gained) -> _Gained:
     """``gained``, each with another gain from each moment on where that is likelier, one after the other.
 
     Of many recordings each is short, and gains of their own are all that is asked.
     """
-    evidence, gained = state.evidence, list(gained)
-    count = len(_fitted(gained))
+    model, count = state.given.model, len(_fitted(gained.sessions))
     for _ in range(MOST_CHANGES * count if count <= MOST_FOLDS else 0):
-        fitted = _fitted(gained)
-        beside = Evidence(replace(evidence.given, sessions=fitted), evidence.noise_sd)
-        moments = [[(j + 1) * one.reading.size // (MOMENTS + 1) for j in range(MOMENTS)] for one in fitted]
-        columns = [np.zeros((one.reading.size, MOMENTS * len(fitted)), order="F") for one in fitted]
-        for k, (one, own) in enumerate(zip(fitted, columns, strict=True)):
-            read = one.own_gain_sd * evidence.given.model.simulate(one.conditions)
-            for j, at in enumerate(moments[k]):
-                own[at:, MOMENTS * k + j] = read[at:]
-        falls = beside.falls_beside(_needed(beside, state.start), columns)
-        k, j = divmod(int(np.argmax(falls)), MOMENTS)
-        if falls.max() < _odds_of_a_change(beside):
+        fitted = _fitted(gained.sessions)
+        moments = [np.arange(1, MOMENTS + 1) * one.reading.size // (MOMENTS + 1) for one in fitted]
+        columns = [np.zeros((one.reading.size, MOMENTS * count), order="F") for one in fitted]
+        for k, one in enumerate(fitted):
+            read = one.own_gain_sd * model.simulate(one.conditions)
+            is_after = np.arange(read.size)[:, None] >= moments[k]
+            columns[k][:, MOMENTS * k : MOMENTS * (k + 1)] = read[:, None] * is_after
+        falls = gained.evidence.falls_beside(gained.kept, columns)
+        if falls.max() < gained.odds_of_a_change:
             break
-        changes = tuple(sorted({*fitted[k].gain_changes, moments[k][j]}))
-        gained = [replace(one, gain_changes=changes) if one is fitted[k] else one for one in gained]
+        k, j = divmod(int(np.argmax(falls)), MOMENTS)
+        changes = tuple(sorted({*fitted[k].gain_changes, int(moments[k][j])}))
+        changed = [replace(one, gain_changes=changes) if one is fitted[k] else one for one in gained.sessions]
+        gained = _Gained.of(state, changed)
     return gained
 
 
-def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session]) -> bool:
-    """Whether gains of their own, which ``gained`` have, are likelier than what was found without, or than some of it.
+def are_told(state: State, sessions: Sequence[Session], gained: _Gained) -> bool:
+    """Whether gains of their own, which ``gained`` has, are likelier than what was found without, or than some of it.
 
     Against them are the odds against an effect, and they must move the reading by more than small imperfections of a
     good unit together. With them, either fewer effects leave no more, or they account for the larger part of what is
@@ -102,27 +121,25 @@ def are_told(state: State, sessions: Sequence[Session], gained: Sequence[Session
     where recordings are of other loads or rates.
     """
     evidence, members, thresholds = state.evidence, state.start, state.thresholds
-    beside = Evidence(replace(evidence.given, sessions=_fitted(gained)), evidence.noise_sd)
-    kept = _needed(beside, members)
-    changes = sum(len(one.gain_changes) for one in _fitted(gained))
-    odds = changes * _odds_of_a_change(beside) + (0.0 if sessions[0].own_gain_sd else beside.odds)
-    if beside.score_beside(kept) + odds >= evidence.score_beside(members):
+    changes = sum(len(one.gain_changes) for one in gained.sessions)
+    odds = changes * gained.odds_of_a_change + (0.0 if sessions[0].own_gain_sd else evidence.odds)
+    if gained.evidence.score_beside(gained.kept) + odds >= evidence.score_beside(members):
         return False
     model = state.fit.model
-    for name in {*model.names} - {beside.given.candidates[m].name for m in kept}:
+    for name in {*model.names} - {state.given.candidates[m].name for m in gained.kept}:
         model = model.without(name)
-    model = fit(Likelihood(gained, evidence.noise_sd, model, thresholds), model, FEW_STEPS).model
-    each = zip(gained, sessions, strict=True)
-    moved = fitted_rms(gained, [residual_of(one, model) - residual_of(other, model) for one, other in each])
-    if moved <= thresholds.tolerable:
+    model = fit(Likelihood(gained.sessions, evidence.noise_sd, model, thresholds), model, FEW_STEPS).model
+    left = [residual_of(one, model) for one in gained.sessions]
+    moved = [rest - residual_of(one, model) for one, rest in zip(sessions, left, strict=True)]
+    if fitted_rms(sessions, moved) <= thresholds.tolerable:
         return False
-    before, after = _left_by(state.fit.model, sessions, thresholds), _left_by(model, gained, thresholds)
-    is_simpler = len(kept) < len(members) and after <= before
+    before, after = _left_by(state.fit.model, sessions, thresholds), beyond_noise(sessions, left, thresholds)
+    is_simpler = len(gained.kept) < len(members) and after <= before
     if not is_simpler and thresholds.clear * after**2 > before**2:
         return False
     before, after = (
         float(LeftOut(some, evidence.noise_sd, one, thresholds).errors(one).sum())
-        for some, one in ((sessions, state.fit.model), (gained, model))
+        for some, one in ((sessions, state.fit.model), (gained.sessions, model))
     )
     return thresholds.clear * after <= before
 
@@ -142,23 +159,6 @@ def changes_of(gains: Sequence[OwnGain]) -> tuple[OwnGain, ...]:
     """Where gains change within a recording: when, and by what share, the largest first."""
     changes = [replace(one, share=one.share - last.share) for last, one in pairwise(gains) if one.is_change]
     return tuple(sorted(changes, key=lambda one: -abs(one.share)))
-
-
-def _odds_of_a_change(evidence: Evidence) -> float:
-    """-2 log prior odds against a change: of one effect among all, at one of the moments of the recordings."""
-    return evidence.odds + 2.0 * math.log(MOMENTS * len(evidence.given.sessions))
-
-
-def _needed(evidence: Evidence, members: Members) -> Members:
-    """``members`` without those of which one after the other has less evidence for it than against it."""
-    best = evidence.posterior(members)
-    while best.members:
-        fewer = (evidence.posterior(tuple(m for m in best.members if m != gone)) for gone in best.members)
-        less = min(fewer, key=lambda one: one.score)
-        if less.score >= best.score:
-            break
-        best = less
-    return best.members
 
 
 def _left_by(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> float:

@@ -63,3 +63,15 @@ def search(evidence: Evidence, start: Members = (), banned: Collection[str] = ()
         if found.score >= best.score - 1e-6:
             return best
         best = found
+
+
+def needed(evidence: Evidence, members: Members) -> Members:
+    """``members`` without those of which one after the other has less evidence for it than against it."""
+    best = evidence.posterior(members)
+    while best.members:
+        fewer = (evidence.posterior(tuple(m for m in best.members if m != gone)) for gone in best.members)
+        less = min(fewer, key=lambda one: one.score)
+        if less.score >= best.score:
+            break
+        best = less
+    return best.members

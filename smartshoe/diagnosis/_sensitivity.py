@@ -84,14 +84,13 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
     return logged | ({"temperatures"} if begin_apart else set())
 
 
-def nuisances(session: Session, pole_per_s: float, read: Array | None = None) -> Array:
+def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) -> Array:
     """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording.
 
-    Of a recording with a gain of its own, after them: by how much that moves what a model has ``read`` (n,), one column
-    for each part of it that has one.
+    After them, for each gain of its own: by how much that moves what a model has ``read`` (n,).
     """
     time_s = session.conditions.time_s
-    own = [] if read is None else [session.own_gain_sd * read * part for part in session.gain_parts]
+    own = [session.own_gain_sd * read * part for part in session.gain_parts]
     return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0])), *own])
 
 
@@ -104,7 +103,7 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
     sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    return np.diag([0.0, 1.0 / sd**2, *([1.0] * len(session.gain_parts) if session.own_gain_sd else [])])
+    return np.diag([0.0, 1.0 / sd**2, *[1.0] * len(session.gain_parts)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +133,7 @@ class Linearised:
         """(n, k) a session: what is its own."""
         pole_per_s, read = self.model.pole_per_s, self.model.simulate
         return tuple(
-            nuisances(one, pole_per_s, read(one.conditions) if one.own_gain_sd else None) for one in self.sessions
+            nuisances(one, pole_per_s, read(one.conditions) if one.own_gain_sd else 0.0) for one in self.sessions
         )
 
     @property

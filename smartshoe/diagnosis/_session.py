@@ -86,7 +86,9 @@ class Session:
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:
-        """(n,) each: the samples of one gain."""
+        """(n,) each: the samples of one gain of its own; none where all recordings share one."""
+        if not self.own_gain_sd:
+            return ()
         at = np.arange(self.reading.size)
         return tuple((at >= a) & (at < b) for a, b in pairwise((0, *self.gain_changes, at.size)))
 

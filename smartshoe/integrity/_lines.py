@@ -103,7 +103,7 @@ def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[
         part, good = y[first:last], ~bad[first:last]
         if good.sum() < view.thresholds.local // 2:
             continue
-        seen = basis[good]
+        seen = basis[good]  # nearly orthogonal: their products do
         left = part - basis @ np.linalg.lstsq(seen.T @ seen, seen.T @ part[good], rcond=None)[0]
         window = np.hanning(last - first) * good
         window *= np.abs(left) <= np.maximum(limit[first:last], view.reading.largest * robust_sd(left))

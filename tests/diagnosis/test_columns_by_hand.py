@@ -52,7 +52,8 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
     return SimpleNamespace(
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
-        cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}), own_gain_sd=0.0,
+        cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
+        own_gain_sd=0.0, gain_parts=(),
     )  # fmt: skip
 
 

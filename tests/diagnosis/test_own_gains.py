@@ -14,7 +14,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._own_gains import changes_of, gains_of, may_differ, with_changes, with_likelier_gains
+from smartshoe.diagnosis._own_gains import _Gained, changes_of, gains_of, may_differ, with_changes, with_likelier_gains
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Scale, Session, prepare
 from smartshoe.diagnosis._state import State, state_at
@@ -61,7 +61,7 @@ def _wide(sessions: list[Session], model: ExtendedModel) -> tuple[Array, ...]:
     """Nuisances (n, 2 or 3) over what is fitted, a session each, times the standard deviations of their priors."""
     made = []
     for one in sessions:
-        read = model.simulate(one.conditions) if one.own_gain_sd else None
+        read = model.simulate(one.conditions)
         sds = np.concatenate([[1e3], np.diag(nuisance_precision(one, model, STANDARD))[1:] ** -0.5])
         made.append((nuisances(one, model.pole_per_s, read) * sds)[one.fitted])
     return tuple(made)
@@ -210,5 +210,5 @@ def test_of_many_recordings_no_changes_are_asked_for(monkeypatch: pytest.MonkeyP
     sessions = _sessions(*(_run(k, 0.0) for k in range(13)))
     state = _state(CURVED, sessions)
     monkeypatch.setattr(Evidence, "falls_beside", lambda *given: pytest.fail("asked for"))
-    gained = [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions]
-    assert with_changes(state, gained) == gained
+    gained = _Gained.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions])
+    assert with_changes(state, gained) is gained

@@ -12,7 +12,7 @@ from smartshoe.diagnosis import Diagnosis, diagnose
 from smartshoe.recording import Recording
 
 GAINS = (0.015, -0.010, 0.004, 0.007, -0.005)
-ONE_FILE = pytest.mark.parametrize("recordings", [2, 3])
+TWO_OR_THREE = pytest.mark.parametrize("recordings", [2, 3])
 
 
 def _put_back(recording: Recording, by: float) -> Recording:
@@ -33,7 +33,7 @@ def _told(found: Diagnosis) -> list[str]:
     return [said for said in found.limits if "a gain of its own" in said]
 
 
-@ONE_FILE
+@TWO_OR_THREE
 @pytest.mark.parametrize("seed", [10, 11, 12, 13])
 def test_gains_are_told_and_nothing_is_named_for_them(seed: int, recordings: int) -> None:
     found = _diagnosed({}, seed, recordings)
@@ -46,7 +46,7 @@ def test_gains_are_told_and_nothing_is_named_for_them(seed: int, recordings: int
     assert not [cause.name for cause in found.causes if cause.confidence > 0.5 and cause.size > 1.5e-3]
 
 
-@ONE_FILE
+@TWO_OR_THREE
 @pytest.mark.parametrize(
     ("name", "family"),
     [
