@@ -118,6 +118,9 @@ class Evidence:
         # What is there without any effect: the baseline's own changes, and what is immaterial.
         self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.material)
         self._sds[: given.own] = 1.0
+        for one in given.candidates:
+            if one.effect.why_unnamed:  # what no law does is no small imperfection of a good unit
+                self._sds[np.array(one.columns) - 1] = 0.0
         inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
         inner[np.diag_indices_from(inner)] += 1.0
         self._factor = _factor(inner)

@@ -25,10 +25,26 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._own_gains import OwnGain, gains_of, with_likelier_gains
+from smartshoe.diagnosis._own_gains import (
+    OwnGain,
+    ZeroChange,
+    foretells,
+    gains_of,
+    with_likelier_gains,
+    zero_changes_of,
+)
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, load_cycles
-from smartshoe.diagnosis._settling import Progress, better_from, law_or_block, listed, score_of, settled, simpler
+from smartshoe.diagnosis._settling import (
+    Progress,
+    better_from,
+    better_from_one,
+    law_or_block,
+    listed,
+    score_of,
+    settled,
+    simpler,
+)
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
 from smartshoe.integrity.thresholds import Thresholds
@@ -43,7 +59,8 @@ class Inference:
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
     ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
     one is idle, and others undo one another without it. ``alone``: the effect that does most by itself, where no
-    member is sure. ``own_gains``: those of the recordings, where they differ by them.
+    member is sure. ``own_gains``: those of the recordings, where they differ by them; ``zero_changes``: when their
+    zeros change.
     """
 
     baseline: Fit
@@ -57,6 +74,7 @@ class Inference:
     undone: tuple[str, ...] = ()
     alone: Effect | None = None
     own_gains: tuple[OwnGain, ...] = ()
+    zero_changes: tuple[ZeroChange, ...] = ()
 
 
 def infer(
@@ -86,10 +104,12 @@ def infer(
     if (gained := with_likelier_gains(state, sessions)) is not None:
         progress("giving each recording a gain of its own")
         beside = infer(start, gained, thresholds, progress)
-        own_gains = beside.own_gains or gains_of(gained, beside.fit.model)
-        # What stands for another recording is the gain of all, as without gains of their own.
-        extended = beside.fit if len(beside.fit.model.parts) > len(plain.model.parts) else plain
-        return replace(beside, baseline=plain, fit=extended, own_gains=own_gains)
+        if not (beside.own_gains or beside.zero_changes):
+            about = gained, beside.fit.model
+            beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
+        if foretells(beside.fit.model, plain.model, state, sessions, gained):
+            return replace(beside, baseline=plain)
+        return replace(beside, baseline=plain, fit=plain, members=(), alone=None)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
@@ -143,7 +163,7 @@ def _sought(begun: State, sessions: Sequence[Session], progress: Progress) -> St
         state = better_from(with_another_pole(state, sessions), state, sessions, progress)
     if state.fit.model.relaxing_share < 0.0:
         state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
-    return state
+    return better_from_one(begun, state, sessions, progress)
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,7 @@ def names_of(
     *,
     is_followed: bool = False,
     is_clocked: bool = False,
+    is_unsteady: bool = False,
     alone: Effect | None = None,
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
@@ -54,12 +55,16 @@ def names_of(
     else the one of the kind that does most ``alone``, likewise.
     ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
     curve: none of these is more than half sure, and nothing is named for its size.
+    ``is_unsteady``: zeros change at moments, of which not all are seen, and others may do what any effect does: none is
+    more than half sure.
 
     A flexible block, and a curve that lies where its kind ends, is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     if is_clocked:
         likely = [_doubted(name) if name.effect.goes_with_the_clock else name for name in likely]
+    if is_unsteady:
+        likely = [_doubted(name) for name in likely]
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
         is_firm = not is_clocked and any(one.confidence >= thresholds.least_confidence for one in likely)

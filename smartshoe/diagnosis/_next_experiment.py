@@ -11,7 +11,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
-from smartshoe.diagnosis._own_gains import OwnGain, changes_of
+from smartshoe.diagnosis._own_gains import changes_of
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
@@ -54,8 +54,8 @@ def next_experiment(
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
     doubtful = [(cause, cause.part) for cause in causes if cause.equivalents and cause.part is not None]
-    if not doubtful and found.own_gains:
-        return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, _again(found.own_gains))
+    if not doubtful and (found.own_gains or found.zero_changes):
+        return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, _again(found))
     if not doubtful:
         is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)
         return _unseen(found, causes, excitation) if is_open else None
@@ -98,13 +98,14 @@ def next_experiment(
     return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
 
 
-def _again(gains: Sequence[OwnGain]) -> str:
-    """What to record once more where gains differ, or change."""
-    if changes := changes_of(gains):
-        return (
-            f"record {changes[0].recording} again, and watch unit, cable and logger at {changes[0].begins_s:.4g} s:"
-            " whether the gain changes there each time"
-        )
+def _again(found: Inference) -> str:
+    """What to record once more where gains differ, or where they or zeros change."""
+    for what, changes in (("gain", changes_of(found.own_gains)), ("zero", found.zero_changes)):
+        if changes:
+            return (
+                f"record {changes[0].recording} again, and watch unit, cable and logger at {changes[0].begins_s:.4g} s:"
+                f" whether the {what} changes there each time"
+            )
     return (
         "record one of these again twice, once without moving the unit and once after taking it out and putting it"
         " back: whether the gain is the mounting's, and how far that moves it"

@@ -1,8 +1,8 @@
 """Whether each recording has a gain of its own, as where a unit is taken out and put back between recordings.
 
-Or other ones in its course, as where it slips. What goes with the time or the cycles of a recording would be taken for
-it: two drifts together make of two recordings what either has throughout, and one drift makes half of what changes at a
-moment. So such gains are weighed against what was found, as one more hypothesis.
+Or other ones in its course, or other zeros, as where it slips. What goes with the time or the cycles of a recording
+would be taken for it: two drifts together make of two recordings what either has throughout, and one drift makes half
+of what changes at a moment. So such gains, and zeros, are weighed against what was found, as one more hypothesis.
 """
 
 from __future__ import annotations
@@ -14,20 +14,22 @@ from itertools import pairwise
 
 import numpy as np
 
+from smartshoe.arrays import Index
 from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
+from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._residual_structure import beyond_noise
-from smartshoe.diagnosis._search import needed
+from smartshoe.diagnosis._search import needed, search
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._state import State
-from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, fitted_rms
+from smartshoe.diagnosis._state import State, with_members
+from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
-# Resolutions: how many moments of a recording a gain may change at, and how often.
+# Resolutions: how many moments of a recording a gain, or its zero, may change at, and how often.
 MOMENTS = 60
-MOST_CHANGES = 2
+MOST_CHANGES = 6
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,29 @@ class OwnGain:
     is_change: bool = False
 
 
+@dataclass(frozen=True)
+class ZeroChange:
+    """A moment of a ``recording`` from which on it reads more, by a ``share`` of full scale."""
+
+    recording: str
+    begins_s: float
+    share: float
+
+
 @dataclass(frozen=True, eq=False)
 class _Gained:
-    """``sessions`` with gains of their own, the ``evidence`` beside these, and what of a state is ``kept`` in it."""
+    """``sessions`` with gains of their own, or zeros that change.
+
+    ``evidence`` is that beside these, ``kept`` what of a state is still needed in it.
+    """
 
     sessions: Sequence[Session]
     evidence: Evidence
     kept: Members
 
     @classmethod
-    def of(cls, state: State, sessions: Sequence[Session]) -> _Gained:
-        evidence = Evidence(replace(state.given, sessions=_fitted(sessions)), state.evidence.noise_sd)
+    def of(cls, state: State, sessions: Sequence[Session], noise_sd: float) -> _Gained:
+        evidence = Evidence(replace(state.given, sessions=_fitted(sessions)), noise_sd)
         return cls(sessions, evidence, needed(evidence, state.start))
 
     @property
@@ -61,19 +75,77 @@ class _Gained:
         """-2 log prior odds against one: of one effect among all, at one of the moments of the recordings."""
         return self.evidence.odds + 2.0 * math.log(MOMENTS * len(self.evidence.given.sessions))
 
+    def searched(self) -> _Gained:
+        """The same with the best set beside them."""
+        return replace(self, kept=search(self.evidence, self.kept).members)
+
+    def model(self, state: State) -> ExtendedModel:
+        """A fit of what is kept."""
+        if self.evidence is state.evidence:
+            return state.fit.model
+        likelihood = Likelihood(self.sessions, self.evidence.noise_sd, state.fit.model, state.thresholds)
+        best = self.evidence.posterior(self.kept)
+        return fit(likelihood, with_members(state.given, best, state.fit.model, likelihood), FEW_STEPS).model
+
+    def score_beside(self, sessions: Sequence[Session]) -> float:
+        """-2 log of its evidence, with the odds against what it has and ``sessions`` have not."""
+        changes = sum(len(one.gain_changes) + len(one.zero_changes) for one in self.sessions)
+        own = self.evidence.odds if self.sessions[0].own_gain_sd and not sessions[0].own_gain_sd else 0.0
+        return self.evidence.score_beside(self.kept) + changes * self.odds_of_a_change + own
+
 
 def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[Session] | None:
-    """The same sessions with gains of their own where these are told, else with gains that change; else None.
+    """The same sessions with gains of their own where these are told, else with what changes at moments; else None.
 
     Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise.
     """
-    if any(one.gain_changes for one in sessions) or not may_differ(state, sessions):
+    if any(one.gain_changes or one.zero_changes for one in sessions) or not may_differ(state, sessions):
         return None
-    gained = _Gained.of(state, [replace(one, own_gain_sd=state.thresholds.strength_sd) for one in sessions])
-    if not sessions[0].own_gain_sd and are_told(state, sessions, gained):
+    found = _Gained(sessions, state.evidence, state.start)
+    noise_sd, own_gain_sd = state.evidence.noise_sd, state.thresholds.strength_sd
+    gained = _Gained.of(state, [replace(one, own_gain_sd=own_gain_sd) for one in sessions], noise_sd)
+    if not sessions[0].own_gain_sd and are_told(state, found, gained):
         return gained.sessions
     changing = with_changes(state, gained)
-    return changing.sessions if changing is not gained and are_told(state, sessions, changing) else None
+    by_gain = changing.sessions if changing is not gained and are_told(state, found, changing) else None
+    jumping = _with_jumping_zeros(state, sessions, (gained, changing))
+    return by_gain if jumping is None else jumping.sessions
+
+
+def _with_jumping_zeros(state: State, sessions: Sequence[Session], rivals: Sequence[_Gained]) -> _Gained | None:
+    """``sessions`` with zeros that change at moments where that is told, and likelier than each of ``rivals``.
+
+    What a zero leaves that jumps is no noise, and hides what else is there: noise is what is left between moments.
+    """
+    if _left_by(state.fit.model, sessions, state.thresholds) <= state.thresholds.tolerable:
+        return None  # no effect does what such a zero does
+    noise_sd = _between_moments_sd(state, sessions)
+    found = _Gained(sessions, Evidence(state.evidence.given, noise_sd), state.start)
+    jumping = with_changes(state, found, of_zero=True)
+    if jumping is found or not are_told(state, found.searched(), jumping := jumping.searched()):
+        return None
+    score = jumping.score_beside(sessions)
+    quiet = (_Gained.of(state, one.sessions, noise_sd).searched() for one in rivals)
+    return jumping if all(score < one.score_beside(sessions) for one in quiet) else None
+
+
+def _moments_of(session: Session) -> Index:
+    """(`MOMENTS`,) samples at which something may change."""
+    return np.arange(1, MOMENTS + 1) * session.reading.size // (MOMENTS + 1)
+
+
+def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
+    """Standard deviation of the noise, as `correlated_sd` has it, whatever the zero is between two moments."""
+    left, kept, free = [], [], 0  # degrees of freedom
+    for one in _fitted(sessions):
+        residual = residual_of(one, state.fit.model)
+        part = np.searchsorted(_moments_of(one), np.arange(residual.size), side="right")
+        sums, counts = (np.bincount(part[one.fitted], of, MOMENTS + 1) for of in (residual[one.fitted], None))
+        left.append(residual - (sums / np.maximum(counts, 1))[part])
+        kept.append(one.fitted)
+        free += int(one.fitted.sum()) - int(np.count_nonzero(counts))
+    count = sum(int(one.sum()) for one in kept)
+    return min(correlated_sd(left, kept) * math.sqrt(count / max(free, 1)), state.evidence.noise_sd)
 
 
 def may_differ(state: State, sessions: Sequence[Session]) -> bool:
@@ -88,60 +160,78 @@ def may_differ(state: State, sessions: Sequence[Session]) -> bool:
     return goes_with_cycles or _left_by(state.fit.model, fitted, state.thresholds) > state.thresholds.tolerable
 
 
-def with_changes(state: State, gained: _Gained) -> _Gained:
-    """``gained``, each with another gain from each moment on where that is likelier, one after the other.
+def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Gained:
+    """``gained``, each with another gain, or zero, from each moment on where that is likelier, one after the other.
 
     Of many recordings each is short, and gains of their own are all that is asked.
     """
     model, count = state.given.model, len(_fitted(gained.sessions))
     for _ in range(MOST_CHANGES * count if count <= MOST_FOLDS else 0):
         fitted = _fitted(gained.sessions)
-        moments = [np.arange(1, MOMENTS + 1) * one.reading.size // (MOMENTS + 1) for one in fitted]
+        moments = [_moments_of(one) for one in fitted]
         columns = [np.zeros((one.reading.size, MOMENTS * count), order="F") for one in fitted]
         for k, one in enumerate(fitted):
-            read = one.own_gain_sd * model.simulate(one.conditions)
-            is_after = np.arange(read.size)[:, None] >= moments[k]
-            columns[k][:, MOMENTS * k : MOMENTS * (k + 1)] = read[:, None] * is_after
+            by = state.thresholds.strength_sd if of_zero else one.own_gain_sd * model.simulate(one.conditions)
+            is_after = np.arange(one.reading.size)[:, None] >= moments[k]
+            columns[k][:, MOMENTS * k : MOMENTS * (k + 1)] = (by * is_after.T).T
         falls = gained.evidence.falls_beside(gained.kept, columns)
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
-        changes = tuple(sorted({*fitted[k].gain_changes, int(moments[k][j])}))
-        changed = [replace(one, gain_changes=changes) if one is fitted[k] else one for one in gained.sessions]
-        gained = _Gained.of(state, changed)
+        changed = _changed(fitted[k], int(moments[k][j]), of_zero=of_zero)
+        changed_too = [changed if one is fitted[k] else one for one in gained.sessions]
+        gained = _Gained.of(state, changed_too, gained.evidence.noise_sd)
     return gained
 
 
-def are_told(state: State, sessions: Sequence[Session], gained: _Gained) -> bool:
-    """Whether gains of their own, which ``gained`` has, are likelier than what was found without, or than some of it.
+def _changed(session: Session, at: int, *, of_zero: bool) -> Session:
+    """A session with another gain, or zero, from a sample on."""
+    if of_zero:
+        return replace(session, zero_changes=tuple(sorted({*session.zero_changes, at})))
+    return replace(session, gain_changes=tuple(sorted({*session.gain_changes, at})))
+
+
+def are_told(state: State, found: _Gained, gained: _Gained) -> bool:
+    """Whether gains of their own, which ``gained`` has, are likelier than what was ``found`` without, or some of it.
 
     Against them are the odds against an effect, and they must move the reading by more than small imperfections of a
     good unit together. With them, either fewer effects leave no more, or they account for the larger part of what is
     left; and what is left out in turn is foreseen with half the squared error: else they take up what equations miss
     where recordings are of other loads or rates.
     """
-    evidence, members, thresholds = state.evidence, state.start, state.thresholds
-    changes = sum(len(one.gain_changes) for one in gained.sessions)
-    odds = changes * gained.odds_of_a_change + (0.0 if sessions[0].own_gain_sd else evidence.odds)
-    if gained.evidence.score_beside(gained.kept) + odds >= evidence.score_beside(members):
+    sessions, thresholds = found.sessions, state.thresholds
+    if gained.score_beside(sessions) >= found.score_beside(sessions):
         return False
-    model = state.fit.model
-    for name in {*model.names} - {state.given.candidates[m].name for m in gained.kept}:
-        model = model.without(name)
-    model = fit(Likelihood(gained.sessions, evidence.noise_sd, model, thresholds), model, FEW_STEPS).model
+    model = gained.model(state)
+    tried = {one: _left_by(one, sessions, thresholds) for one in (state.fit.model, found.model(state))}
+    without = min(tried, key=lambda one: tried[one])
     left = [residual_of(one, model) for one in gained.sessions]
     moved = [rest - residual_of(one, model) for one, rest in zip(sessions, left, strict=True)]
     if fitted_rms(sessions, moved) <= thresholds.tolerable:
         return False
-    before, after = _left_by(state.fit.model, sessions, thresholds), beyond_noise(sessions, left, thresholds)
-    is_simpler = len(gained.kept) < len(members) and after <= before
+    before, after = tried[without], beyond_noise(sessions, left, thresholds)
+    is_simpler = len(gained.kept) < len(found.kept) and after <= before
     if not is_simpler and thresholds.clear * after**2 > before**2:
         return False
     before, after = (
-        float(LeftOut(some, evidence.noise_sd, one, thresholds).errors(one).sum())
-        for some, one in ((sessions, state.fit.model), (gained.sessions, model))
+        float(LeftOut(some, gained.evidence.noise_sd, one, thresholds).errors(one).sum())
+        for some, one in ((sessions, without), (gained.sessions, model))
     )
     return thresholds.clear * after <= before
+
+
+def foretells(
+    model: ExtendedModel, plain: ExtendedModel, state: State, sessions: Sequence[Session], gained: Sequence[Session]
+) -> bool:
+    """Whether ``model``, found beside what ``gained`` have of their own, is worth more than ``plain`` without that.
+
+    What stands for another recording is the gain of all, and no zero that changed. Gains of whole recordings bend what
+    is fitted to few of them, so that there it must but follow ``sessions`` as they are; what changes within each is
+    seen by what each tells of the others.
+    """
+    if not any(one.gain_changes or one.zero_changes for one in gained):
+        return error_of(sessions, model) < error_of(sessions, plain)
+    return LeftOut(sessions, state.evidence.noise_sd, model, state.thresholds).stands(model, plain)
 
 
 def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain, ...]:
@@ -149,10 +239,25 @@ def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain
     found = []
     for one in _fitted(sessions):
         own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
-        for at, gain in zip((0, *one.gain_changes), own[2:], strict=True):
-            begins_s = float(one.recording.time_s[0] + one.conditions.time_s[at])
-            found.append(OwnGain(one.recording.name, begins_s, one.own_gain_sd * float(gain), at > 0))
+        for at, gain in zip((0, *one.gain_changes) if one.own_gain_sd else (), own[2:], strict=False):
+            found.append(OwnGain(one.recording.name, _time_s(one, at), one.own_gain_sd * float(gain), at > 0))
     return tuple(found)
+
+
+def zero_changes_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[ZeroChange, ...]:
+    """Where the zero of a fitted recording changes: when, and by what, the largest first."""
+    found = []
+    for one in _fitted(sessions):
+        own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
+        steps = own[own.size - len(one.zero_changes) :]
+        for at, share in zip(one.zero_changes, steps, strict=True):
+            found.append(ZeroChange(one.recording.name, _time_s(one, at), float(share)))
+    return tuple(sorted(found, key=lambda one: -abs(one.share)))
+
+
+def _time_s(session: Session, at: int) -> float:
+    """The file's time at a sample of a session."""
+    return float(session.recording.time_s[0] + session.conditions.time_s[at])
 
 
 def changes_of(gains: Sequence[OwnGain]) -> tuple[OwnGain, ...]:

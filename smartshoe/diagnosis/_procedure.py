@@ -52,6 +52,7 @@ from smartshoe.diagnosis._verdict import (
     unexplained_of,
     verdict_of,
     worse_of,
+    zero_changes_said,
 )
 from smartshoe.diagnosis._zero import Zero, creeping, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
@@ -236,9 +237,11 @@ def _diagnosed(
         thresholds,
         is_followed=is_followed,
         is_clocked=given.excitation.goes_with_the_clock,
+        is_unsteady=bool(found.zero_changes),
         alone=found.alone,
     )
     unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
+    unnamed = max((one.member.size for one, _ in unclear), default=0.0)
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = _less(names, unclear)
     unclear += [(one, said) for one in names if (said := departure_of(one, names))]
@@ -253,7 +256,10 @@ def _diagnosed(
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds, within.memory)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
     past = [past_of(one, scale) for one in zeros if one.is_past]
-    zeros = tuple(one for one in zeros if not one.is_past)
+    # A zero that jumps within recordings is no offset.
+    zeros = tuple(
+        one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
+    )
     crept = [(one, tare) for one in names if (tare := creeping(zeros, one.effect, one.member.size, thresholds))]
     names = _less(names, crept)
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
@@ -267,7 +273,8 @@ def _diagnosed(
     elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:
-        verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=elsewhere)
+        besides = elsewhere or (unnamed if unnamed > thresholds.tolerable else 0.0)
+        verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - max(after.rms, elsewhere) ** 2, 0.0)
@@ -307,6 +314,7 @@ def _diagnosed(
             *past,
             *(crept_of(*one) for one in crept),
             *own_gains_of(found.own_gains),
+            *zero_changes_said(found.zero_changes),
             *refusals_of(found),
         ),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,

@@ -87,23 +87,26 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
 def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) -> Array:
     """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording.
 
-    After them, for each gain of its own: by how much that moves what a model has ``read`` (n,).
+    After them, for each gain of its own: by how much that moves what a model has ``read`` (n,); and, from each moment
+    on at which its zero changes, one.
     """
     time_s = session.conditions.time_s
     own = [session.own_gain_sd * read * part for part in session.gain_parts]
-    return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0])), *own])
+    steps = [np.arange(time_s.size) >= at for at in session.zero_changes]
+    return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0])), *own, *steps])
 
 
 def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
     """(2, 2) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
 
     A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
-    rest still carries some of what went before. One more row for each gain of its own.
+    rest still carries some of what went before. One more row for each gain of its own, and each change of its zero.
     """
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
     sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    return np.diag([0.0, 1.0 / sd**2, *[1.0] * len(session.gain_parts)])
+    steps = [thresholds.strength_sd**-2] * len(session.zero_changes)
+    return np.diag([0.0, 1.0 / sd**2, *[1.0] * len(session.gain_parts), *steps])
 
 
 @dataclass(frozen=True, eq=False)

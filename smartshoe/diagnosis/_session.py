@@ -68,7 +68,7 @@ class Session:
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
     ``quiet`` is the load at the full rate. ``own_gain_sd``: standard deviation, as a share, by which the gain of one
     recording lies beside that of all; 0 where they share one. ``gain_changes``: the samples from which on it is
-    another, in order.
+    another, in order; ``zero_changes`` those from which on its reading without load is.
     """
 
     recording: Recording
@@ -83,6 +83,7 @@ class Session:
     quiet: Quiet
     own_gain_sd: float = 0.0
     gain_changes: tuple[int, ...] = ()
+    zero_changes: tuple[int, ...] = ()
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:

@@ -61,6 +61,23 @@ def better_from(begun: State, state: State, sessions: Sequence[Session], progres
     return state if other is state else replace(simpler(other, state, sessions), path=(*state.path, *other.path))
 
 
+def better_from_one(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
+    """What settles from one of the likeliest effects alone, where that follows better than the several of ``state``.
+
+    Several that are each fitted a little may promise more in one linearisation than one that is large.
+    """
+    if effect_count(state.fit.model) - effect_count(begun.fit.model) < 2:
+        return state
+    likelihood = state.likelihood(sessions)
+    few = [begun.evidence.posterior((*begun.start, k)) for k in additions(begun.evidence, begun.start, RIVALS)]
+    fits = [fit(likelihood, with_members(begun.given, one, begun.fit.model, likelihood)) for one in few]
+    one = min(fits, key=lambda one: one.cost, default=begun.fit)
+    if not _is_simpler(one, state, sessions):
+        return state
+    progress(f"beginning anew from {listed(one.model.names)}")
+    return better_from(state_at(one, sessions, state.thresholds), state, sessions, progress)
+
+
 def simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
     return other if _is_simpler(other.fit, state, sessions) else state
 

@@ -13,7 +13,7 @@ from smartshoe.diagnosis._arms import arms_of, is_stretched
 from smartshoe.diagnosis._held_out import Errors, Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._own_gains import OwnGain, changes_of
+from smartshoe.diagnosis._own_gains import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale, Session
@@ -43,6 +43,8 @@ def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
     """What is said of an effect that follows best where it is of another kind, or is the wall's own arm."""
     told = name.effect.name.replace("_", " ")
     part = model.part(name.member.name)
+    if part.effect.why_unnamed and name.by is None:
+        return f"the reading {part.effect.why_unnamed}, which no effect of the catalogue does, so that it is not named"
     if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
@@ -113,7 +115,7 @@ def verdict_of(
     """What is left, against what was wrong ``before`` and what is tolerable.
 
     ``worse``: that the extension is so, for certain, on what is held out: whatever it follows, it explains a part.
-    ``elsewhere``: `off_elsewhere`.
+    ``elsewhere``: `off_elsewhere`, or what an effect moves that is followed, but of no kind that has a name.
 
     ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
 
@@ -220,15 +222,29 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
         return []
     told = "what is named is told beside these gains, and no model foresees that of another recording"
     if changes := changes_of(gains):
-        few = [f"by {100 * one.share:+.2g} % at {one.begins_s:.4g} s in {one.recording}" for one in changes[:SAID]]
-        more = f" and {len(changes) - SAID} times more" if len(changes) > SAID else ""
-        return [f"the gain changes {', '.join(few)}{more}, as where a unit slips or is set anew: {told}"]
+        return [f"the gain changes {_when(changes)}, as where a unit slips or is set anew: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
     return [
         f"each recording has a gain of its own, from {100 * low.share:+.2g} % in {low.recording} to"
         f" {100 * high.share:+.2g} % in {high.recording} beside that of all, as where a unit is taken out and put back:"
         f" {told} (leave the unit in place, or calibrate it each time)"
     ]
+
+
+def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
+    """What is said of recordings in which the reading without load changes at moments."""
+    if not changes:
+        return []
+    return [
+        f"the zero changes, in shares of full scale, {_when(changes)}, as where a unit slips or water moves in a line:"
+        " other such changes may do what any effect does, so that none is more than half sure, and no model foresees"
+        " those of another recording"
+    ]
+
+
+def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
+    few = [f"by {100 * one.share:+.2g} % at {one.begins_s:.4g} s in {one.recording}" for one in changes[:SAID]]
+    return f"{', '.join(few)}{f' and {len(changes) - SAID} times more' if len(changes) > SAID else ''}"
 
 
 def refusals_of(found: Inference) -> list[str]:

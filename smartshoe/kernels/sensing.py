@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 
@@ -34,3 +35,21 @@ def at_places(u, late, weights, out):  # type: ignore[no-untyped-def]
                 weight = weights[row, j] + share * (weights[row + 1, j] - weights[row, j])
                 total += weight * u[min(max(first + j, 0), n - 1)]
         out[k] = total
+
+
+@njit(cache=True)
+def lagged_by_direction(start, rise, keep_rising, fall, keep_falling):  # type: ignore[no-untyped-def]
+    """w (n,), each ``keep`` of the value before and the drive of its step: ``rise`` (n,) where it rises, else ``fall``.
+
+    Where neither way leads up nor down, what is followed crosses, and it stays.
+    """
+    out = np.empty(rise.size)
+    last = start
+    for k in range(rise.size):
+        up, down = keep_rising * last + rise[k], keep_falling * last + fall[k]
+        if up > last:
+            last = up
+        elif down < last:
+            last = down
+        out[k] = last
+    return out

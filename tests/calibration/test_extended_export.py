@@ -109,7 +109,7 @@ def test_20_000_samples_of_every_block_in_single_precision(tmp_path: Path) -> No
     in_integers = {name for name in worst_n if "int64_t" in (tmp_path / f"{name}.c").read_text()}
     assert in_integers == {
         "rate_gain", "bouc_wen_hysteresis", "dead_band", "flexible_loop", "load_unload_asymmetry", "flexible_asymmetry",
-        "flexible_softening", "flexible_set",
+        "flexible_softening", "flexible_set", "flexible_lag",
     }  # fmt: skip
     require_stated("chains with rate gain", 1, max(worst_n[name] for name in in_integers))
     require_stated("network, offsets", 1, max(value for name, value in worst_n.items() if name not in in_integers))

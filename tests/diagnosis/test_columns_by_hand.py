@@ -53,7 +53,7 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
         cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
-        own_gain_sd=0.0, gain_parts=(),
+        own_gain_sd=0.0, gain_parts=(), zero_changes=(),
     )  # fmt: skip
 
 
@@ -138,7 +138,10 @@ def test_what_only_later_load_cycles_show_is_not_looked_for_where_no_recording_h
     def told(*sessions: Any) -> set[str]:
         return {one.name for one in available(sessions, STANDARD)}
 
-    memories = {"mullins_softening", "cycle_conditioning", "gain_drift", "flexible_softening", "flexible_gain_drift"}
+    memories = {
+        "mullins_softening", "cycle_conditioning", "gain_drift", "flexible_softening", "flexible_gain_drift",
+        "flexible_lag",
+    }  # fmt: skip
     assert told(twice) - told(once, once) == memories
     assert told(once, twice) == told(twice)
     assert all(effect(name).needs_cycles for name in memories)

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
 from smartshoe.diagnosis._next_experiment import _in_place_of, expected_margin, next_experiment
-from smartshoe.diagnosis._own_gains import OwnGain
+from smartshoe.diagnosis._own_gains import OwnGain, ZeroChange
 from smartshoe.diagnosis.design import Design, _commanded, _compared, _not_followed, design
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -228,6 +228,7 @@ def _next(
     open_: bool = False,
     can_validate: bool = True,
     own_gains: tuple[OwnGain, ...] = (),
+    zero_changes: tuple[ZeroChange, ...] = (),
 ) -> Any:
     def margin(truth: Any, rival: Any, protocol: Any, noise_sd: float, like: Any) -> float:
         assert (truth.model.names, rival, noise_sd, like) == (("linear_leak", "dead_band"), "other", 0.01, "session")
@@ -243,7 +244,7 @@ def _next(
     model = MODEL.with_part("linear_leak").with_part("dead_band")
     found: Any = SimpleNamespace(
         fit=SimpleNamespace(model=model), likelihood=SimpleNamespace(noise_sd=0.01), can_validate=can_validate,
-        own_gains=own_gains,
+        own_gains=own_gains, zero_changes=zero_changes,
     )  # fmt: skip
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
     return next_experiment(found, causes, ["session"], excitation, open_=open_)  # type: ignore[list-item]
@@ -319,6 +320,10 @@ def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and
     assert "once without moving the unit and once after taking it out" in again.says
     slipped = _next(monkeypatch, [sure], {}, own_gains=(*gains, OwnGain("second", 83.21, 0.02, True)))
     assert slipped.says.startswith("record second again, and watch unit, cable and logger at 83.21 s")
+    assert slipped.says.endswith("whether the gain changes there each time")
+    slipped = _next(monkeypatch, [sure], {}, zero_changes=(ZeroChange("third", 12.3, 0.02),))
+    assert slipped.says.startswith("record third again, and watch unit, cable and logger at 12.3 s")
+    assert slipped.says.endswith("whether the zero changes there each time")
     doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), rivals=(("orifice_leak", 1.0),))]
     assert _next(monkeypatch, doubtful, {"steps": 1e3}, own_gains=gains).protocol == "steps"
 

@@ -14,6 +14,7 @@ from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, 
 from smartshoe import Recording
 from smartshoe.diagnosis import _procedure
 from smartshoe.diagnosis._force import ForceError
+from smartshoe.diagnosis._own_gains import ZeroChange
 from smartshoe.diagnosis._procedure import _diagnosed, _prepared
 from smartshoe.diagnosis._zero import Zero, shift_of
 from smartshoe.models.effects import effect
@@ -94,7 +95,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     found = SimpleNamespace(
         fit=SimpleNamespace(model=extended), baseline=SimpleNamespace(model=MODEL), members=(core, core, other),
         can_validate=True, refused=(), undone=(), alone=None, screening=tuple((f"n{k}", float(k)) for k in range(6)),
-        likeness=np.eye(6), own_gains=(),
+        likeness=np.eye(6), own_gains=(), zero_changes=(),
     )  # fmt: skip
     kinds = [_left(0.3), _left(0.02), _left(0.01)]  # before, after, and of what was learnt
     kinds[2].memory, kinds[2].size = "memory", 0.07
@@ -155,7 +156,7 @@ def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool =
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
-    parts.names = [_name("linear_leak"), _name("turned"), _name("delay")]
+    parts.names = [_name("linear_leak"), _name("turned", size=STANDARD.tolerable), _name("delay")]
     parts.zeros = [Zero(shift_of("load"), 0.2, 0.1, 0.2), Zero(shift_of("reading"), 0.2, 0.1, 1e-4)]
     told = _run_diagnosis(parts)
     assert [one.name for one in told.causes] == ["delay", "zero", "linear_leak"]  # the largest first, no immaterial one
@@ -183,7 +184,9 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
         [("fitted", [True, True, False])],  # a cycle that is held out decides over no name
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
-    assert seen["names_of"][1] == {"is_followed": False, "is_clocked": False, "alone": None}
+    assert seen["names_of"][1] == {
+        "is_followed": False, "is_clocked": False, "is_unsteady": False, "alone": None,
+    }  # fmt: skip
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
     assert seen["noise_kinds"][0][3:] == (True, STANDARD.material, "memory")
@@ -191,13 +194,23 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     assert seen["infer"][0][4] is True
 
 
+def test_what_an_effect_without_a_name_moves_is_not_explained(parts: Any) -> None:
+    for size, verdict in ((STANDARD.tolerable, "explained"), (1.01 * STANDARD.tolerable, "partly_explained")):
+        parts.seen.clear()
+        parts.names = [_name("linear_leak"), _name("turned", size=size)]
+        assert _run_diagnosis(parts).verdict == verdict
+
+
 def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     for left, is_followed in ((STANDARD.departure, True), (1.01 * STANDARD.departure, False)):
         parts.seen.clear()
         monkeypatch.setattr(_procedure, "fitted_rms", lambda _, of, left=left: left if of[0] == "held 2" else 1.0)
         parts.given.excitation.goes_with_the_clock = is_followed
+        parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if is_followed else ()
         _run_diagnosis(parts)
-        assert parts.seen["names_of"][1] == {"is_followed": is_followed, "is_clocked": is_followed, "alone": None}
+        assert parts.seen["names_of"][1] == {
+            "is_followed": is_followed, "is_clocked": is_followed, "is_unsteady": is_followed, "alone": None,
+        }  # fmt: skip
 
 
 def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:

@@ -93,6 +93,9 @@ class _Twin:
     def prior(self, members: tuple[int, ...]) -> Array:
         sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.material)
         sds[: self.given.own] = 1.0
+        for one in self.given.candidates:
+            if one.effect.why_unnamed:  # what no law does is no small imperfection
+                sds[[c - 1 for c in one.columns]] = 0.0
         for member in members:
             sds[[c - 1 for c in self.given.candidates[member].columns]] = self.given.thresholds.strength_sd
         return sds

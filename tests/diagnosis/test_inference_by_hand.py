@@ -95,6 +95,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "settled", settled)
     monkeypatch.setattr(_inference, "better_from", better_from)
+    monkeypatch.setattr(_inference, "better_from_one", lambda begun, one, sessions, progress: one)
     monkeypatch.setattr(_inference, "simpler", lambda other, one, sessions: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "with_a_latency", named("late"))
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
@@ -135,10 +136,18 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
 
     monkeypatch.setattr(_inference, "with_likelier_gains", likelier)
     monkeypatch.setattr(_inference, "gains_of", lambda sessions, model: (sessions, model))
+    monkeypatch.setattr(_inference, "zero_changes_of", lambda sessions, model: ())
+    flow.members = (0.9,)
+    stands = [True, True, True]  # of each that is told, from the innermost on
+    monkeypatch.setattr(_inference, "foretells", lambda *given: stands.pop())
     found = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
     assert found.own_gains == ("changing", "settled first")  # those that were told at last
     assert asked == ["shared", "own", "changing"]
     assert "giving each recording a gain of its own" in flow.said
+    assert (found.fit.model, found.members) == ("settled first", (0.9,))
+    stands = [False, True]
+    other = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
+    assert (other.fit, other.members, other.own_gains) == (other.baseline, (), found.own_gains)
     gains["shared"] = None
     assert infer(MODEL, "shared", STANDARD, flow.said.append).own_gains == ()  # type: ignore[arg-type]
 

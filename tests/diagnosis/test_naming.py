@@ -256,6 +256,14 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
     assert told[1].confidence == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
 
 
+def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
+    sure = member("play_hysteresis", size=0.05)
+    assert only(names_of([sure], 0.0, STANDARD)).confidence > 0.5
+    (told,) = names_of([sure], 0.0, STANDARD, is_unsteady=True)  # larger than what is left, and not to be ruled out
+    assert (told.confidence, told.is_sure) == (0.5, False)
+    assert not names_of([member(size=0.05, departed=9.0)], 0.06, STANDARD, is_unsteady=True)
+
+
 def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_what_is_left() -> None:
     doubted = [member(size=0.05, departed=5.0), member("rate_gain", size=0.02, departed=5.0)]
     assert not names_of(doubted, 0.03, STANDARD)

@@ -14,10 +14,20 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._own_gains import _Gained, changes_of, gains_of, may_differ, with_changes, with_likelier_gains
+from smartshoe.diagnosis._own_gains import (
+    _Gained,
+    changes_of,
+    foretells,
+    gains_of,
+    may_differ,
+    with_changes,
+    with_likelier_gains,
+    zero_changes_of,
+)
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Scale, Session, prepare
 from smartshoe.diagnosis._state import State, state_at
+from smartshoe.diagnosis._validation import error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -71,6 +81,8 @@ def _density(given: Linearised, sessions: list[Session], member: int | None) -> 
     """-2 log density of the target, every prior written out in one covariance; the equation exact."""
     prior = np.full(given.rows[0].shape[1] - 1, STANDARD.material)
     prior[: given.own] = 1.0
+    for one in given.candidates:
+        prior[[c - 1 for c in one.columns]] *= not one.effect.why_unnamed
     if member is not None:
         prior[[c - 1 for c in given.candidates[member].columns]] = STANDARD.strength_sd
     z = np.concatenate([rows[s.fitted, 1:] * prior for rows, s in zip(given.rows, sessions, strict=True)])
@@ -184,6 +196,51 @@ def test_a_gain_that_changes_is_told_with_the_moment() -> None:
     assert change.share == pytest.approx(0.04, abs=0.005)
 
 
+def test_zeros_that_change_are_told_with_the_moment_and_are_no_gains() -> None:
+    """1.5 % of full scale more from 14 s of one recording on, 1 % less from 28 s on."""
+    runs = [_run(k, 0.0) for k in range(3)]
+    reading, time_s = runs[1].sensors[0], runs[1].time_s
+    values = reading.values + SPAN_MBAR * (0.015 * (time_s >= 14.0) - 0.01 * (time_s >= 28.0))
+    sessions = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
+    told = with_likelier_gains(_state(CURVED, sessions), sessions)
+    assert told is not None
+    assert [len(one.zero_changes) for one in told] == [0, 2, 0]
+    assert not any(one.own_gain_sd or one.gain_changes for one in told)
+    assert with_likelier_gains(_state(CURVED, list(told)), told) is None
+    model = fit(Likelihood(told, SD, CURVED, STANDARD), CURVED).model
+    assert not gains_of(told, model)
+    first, second = zero_changes_of(told, model)  # the largest first
+    assert (first.recording, second.recording) == ("run_1", "run_1")
+    assert (first.begins_s, first.share) == (pytest.approx(14.0, abs=1.0), pytest.approx(0.015, abs=0.002))
+    assert (second.begins_s, second.share) == (pytest.approx(28.0, abs=1.0), pytest.approx(-0.01, abs=0.002))
+
+
+def test_beside_gains_an_extension_must_follow_and_beside_changes_it_must_foresee() -> None:
+    """The curve is there, an offset of 2 % of full scale in one recording of three is not in what is left out."""
+    runs = [_run(k, gain) for k, gain in enumerate((0.01, -0.005, -0.005))]
+    sessions = _sessions(*runs)
+    gained = [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions]
+    changing = [replace(one, zero_changes=(one.reading.size // 2,)) for one in sessions]
+    state = _state(MODEL, sessions)
+    curved, wrong = (fit(Likelihood(sessions, SD, MODEL, STANDARD), MODEL.with_part(effect(name), values), 1).model
+                     for name, values in (("gas_compression", [0.2]), ("permanent_set", [0.002, 1.0])))  # fmt: skip
+    for beside in (gained, changing):
+        assert foretells(curved, MODEL, state, sessions, beside)
+    worse = MODEL.with_part(effect("permanent_set"), np.array([0.02, 1.0]))
+    assert not foretells(worse, MODEL, state, sessions, gained)
+    assert foretells(wrong, MODEL, state, sessions, gained) is (error_of(sessions, wrong) < error_of(sessions, MODEL))
+    assert not foretells(wrong, MODEL, state, sessions, changing)  # it does away with a part of a quarter at most
+
+
+@pytest.mark.parametrize("by", [0.0, 0.002])
+def test_zeros_that_hardly_change_are_not_told(by: float) -> None:
+    runs = [_run(k, 0.0) for k in range(3)]
+    reading = runs[1].sensors[0]
+    values = reading.values + SPAN_MBAR * by * (runs[1].time_s >= 14.0)
+    sessions = _sessions(runs[0], runs[1].with_channel(replace(reading, values=values)), runs[2])
+    assert with_likelier_gains(_state(CURVED, sessions), sessions) is None
+
+
 @pytest.mark.parametrize("is_changed", [True, False])
 def test_what_a_column_takes_off_a_score_is_what_the_score_with_it_says(is_changed: bool) -> None:
     """A step beside a gain, or two gains apart, whose priors differ a little: nearly the same evidence."""
@@ -210,5 +267,5 @@ def test_of_many_recordings_no_changes_are_asked_for(monkeypatch: pytest.MonkeyP
     sessions = _sessions(*(_run(k, 0.0) for k in range(13)))
     state = _state(CURVED, sessions)
     monkeypatch.setattr(Evidence, "falls_beside", lambda *given: pytest.fail("asked for"))
-    gained = _Gained.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions])
+    gained = _Gained.of(state, [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions], SD)
     assert with_changes(state, gained) is gained

@@ -101,6 +101,37 @@ def test_it_ends_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (end.itself, fits) == (ever[_settling.ROUNDS - 1].itself, _settling.ROUNDS)
 
 
+@pytest.mark.parametrize(
+    ("found", "likely", "one_is"), [("ab", True, True), ("ab", False, False), ("a", True, False), ("", True, False)]
+)
+def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several(
+    monkeypatch: pytest.MonkeyPatch, found: str, likely: bool, one_is: bool
+) -> None:
+    """Of the two likeliest alone the one that follows better; where fewer than two were found nothing is done."""
+    worth_of = {"x": 20.0, "y": 5.0}
+    begun: Any = SimpleNamespace(
+        start=(), given=None, fit=SimpleNamespace(model=SimpleNamespace(names=(), parts=(), relaxing_share=0.1)),
+        evidence=SimpleNamespace(posterior=lambda members: members[0]),
+    )  # fmt: skip
+    model = SimpleNamespace(names=tuple(found), parts=tuple(found), relaxing_share=0.1)
+    state: Any = SimpleNamespace(
+        fit=SimpleNamespace(model=model), likelihood=lambda sessions: None, thresholds=STANDARD
+    )
+    said: list[str] = []
+    monkeypatch.setattr(_settling, "additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
+    monkeypatch.setattr(_settling, "with_members", lambda given, one, model, likelihood: one)
+    monkeypatch.setattr(
+        _settling, "fit",
+        lambda likelihood, one: SimpleNamespace(cost=worth_of[one], model=SimpleNamespace(names=(one,))),
+    )  # fmt: skip
+    monkeypatch.setattr(_settling, "_is_simpler", lambda other, state, sessions: likely)
+    monkeypatch.setattr(_settling, "state_at", lambda found, sessions, thresholds: found.model.names)
+    monkeypatch.setattr(_settling, "better_from", lambda begun, state, sessions, progress: begun)
+    told = _settling.better_from_one(begun, state, [], said.append)
+    assert told == (("y",) if one_is else state)
+    assert said == (["beginning anew from y"] if one_is else [])
+
+
 @pytest.mark.parametrize(("names", "apart", "joins"), [("ba", 0.9, True), ("ba", 1.1, False), ("ac", 0.0, False)])
 def test_a_fit_that_comes_upon_a_known_way_ends_where_that_did(
     monkeypatch: pytest.MonkeyPatch, names: str, apart: float, joins: bool

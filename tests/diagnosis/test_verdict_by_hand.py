@@ -15,7 +15,7 @@ from smartshoe.diagnosis import _inference, _zero
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
-from smartshoe.diagnosis._own_gains import OwnGain, changes_of
+from smartshoe.diagnosis._own_gains import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
@@ -28,6 +28,7 @@ from smartshoe.diagnosis._verdict import (
     past_of,
     verdict_of,
     worse_of,
+    zero_changes_said,
 )
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
 from smartshoe.models.effects import effect
@@ -100,6 +101,16 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
         assert said("delay", replace(MODEL, **arm), 0.08) is None  # late as well
     inside = {key: 0.99 * value + 0.01 * getattr(MODEL, key) for key, value in arm.items()}
     assert said("second_relaxation", replace(MODEL, **inside)) is None  # type: ignore[arg-type]
+
+
+def test_a_block_that_follows_what_no_law_does_is_said_and_not_named_but_by_a_law_in_its_place() -> None:
+    model = MODEL.with_part("flexible_lag", np.array([0.03, -0.9])).with_part("flexible_set")
+    block = SimpleNamespace(effect=effect("sensor_lag"), member=SimpleNamespace(name="flexible_lag"), by=None)
+    assert "the reading comes later one way than the other" in str(other_kind_of(block, model))  # type: ignore[arg-type]
+    block.by = "a law that misses little"
+    assert other_kind_of(block, model) is None  # type: ignore[arg-type]
+    kind = SimpleNamespace(effect=effect("permanent_set"), member=SimpleNamespace(name="flexible_set"), by=None)
+    assert other_kind_of(kind, model) is None  # type: ignore[arg-type]
 
 
 def _named(name: str) -> Any:
@@ -322,3 +333,13 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
         " d and 1 times more, as where a unit slips or is set anew:"
     )
+
+
+def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
+    changes = [ZeroChange("a", 7.5 * k, 0.03 / k) for k in range(1, 7)]
+    (said,) = zero_changes_said(changes)
+    assert said.startswith(
+        "the zero changes, in shares of full scale, by +3 % at 7.5 s in a, by +1.5 % at 15 s in a, by +1 % at 22.5 s in"
+        " a, by +0.75 % at 30 s in a and 2 times more, as where a unit slips or water moves in a line:"
+    )
+    assert zero_changes_said([]) == []

@@ -21,7 +21,7 @@ STANDARD = Thresholds()
 
 def candidate(name: str, slot: str = "", sign: float = 1.0, **of: Any) -> Any:
     """Of a strength that may be as large as it likes on one side of null only."""
-    made = SimpleNamespace(name=name, is_flexible=False, is_memoryless=False, parameters=())
+    made = SimpleNamespace(name=name, is_flexible=False, is_memoryless=False, parameters=(), why_unnamed="")
     made.__dict__.update(of)
     return SimpleNamespace(
         name=name, slot=slot or name, effect=made, columns=(1,),

@@ -178,6 +178,7 @@ class Effect(ABC):
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
     ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause;
     ``is_refinement`` where it follows members of other families too, and so tells no kind.
+    ``why_unnamed``: of a block that follows what no law of the catalogue does, what the reading then does.
     ``is_steep_undone``: True where half a spacing of single precision in a signal moves the load by 3e-7 of full scale.
     ``is_memoryless``: True where the reading is a function of the present load alone.
     ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
@@ -202,6 +203,7 @@ class Effect(ABC):
     is_leak: ClassVar[bool] = False
     why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False
+    why_unnamed: ClassVar[str] = ""
     is_memoryless: ClassVar[bool] = False
     bends_beside_arm: ClassVar[bool] = False
     imitates: ClassVar[str] = ""

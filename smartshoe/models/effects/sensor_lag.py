@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects.effect import Conditions, CStep, Effect, EffectParameter, Inverse
+from smartshoe.models.effects._one_pole import Lead, lagged
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -45,11 +41,11 @@ class SensorLag(Effect):
         if tau == 0.0:
             return signal.copy()
         step_s = float(conditions.step_s)
-        slow = _lagged(signal, step_s / ((1.0 - r) * tau))
+        slow = lagged(signal, step_s / ((1.0 - r) * tau))
         if r * tau == 0.0:
             return slow
         # In partial fractions, since only what goes into the first pole is known between samples.
-        fast = _lagged(signal, step_s / (r * tau))
+        fast = lagged(signal, step_s / (r * tau))
         return slow + (r / (1.0 - 2.0 * r)) * (slow - fast)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
@@ -59,73 +55,5 @@ class SensorLag(Effect):
         it rings at half the sampling rate and raises noise thirty times as much.
         """
         tau, r = (float(value) for value in values)
-        return _Lead((1.0 - r) * tau / step_s, r * tau / step_s)
-
-
-NODES = np.array([-2.0, -1.0, 0.0, 1.0])  # samples that the cubic from -1 to 0 passes through
-CUBICS = np.linalg.inv(np.vander(NODES, increasing=True))  # (power, node): the polynomial of each sample's value
-POINTS, WEIGHTS = (0.5 * values for values in np.polynomial.legendre.leggauss(12))  # on -1/2 ... 1/2
-POWERS = (POINTS - 0.5) ** np.arange(4)[:, None]  # (power, point): of s between -1 and 0
-
-
-def _weights(x: float) -> Array:
-    """(4,) of the samples at `NODES` in w(0) = exp(-x) w(-1) + integral of x exp(x s) u(s) from -1 to 0."""
-    if x < 2.0:
-        moments = np.sum(WEIGHTS * x * np.exp(x * POWERS[1]) * POWERS, axis=1)
-    else:
-        decay, moments = math.exp(-x), np.empty(4)
-        moments[0] = 1.0 - decay
-        for i in range(1, 4):
-            moments[i] = -((-1.0) ** i) * decay - i / x * moments[i - 1]
-    return np.asarray(moments @ CUBICS)
-
-
-def _lagged(u: Array, x: float) -> Array:
-    """w (n,) of w' = (u - w) x, the step being 1, from w = u before the first sample."""
-    from smartshoe.kernels.linear_filter import linear_filter
-
-    if u.size < 2:
-        return u.copy()
-    padded = np.concatenate([[u[0], u[0]], u, [2.0 * u[-1] - u[-2]]])
-    drive = np.convolve(padded, _weights(x)[::-1], "valid")
-    decay = math.exp(-x)
-    drive[0] = (1.0 - decay) * u[0]
-    return linear_filter([1.0], [1.0, -decay], drive, [decay * u[0]])[0]
-
-
-class _Lead(Inverse):
-    """Two leads in a row, their times in steps."""
-
-    def __init__(self, slow: float, fast: float) -> None:
-        self.slow, self.fast = slow, fast
-        self.reset()
-
-    def reset(self) -> None:
-        self._last: tuple[float, float] | None = None
-
-    def push(self, signal: Array, time_s: Array) -> Array:
-        if signal.size == 0:
-            return signal.copy()
-        first, second = self._last or (float(signal[0]), float(signal[0]))
-        between = signal + self.slow * np.diff(signal, prepend=first)
-        self._last = float(signal[-1]), float(between[-1])
-        return between + self.fast * np.diff(between, prepend=second)
-
-    def c_step(self, name: str) -> CStep:
-        first, second, begun = f"{name}_first", f"{name}_second", f"{name}_begun"
-        body = f"""{{
-    const double lagged = x;
-    if (f->{begun} <= 0.0) {{
-        f->{first} = x;
-        f->{second} = x;
-        f->{begun} = 1.0;
-    }}
-    x += {c_number(self.slow)} * (x - f->{first});
-    f->{first} = lagged;
-    {{
-        const double between = x;
-        x += {c_number(self.fast)} * (x - f->{second});
-        f->{second} = between;
-    }}
-}}"""
-        return CStep({first: 0.0, second: 0.0, begun: 0.0}, body)
+        slow = (1.0 - r) * tau / step_s
+        return Lead(slow, slow, r * tau / step_s)
