@@ -102,7 +102,7 @@ def infer(
     if lawful is not state:
         state = law_or_block(settled(lawful, sessions, progress), state, sessions)
     if (gained := with_likelier_gains(state, sessions)) is not None:
-        progress("giving each recording a gain of its own")
+        progress("going through it again beside what recordings have of their own")
         beside = infer(start, gained, thresholds, progress)
         if not (beside.own_gains or beside.zero_changes):
             about = gained, beside.fit.model

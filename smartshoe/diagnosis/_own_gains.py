@@ -97,18 +97,23 @@ class _Gained:
 def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[Session] | None:
     """The same sessions with gains of their own where these are told, else with what changes at moments; else None.
 
-    Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise.
+    Beside gains of their own, changes are looked for in what is found then: a drift would be steps otherwise. A single
+    recording has no gain of its own.
     """
     if any(one.gain_changes or one.zero_changes for one in sessions) or not may_differ(state, sessions):
         return None
-    found = _Gained(sessions, state.evidence, state.start)
-    noise_sd, own_gain_sd = state.evidence.noise_sd, state.thresholds.strength_sd
-    gained = _Gained.of(state, [replace(one, own_gain_sd=own_gain_sd) for one in sessions], noise_sd)
-    if not sessions[0].own_gain_sd and are_told(state, found, gained):
-        return gained.sessions
-    changing = with_changes(state, gained)
-    by_gain = changing.sessions if changing is not gained and are_told(state, found, changing) else None
-    jumping = _with_jumping_zeros(state, sessions, (gained, changing))
+    rivals: list[_Gained] = []
+    by_gain = None
+    if len(_fitted(sessions)) > 1:
+        found = _Gained(sessions, state.evidence, state.start)
+        own_gain_sd = state.thresholds.strength_sd
+        gained = _Gained.of(state, [replace(one, own_gain_sd=own_gain_sd) for one in sessions], found.evidence.noise_sd)
+        if not sessions[0].own_gain_sd and are_told(state, found, gained):
+            return gained.sessions
+        changing = with_changes(state, gained)
+        by_gain = changing.sessions if changing is not gained and are_told(state, found, changing) else None
+        rivals = [gained, changing]
+    jumping = _with_jumping_zeros(state, sessions, rivals)
     return by_gain if jumping is None else jumping.sessions
 
 
@@ -149,12 +154,12 @@ def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
 
 
 def may_differ(state: State, sessions: Sequence[Session]) -> bool:
-    """Whether gains may be what is wrong: of several recordings of which none carries on from another.
+    """Whether gains or zeros of their own may be what is wrong: of recordings of which none carries on from another.
 
     More is left than small imperfections of a good unit add up to, or something was found that goes with cycles.
     """
     fitted = _fitted(sessions)
-    if len(fitted) < 2 or any("continues" in one.recording.metadata for one in fitted):
+    if any("continues" in one.recording.metadata for one in fitted):
         return False
     goes_with_cycles = any(part.effect.needs_cycles for part in state.fit.model.parts)
     return goes_with_cycles or _left_by(state.fit.model, fitted, state.thresholds) > state.thresholds.tolerable

@@ -143,7 +143,7 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
     found = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
     assert found.own_gains == ("changing", "settled first")  # those that were told at last
     assert asked == ["shared", "own", "changing"]
-    assert "giving each recording a gain of its own" in flow.said
+    assert "going through it again beside what recordings have of their own" in flow.said
     assert (found.fit.model, found.members) == ("settled first", (0.9,))
     stands = [False, True]
     other = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]

@@ -87,3 +87,19 @@ def test_zeros_that_jump_are_told_with_their_moments_and_nothing_is_sure_beside_
     assert not _sure(found)
     assert found.extended is not None
     assert found.extended.rmse <= found.baseline.rmse * (1.0 + 1e-9)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("effects", [{}, {"wall_hardening": 1.0}, {"zero_drift": 1.0}, {"linear_leak": 1.0}])
+@pytest.mark.parametrize("seed", [54, 55])
+@pytest.mark.parametrize("jumps", [(), JUMPS[0]])
+def test_jumps_of_a_single_recording_are_told_but_for_the_cycle_that_is_held_out(
+    seed: int, effects: dict[str, float], jumps: tuple[tuple[float, float], ...]
+) -> None:
+    one = within_reach(effects, PLAIN[seed % len(PLAIN)], seed, recordings=2).recordings[0]
+    found = diagnose(_jumped(one, jumps) if jumps else one)
+    said = " ".join(one for one in found.limits if one.startswith("the zero changes"))
+    told = [(float(at) - one.time_s[0]) / np.ptp(one.time_s) for at in re.findall(r"at ([0-9.]+) s in", said)]
+    assert bool(told) is bool(jumps)
+    for at, _ in jumps:
+        assert min(abs(when - at) for when in told) < 0.1
+    assert not (jumps and _sure(found))
