@@ -91,9 +91,7 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     kind = probability_of_kind(one, left, thresholds)
     is_sure = kind >= thresholds.least_confidence
     by = _law_in_its_place(one)
-    # What is of no kind but a law's departure is that law, however far laws depart.
-    most = thresholds.law_departure if one.effect.why_unnamed else thresholds.departure
-    if by is not None and by.margin <= most**2 * one.fall:
+    if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
         followed = catalogue()[str(by.effect)]
         kin = _kin_of(followed)

@@ -240,7 +240,7 @@ def _diagnosed(
         is_unsteady=bool(found.zero_changes),
         alone=found.alone,
     )
-    unclear = [(one, said) for one in names if (said := other_kind_of(one, extended))]
+    unclear = [(one, said) for one in names if (said := other_kind_of(one, extended, thresholds))]
     unnamed = max((one.member.size for one, _ in unclear), default=0.0)
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = _less(names, unclear)

@@ -39,11 +39,14 @@ def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds:
     )
 
 
-def other_kind_of(name: Name, model: ExtendedModel) -> str | None:
-    """What is said of an effect that follows best where it is of another kind, or is the wall's own arm."""
+def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> str | None:
+    """What is said of an effect that follows best where it is of another kind, or is the wall's own arm.
+
+    A block of what no law does is one where it differs from a law by more than laws do.
+    """
     told = name.effect.name.replace("_", " ")
     part = model.part(name.member.name)
-    if part.effect.why_unnamed and name.by is None:
+    if part.effect.why_unnamed and name.by is None and part.effect.departs_by(part.values) > thresholds.law_departure:
         return f"the reading {part.effect.why_unnamed}, which no effect of the catalogue does, so that it is not named"
     if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]

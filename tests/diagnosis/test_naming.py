@@ -256,16 +256,6 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
     assert told[1].confidence == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
 
 
-def test_a_block_of_no_kind_has_the_name_of_a_law_that_departs_as_far_as_laws_do() -> None:
-    """A lag that differs by direction is that of a law that misses up to 40 % of it, and of none beyond."""
-    (block,) = blocks()["timing"]
-    for missed, is_law in ((0.99, True), (1.01, False)):
-        margin = missed * STANDARD.law_departure**2 * 100.0
-        one = member(block, fall=100.0, laws=(("sensor_lag", margin), ("delay", 2.0 * margin)))
-        (name,) = names_of([one], 0.0, STANDARD)
-        assert (name.effect.name, name.by is not None) == ("sensor_lag", is_law)
-
-
 def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
     sure = member("play_hysteresis", size=0.05)
     assert only(names_of([sure], 0.0, STANDARD)).confidence > 0.5

@@ -75,7 +75,7 @@ def test_an_effect_is_not_named_where_it_turns_into_one_of_another_kind(
     name: str, inside: list[float], at_bound: list[float] | None, told: str
 ) -> None:
     def said(values: list[float]) -> str | None:
-        return other_kind_of(_named(name), MODEL.with_part("linear_leak", [0.001]).with_part(name, values))
+        return other_kind_of(_named(name), MODEL.with_part("linear_leak", [0.001]).with_part(name, values), STANDARD)
 
     assert said(inside) is None
     if at_bound is not None:
@@ -92,7 +92,7 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
         values = (
             [0.1, 0.3] if name in ("second_relaxation", "power_law_creep") else [early_s if name == "delay" else 0.001]
         )
-        return other_kind_of(_named(name), model.with_part(name, values))
+        return other_kind_of(_named(name), model.with_part(name, values), STANDARD)
 
     for name in ("second_relaxation", "power_law_creep", "linear_leak", "delay"):
         assert said(name, MODEL) is None
@@ -104,13 +104,18 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
 
 
 def test_a_block_that_follows_what_no_law_does_is_said_and_not_named_but_by_a_law_in_its_place() -> None:
-    model = MODEL.with_part("flexible_lag", np.array([0.03, -0.9])).with_part("flexible_set")
-    block = SimpleNamespace(effect=effect("sensor_lag"), member=SimpleNamespace(name="flexible_lag"), by=None)
-    assert "the reading comes later one way than the other" in str(other_kind_of(block, model))  # type: ignore[arg-type]
+    block: Any = SimpleNamespace(effect=effect("sensor_lag"), member=SimpleNamespace(name="flexible_lag"), by=None)
+
+    def said(direction: float) -> str | None:
+        return other_kind_of(block, MODEL.with_part("flexible_lag", np.array([0.03, direction])), STANDARD)
+
+    for sign in (-1.0, 1.0):
+        assert "the reading comes later one way than the other" in str(said(sign * 1.01 * STANDARD.law_departure))
+        assert said(sign * 0.99 * STANDARD.law_departure) is None  # a law departs as far
     block.by = "a law that misses little"
-    assert other_kind_of(block, model) is None  # type: ignore[arg-type]
-    kind = SimpleNamespace(effect=effect("permanent_set"), member=SimpleNamespace(name="flexible_set"), by=None)
-    assert other_kind_of(kind, model) is None  # type: ignore[arg-type]
+    assert said(0.9) is None
+    kind: Any = SimpleNamespace(effect=effect("permanent_set"), member=SimpleNamespace(name="flexible_set"), by=None)
+    assert other_kind_of(kind, MODEL.with_part("flexible_set"), STANDARD) is None
 
 
 def _named(name: str) -> Any:

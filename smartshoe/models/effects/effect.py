@@ -238,6 +238,10 @@ class Effect(ABC):
         """Whether it goes with time, or with what was borne so far, by what its neighbours are told from it."""
         return any(words & CLOCK for words in self.separated_by.values())
 
+    def departs_by(self, values: Array) -> float:
+        """Of a block that follows what no law does: by what share of itself it differs from a law."""
+        return 1.0
+
     def delay_s(self, values: Array) -> float:
         """The constant time by which it makes a reading late, and which a whole recording can be shifted back by."""
         return 0.0

@@ -38,6 +38,10 @@ class FlexibleLag(Effect):
         step_s = float(conditions.step_s)
         return lagged_by_direction(signal, step_s / ((1.0 + direction) * tau), step_s / ((1.0 - direction) * tau))
 
+    def departs_by(self, values: Array) -> float:
+        """By the direction's share."""
+        return abs(float(values[1]))
+
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """P = y + T y', T by the sign of the slope since the last sample; exact for steady ramps."""
         tau, direction = (float(value) for value in values)
