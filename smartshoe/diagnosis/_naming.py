@@ -61,10 +61,9 @@ def names_of(
     A flexible block, and a curve that lies where its kind ends, is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
-    if is_clocked:
-        likely = [_doubted(name) if name.effect.goes_with_the_clock else name for name in likely]
-    if is_unsteady:
-        likely = [_doubted(name) for name in likely]
+    likely = [
+        _doubted(name) if is_unsteady or (is_clocked and name.effect.goes_with_the_clock) else name for name in likely
+    ]
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
         is_firm = not is_clocked and any(one.confidence >= thresholds.least_confidence for one in likely)

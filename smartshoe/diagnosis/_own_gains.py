@@ -8,13 +8,13 @@ of what changes at a moment. So such gains, and zeros, are weighed against what 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.arrays import Index
+from smartshoe.arrays import Array, Index
 from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
@@ -170,22 +170,23 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
 
     Of many recordings each is short, and gains of their own are all that is asked.
     """
-    model, count = state.given.model, len(_fitted(gained.sessions))
-    for _ in range(MOST_CHANGES * count if count <= MOST_FOLDS else 0):
-        fitted = _fitted(gained.sessions)
-        moments = [_moments_of(one) for one in fitted]
-        columns = [np.zeros((one.reading.size, MOMENTS * count), order="F") for one in fitted]
-        for k, one in enumerate(fitted):
-            by = state.thresholds.strength_sd if of_zero else one.own_gain_sd * model.simulate(one.conditions)
-            is_after = np.arange(one.reading.size)[:, None] >= moments[k]
-            columns[k][:, MOMENTS * k : MOMENTS * (k + 1)] = (by * is_after.T).T
+    fitted = _fitted(gained.sessions)
+    if len(fitted) > MOST_FOLDS:
+        return gained
+    columns = [np.zeros((one.reading.size, MOMENTS * len(fitted)), order="F") for one in fitted]
+    for k, one in enumerate(fitted):
+        by = state.thresholds.strength_sd if of_zero else one.own_gain_sd * state.given.model.simulate(one.conditions)
+        is_after = np.arange(one.reading.size)[:, None] >= _moments_of(one)
+        columns[k][:, MOMENTS * k : MOMENTS * (k + 1)] = (by * is_after.T).T
+    for _ in range(MOST_CHANGES * len(fitted)):
         falls = gained.evidence.falls_beside(gained.kept, columns)
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
-        changed = _changed(fitted[k], int(moments[k][j]), of_zero=of_zero)
-        changed_too = [changed if one is fitted[k] else one for one in gained.sessions]
-        gained = _Gained.of(state, changed_too, gained.evidence.noise_sd)
+        one = _fitted(gained.sessions)[k]
+        changed = _changed(one, int(_moments_of(one)[j]), of_zero=of_zero)
+        sessions = [changed if other is one else other for other in gained.sessions]
+        gained = _Gained.of(state, sessions, gained.evidence.noise_sd)
     return gained
 
 
@@ -241,23 +242,29 @@ def foretells(
 
 def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain, ...]:
     """The gains of the fitted recordings, in order."""
-    found = []
-    for one in _fitted(sessions):
-        own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
-        for at, gain in zip((0, *one.gain_changes) if one.own_gain_sd else (), own[2:], strict=False):
-            found.append(OwnGain(one.recording.name, _time_s(one, at), one.own_gain_sd * float(gain), at > 0))
-    return tuple(found)
+    return tuple(
+        OwnGain(one.recording.name, _time_s(one, at), one.own_gain_sd * float(gain), at > 0)
+        for one, gains, _ in _own_of_each(sessions, model)
+        for at, gain in zip((0, *one.gain_changes), gains, strict=False)  # none where all share one
+    )
 
 
 def zero_changes_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[ZeroChange, ...]:
     """Where the zero of a fitted recording changes: when, and by what, the largest first."""
-    found = []
+    found = (
+        ZeroChange(one.recording.name, _time_s(one, at), float(share))
+        for one, _, steps in _own_of_each(sessions, model)
+        for at, share in zip(one.zero_changes, steps, strict=True)
+    )
+    return tuple(sorted(found, key=lambda one: -abs(one.share)))
+
+
+def _own_of_each(sessions: Sequence[Session], model: ExtendedModel) -> Iterator[tuple[Session, Array, Array]]:
+    """Each fitted recording with its own gains (k,) and the changes of its zero (l,)."""
     for one in _fitted(sessions):
         own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
-        steps = own[own.size - len(one.zero_changes) :]
-        for at, share in zip(one.zero_changes, steps, strict=True):
-            found.append(ZeroChange(one.recording.name, _time_s(one, at), float(share)))
-    return tuple(sorted(found, key=lambda one: -abs(one.share)))
+        gains, steps = np.split(own[2:], [len(one.gain_parts)])
+        yield one, gains, steps
 
 
 def _time_s(session: Session, at: int) -> float:

@@ -24,7 +24,7 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.extended import ExtendedModel
 
-SAID = 4  # changes of a gain that are said one by one
+SAID = 4  # changes of a gain, or a zero, that are said one by one
 
 
 def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds: Thresholds) -> str | None:

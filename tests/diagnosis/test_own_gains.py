@@ -217,7 +217,7 @@ def test_zeros_that_change_are_told_with_the_moment_and_are_no_gains() -> None:
 
 
 def test_beside_gains_an_extension_must_follow_and_beside_changes_it_must_foresee() -> None:
-    """The curve is there, an offset of 2 % of full scale in one recording of three is not in what is left out."""
+    """A curve that is there is worth more either way, a set that is not there is worth no quarter of what is left."""
     runs = [_run(k, gain) for k, gain in enumerate((0.01, -0.005, -0.005))]
     sessions = _sessions(*runs)
     gained = [replace(one, own_gain_sd=STANDARD.strength_sd) for one in sessions]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, log2
@@ -65,10 +65,10 @@ class IntegerChain:
     leaving: tuple[int, int]
 
     @classmethod
-    def of(cls, filter_: ExtendedCompensator, ends: str = "") -> IntegerChain:
+    def of(cls, filter_: ExtendedCompensator, ends: Set[str] = frozenset()) -> IntegerChain:
         """The chain of ``filter_`` from its start; raises `UsageError` for C that has no integer form.
 
-        ``ends``: the function by which integers come in and go out; '' where these are floats.
+        ``ends``: functions by which integers come in and go out; none where these are floats.
         """
         steps = filter_.c_steps(single=True)
         timed = any(reads_time(step.body) for _, step in steps)
@@ -79,7 +79,7 @@ class IntegerChain:
         return cls(
             fraction=to.fraction,
             blocks=tuple((name, _in_integers(to, name, one)) for name, one in steps),
-            functions=functions_text(to.used | {"times_q"} | ({ends} if ends else set()), to.fraction),
+            functions=functions_text(to.used | {"times_q"} | ends, to.fraction),
             clock=(start, step, min((MOST - start) // step, 2**32 - 2)) if timed else None,
             widest=WIDEST * to.one,
             entry=(to.count(Fraction(2) ** above / Fraction(share)), above),
@@ -128,7 +128,7 @@ class FixedChain(IntegerFilter):
         finite = model.test_readings[np.isfinite(model.test_readings)]
         input_lsb = power_of_two(HEADROOM[fixed] * max(float(np.abs(finite).max()), share) / (2**width - 1))
         output_lsb = power_of_two(HEADROOM[fixed] * full_scale_n / (2**width - 1))
-        chain = IntegerChain.of(filter_, "rounded_q")
+        chain = IntegerChain.of(filter_, {"rounded_q"})
         unit = Fraction(input_lsb) / Fraction(filter_.reading_per_share) * 2**chain.fraction
         entry = Scaled.of(unit, 2**width)
         if entry is None:

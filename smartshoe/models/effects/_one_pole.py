@@ -57,7 +57,7 @@ def _drive(u: Array, x: float) -> Array:
 
 
 class Lead(Inverse):
-    """Two leads in a row, their times in steps; the first one's where what came out ``rising`` and ``falling``."""
+    """Two leads in a row, their times in steps: the first one's while the signal is ``rising`` or ``falling``."""
 
     def __init__(self, rising: float, falling: float, fast: float) -> None:
         self.rising, self.falling, self.fast = rising, falling, fast
