@@ -30,7 +30,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, cycle
+from itertools import combinations, cycle, pairwise
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -46,6 +46,7 @@ from smartshoe.diagnosis._sensitivity import (
     ridged,
     where,
 )
+from smartshoe.diagnosis._session import Session
 
 Members = tuple[int, ...]
 
@@ -72,6 +73,29 @@ class _Columns:
 
     seen: Sequence[Array]
     past: Sequence[Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """What a session's ``by`` (n,) adds from each of ``starts`` (k,) on, both counted over what is fitted."""
+
+    by: Array
+    starts: Index
+
+    @classmethod
+    def of(cls, session: Session, by: Array, moments: Index) -> Steps:
+        """``by`` (n,) and ``moments`` (k,) of all samples, in order."""
+        return cls(by[session.fitted], np.searchsorted(np.flatnonzero(session.fitted), moments))
+
+    def products(self, columns: Array) -> Array:
+        """(m, k) inner products with columns (n, m)."""
+        parts = [columns[a:b].T @ self.by[a:b] for a, b in pairwise((*self.starts, self.by.size))]
+        return np.asarray(np.cumsum(np.stack(parts[::-1], axis=1), axis=1)[:, ::-1])
+
+    @property
+    def power(self) -> Array:
+        """(k,) sums of squares."""
+        return np.asarray(self.products(self.by[:, None])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,26 +282,32 @@ class Evidence:
         free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
         return self.posterior(members).score - float(sum(free))
 
-    def falls_beside(self, members: Members, columns: Sequence[Array]) -> Array:
-        """By how much a set's score falls (k,) with each of further ``columns`` (n, k) a session, of unit prior."""
-        added = self._columns(columns)
-        cross = self._between(self._all, added)
+    def falls_beside(self, members: Members, steps: Sequence[Steps]) -> Array:
+        """By how much a set's score falls with each of the sessions' ``steps``, in order, of unit prior."""
+        past = [one.products(own) for one, own in zip(steps, self.given.past, strict=True)]
+        cross = self._with_steps(self._all, steps, past)
         half = self._taken_out(cross)
         free = cross - self._half.T @ half
         best = self.posterior(members)
         index, sds = self._widened(best.members, best.strengths)
         departures = [self._departures[member] for member in best.members]
         strengths = index[: index.size - self._directions * len(departures)]
-        also = [self._between(one.columns, added) - one.half.T @ half for one in departures]
+        also = [self._with_steps(one.columns, steps, past) - one.half.T @ half for one in departures]
         beside = sds[:, None] * np.vstack([free[strengths], *also])
         factor, pull, _ = self._moved(index, sds)
         taken = solve_triangular(factor, beside, lower=True, check_finite=False) if index.size else beside
-        power = np.sum([np.einsum("nk,nk->k", part, part) for part in added.seen], axis=0)
-        for past, inverse in zip(added.past, self._inverse, strict=True):
-            power -= np.einsum("kl,lm,km->k", past, inverse, past)
-        left = np.maximum(power / self.noise_sd**2 - np.sum(half**2, axis=0) - np.sum(taken**2, axis=0), 0.0)
+        each = zip(steps, past, self._inverse, strict=True)
+        power = [one.power - np.einsum("lk,lm,mk->k", own, inverse, own) for one, own, inverse in each]
+        alone = np.concatenate(power) / self.noise_sd**2
+        left = np.maximum(alone - np.sum(half**2, axis=0) - np.sum(taken**2, axis=0), 0.0)
         asked = free[0] - beside.T @ pull
         return np.asarray(asked**2 / (1.0 + left) - np.log1p(left))
+
+    def _with_steps(self, columns: _Columns, steps: Sequence[Steps], past: Sequence[Array]) -> Array:
+        """`_free` of columns and all ``steps``, whose products with their sessions' nuisances are ``past``."""
+        each = zip(columns.seen, columns.past, steps, past, self._inverse, strict=True)
+        parts = [one.products(seen) - own @ inverse @ beside for seen, own, one, beside, inverse in each]
+        return np.hstack(parts) / self.noise_sd**2
 
     @cached_property
     def of_whole_effects(self) -> Evidence:
@@ -339,7 +369,7 @@ class Evidence:
     def _moved(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
         """Factor of I + D R, its solution (k,) of D q, and by how much -2 log evidence falls; D by halves each side."""
         inner = self._reduced[index[:, None], index] * (sds[:, None] * sds)
-        inner[np.diag_indices_from(inner)] += 1.0
+        inner.flat[:: index.size + 1] += 1.0
         factor = _factor(inner)
         asked = sds * self._reduced[index, 0]
         pull = np.asarray(dpotrs(factor, asked, lower=1)[0]) if index.size else asked

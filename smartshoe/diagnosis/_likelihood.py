@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged, where
@@ -26,7 +27,10 @@ LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped i
 def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) -> Array:
     """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`."""
     reading, slopes = model.sensitivities(session.conditions, trace)
-    return np.column_stack([session.reading - reading, slopes])
+    rows = np.empty((reading.size, 1 + slopes.shape[1]), order="F")
+    rows[:, 0] = session.reading - reading
+    rows[:, 1:] = slopes
+    return rows
 
 
 class Likelihood:
@@ -38,7 +42,7 @@ class Likelihood:
         self.sessions = tuple(session for session in sessions if session.fitted.any())
         self.noise_sd = noise_sd
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
-        self._rows: list[Array] = []  # what is left and its slopes, a session, where they were last asked for
+        self._rows: list[Array] = []  # `rows_of` where they were last asked for, with room for one column more
         self._scales = np.zeros(0)
         self._precision = [nuisance_precision(session, like, thresholds) for session in self.sessions]
         self._pole_per_s = math.nan
@@ -51,7 +55,7 @@ class Likelihood:
             return
         self._pole_per_s = model.pole_per_s
         pasts = [
-            nuisances(one, model.pole_per_s, one.reading - rest)[one.fitted] / self.noise_sd
+            where(one.fitted, nuisances(one, model.pole_per_s, one.reading - rest)) / self.noise_sd
             for one, rest in zip(self.sessions, left, strict=True)
         ]
         inner = [ridged(past.T @ past + precision) for past, precision in zip(pasts, self._precision, strict=True)]
@@ -79,7 +83,9 @@ class Likelihood:
         if rows is None:
             known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
             rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
-        self._rows = [one.copy(order="K") for one in rows]  # they are brought up to date in place
+        self._rows = [np.empty((one.shape[0], one.shape[1] + 1), order="F") for one in rows]
+        for own, one in zip(self._rows, rows, strict=True):
+            own[:, :-1] = one  # they are brought up to date in place
         return self._products(model)
 
     def nearly_normal(self, model: ExtendedModel, step: Array) -> tuple[float, Array, Array]:
@@ -92,8 +98,9 @@ class Likelihood:
         weighed = self._scales * step  # each parameter in units of what it does
         for rows, session, (reading, _) in zip(self._rows, self.sessions, known, strict=True):
             left = session.reading - reading
-            missed = rows[:, 0] - left - rows[:, 1:] @ step
-            rows[:, 1:] += np.outer(missed, weighed / max(float(weighed @ step), 1e-300))
+            missed = rows[:, 0] - left - rows[:, 1:-1] @ step
+            for k, share in enumerate(weighed / max(float(weighed @ step), 1e-300), start=1):
+                rows[:, k] += share * missed
             rows[:, 0] = left
         return self._products(model)
 
@@ -107,19 +114,18 @@ class Likelihood:
         return float(total[0, 0]), total[1:, 0], total[1:, 1:]
 
     def _with_memory(self, k: int, rows: Array, model: ExtendedModel) -> Array:
-        """`_gram` of ``rows``, whose slopes over the arm's share and rate take along how what it remembers fades.
+        """`_gram` of all ``rows`` but the last, whose slopes over the arm's share and rate take along how memory fades.
 
         What a session brought along, c exp(-p t), moves with the pole p = a/(1 + kappa) by -c t exp(-p t).
         """
         session = self.sessions[k]
-        seen = self._past[k].T @ rows[session.fitted, 0] / self.noise_sd
+        seen = self._past[k].T @ where(session.fitted, rows[:, :1])[:, 0] / self.noise_sd
         brought = float(self._inverse[k][1] @ seen)
         time_s = session.conditions.time_s - session.conditions.time_s[0]
-        moved = -brought * time_s * np.exp(-self._pole_per_s * time_s)
-        by = np.zeros(rows.shape[1])
-        by[2:4] = np.array([-model.pole_per_s, 1.0]) / (1.0 + model.relaxing_share)
-        turn = np.vstack([np.eye(by.size), by])
-        return np.asarray(turn.T @ self._gram(k, np.column_stack([rows, moved])) @ turn)
+        rows[:, -1] = -brought * time_s * np.exp(-self._pole_per_s * time_s)
+        turn = np.eye(rows.shape[1], rows.shape[1] - 1)
+        turn[-1, 2:4] = np.array([-model.pole_per_s, 1.0]) / (1.0 + model.relaxing_share)
+        return np.asarray(turn.T @ self._gram(k, rows) @ turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,10 +251,14 @@ def _bounded_step(
         index = np.flatnonzero(free)
         if not index.size:
             break
-        part = normal[np.ix_(index, index)] + damping * np.diag(diagonal[index])
-        root = np.sqrt(np.diag(part))
+        root = np.sqrt((1.0 + damping) * diagonal[index])
+        part = normal[index[:, None], index] / (root[:, None] * root)
+        part.flat[:: index.size + 1] = 1.0
+        found, failed = dposv(part, right[index] / root, lower=1)[1:]
+        if failed:  # rounding has made it indefinite
+            found = np.linalg.lstsq(part, right[index] / root, rcond=1e-12)[0]
         step[:] = 0.0
-        step[index] = np.linalg.lstsq(part / np.outer(root, root), right[index] / root, rcond=1e-12)[0] / root
+        step[index] = found / root
         step = np.where(logarithmic, np.clip(step, -1.0, 1.0), step)
         outward = ((theta <= low) & (step < 0)) | ((theta >= high) & (step > 0))
         if not (outward & free).any():

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Index
-from smartshoe.diagnosis._evidence import Evidence, Members
+from smartshoe.diagnosis._evidence import Evidence, Members, Steps
 from smartshoe.diagnosis._held_out import own_of, residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._noise import correlated_sd
@@ -173,13 +173,12 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     fitted = _fitted(gained.sessions)
     if len(fitted) > MOST_FOLDS:
         return gained
-    columns = [np.zeros((one.reading.size, MOMENTS * len(fitted)), order="F") for one in fitted]
-    for k, one in enumerate(fitted):
-        by = state.thresholds.strength_sd if of_zero else one.own_gain_sd * state.given.model.simulate(one.conditions)
-        is_after = np.arange(one.reading.size)[:, None] >= _moments_of(one)
-        columns[k][:, MOMENTS * k : MOMENTS * (k + 1)] = (by * is_after.T).T
+    by = [np.full(one.reading.size, state.thresholds.strength_sd) for one in fitted]
+    if not of_zero:
+        by = [one.own_gain_sd * state.given.model.simulate(one.conditions) for one in fitted]
+    steps = [Steps.of(one, own, _moments_of(one)) for one, own in zip(fitted, by, strict=True)]
     for _ in range(MOST_CHANGES * len(fitted)):
-        falls = gained.evidence.falls_beside(gained.kept, columns)
+        falls = gained.evidence.falls_beside(gained.kept, steps)
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)

@@ -93,7 +93,12 @@ def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) ->
     time_s = session.conditions.time_s
     own = [session.own_gain_sd * read * part for part in session.gain_parts]
     steps = [np.arange(time_s.size) >= at for at in session.zero_changes]
-    return np.column_stack([np.ones(time_s.size), np.exp(-pole_per_s * (time_s - time_s[0])), *own, *steps])
+    columns = np.empty((time_s.size, 2 + len(own) + len(steps)), order="F")
+    columns[:, 0] = 1.0
+    np.exp(-pole_per_s * (time_s - time_s[0]), out=columns[:, 1])
+    for k, one in enumerate([*own, *steps], start=2):
+        columns[:, k] = one
+    return columns
 
 
 def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
@@ -195,6 +200,11 @@ def where(mask: Mask, columns: Array) -> Array:
     return columns if mask.all() else np.asfortranarray(columns.T[:, mask].T)
 
 
+def _power(columns: Array) -> Array:
+    """(m,) sums of squares of columns (n, m)."""
+    return np.asarray(np.einsum("nk,nk->k", columns, columns))
+
+
 def _products(seen: Array, past: Array) -> Array:
     cross = seen.T @ past
     return np.block([[seen.T @ seen, cross], [cross.T, past.T @ past]])
@@ -208,7 +218,9 @@ def _without_last(products: Array, count: int) -> Array:
 
 def ridged(inner: Array) -> Array:
     """(k, k) inner products with a trillionth more on the diagonal: columns that are alike can be solved for."""
-    return inner + 1e-12 * max(float(np.trace(inner)), 1e-12) * np.eye(inner.shape[0])
+    held = inner.copy()
+    held.flat[:: inner.shape[0] + 1] += 1e-12 * max(float(np.trace(inner)), 1e-12)
+    return held
 
 
 def cosines(inner: Array) -> Array:
@@ -239,20 +251,27 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     for session in fitted:
         trace = model.trace(session.conditions)
         reading, slopes = model.sensitivities(session.conditions, trace)
-        within = [reading - one.simulate(session.conditions) for one in less]
-        beside = [model.column_of(by, session.conditions, trace) for by in beyond]
-        target = session.reading - reading + sum(within, np.zeros(reading.size))
-        rows.append(np.column_stack([target, slopes[:, :3], *within, *beside]))
-    power = sum(np.sum(part[s.fitted] ** 2, axis=0) for part, s in zip(rows, fitted, strict=True))
+        columns = np.empty((reading.size, place), order="F")
+        columns[:, 0] = session.reading - reading
+        columns[:, 1:4] = slopes[:, :3]
+        for k, without in enumerate(less, start=4):
+            columns[:, k] = reading - without.simulate(session.conditions)
+            columns[:, 0] += columns[:, k]
+        for by, added in zip(beyond, candidates[len(less) :], strict=True):
+            columns[:, list(added.columns)] = model.column_of(by, session.conditions, trace)
+        rows.append(columns)
+    power = np.sum([_power(where(one.fitted, part)) for part, one in zip(rows, fitted, strict=True)], axis=0)
     _refuse_endless(power, candidates)
     count = sum(int(s.fitted.sum()) for s in fitted)
-    scales = np.sqrt(np.asarray(power) / count)
+    scales = np.sqrt(power / count)
     scales[0] = 1.0
     scales[scales == 0] = 1.0
+    for columns in rows:
+        columns /= scales
     return Linearised(
         model,
         fitted,
-        tuple(np.asfortranarray(part / scales) for part in rows),
+        tuple(rows),
         scales,
         3,
         tuple(candidates),
@@ -293,8 +312,7 @@ def departures(given: Linearised, column: Sequence[Array]) -> list[Array]:
         np.multiply(own[:, None], factors, out=part[:, : -len(given.thresholds.memory_s)])
         for k, tau_s in enumerate(given.thresholds.memory_s, start=factors.shape[1]):
             np.subtract(lagged(own, session.conditions.step_s, tau_s), own, out=part[:, k])
-        seen = where(session.fitted, part)
-        power += np.einsum("nk,nk->k", seen, seen)
+        power += _power(where(session.fitted, part))
         size += float(np.sum(own[session.fitted] ** 2))
         out.append(part)
     ratio = np.minimum(np.sqrt(size / np.maximum(power, 1e-300)), 1e6)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -93,7 +94,7 @@ class Session:
         at = np.arange(self.reading.size)
         return tuple((at >= a) & (at < b) for a, b in pairwise((0, *self.gain_changes, at.size)))
 
-    @property
+    @cached_property
     def fitted(self) -> Mask:
         """(n,) the samples that a fit may use."""
         return self.usable & ~self.held_out

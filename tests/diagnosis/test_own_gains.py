@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._evidence import Evidence, Steps
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._own_gains import (
@@ -243,7 +243,7 @@ def test_zeros_that_hardly_change_are_not_told(by: float) -> None:
 
 
 @pytest.mark.parametrize("is_changed", [True, False])
-def test_what_a_column_takes_off_a_score_is_what_the_score_with_it_says(is_changed: bool) -> None:
+def test_what_a_step_takes_off_a_score_is_what_the_score_with_it_says(is_changed: bool) -> None:
     """A step beside a gain, or two gains apart, whose priors differ a little: nearly the same evidence."""
     run = _run(0, 0.02)
     grown = run.sensors[0].values * np.where((run.time_s >= run.time_s[-1] / 3.0) & is_changed, 1.02, 1.0)
@@ -252,12 +252,11 @@ def test_what_a_column_takes_off_a_score_is_what_the_score_with_it_says(is_chang
     given = replace(linearised(MODEL, sessions, STANDARD), sessions=gained)
     (curve,) = (k for k, one in enumerate(given.candidates) if one.name == "gas_compression")
     at = gained[0].reading.size // 3
-    column = STANDARD.strength_sd * MODEL.simulate(gained[0].conditions)
-    column[:at] = 0.0
-    added = [column[:, None], np.zeros((gained[1].reading.size, 1))]
+    by = [STANDARD.strength_sd * MODEL.simulate(one.conditions) for one in gained]
+    steps = [Steps.of(one, own, np.array([at])) for one, own in zip(gained, by, strict=True)]
     changed = replace(given, sessions=(replace(gained[0], gain_changes=(at,)), gained[1]))
     for members in ((), (curve,)):
-        (fall,) = Evidence(given, SD).falls_beside(members, added)
+        fall, _ = Evidence(given, SD).falls_beside(members, steps)
         before, after = (Evidence(one, SD).score_beside(members) for one in (given, changed))
         assert fall == pytest.approx(before - after, abs=2.0 + 0.05 * abs(fall))
         assert bool(fall > 20.0) is is_changed

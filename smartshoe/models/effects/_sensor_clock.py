@@ -61,8 +61,7 @@ def drift(conditions: Conditions, values: Array, exponent: float, carried_over: 
     if carried_over != 0.0:
         moved += values[1] * carried_over * conditions.begins_warmer_k
     if not warmer_k.size or conditions.cache["drift_by_clock"][0] > 0.0:
-        time_s = running_time_s(conditions)
-        moved += values[0] * grown(time_s, exponent)
+        moved += values[0] * conditions.kept("grown", (exponent,), lambda: grown(running_time_s(conditions), exponent))
     return moved
 
 
