@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from smartshoe.arrays import Mask
-from smartshoe.diagnosis._session import LEAST_WINDOW, Session
+from smartshoe.diagnosis._session import LEAST_WINDOW, Session, load_cycles
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import Effect
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
 
@@ -22,6 +23,7 @@ class Excitation:
     """``rates_per_s`` and ``peaks`` (shares of full scale) of the load cycles.
 
     ``present`` holds the words of `Effect.exposed_by` that apply. ``is_judged``: what is held out can be used.
+    ``is_cycled``: a recording that is fitted has more than one load cycle.
     """
 
     rates_per_s: tuple[float, ...]
@@ -30,6 +32,11 @@ class Excitation:
     present: frozenset[str]
     thresholds: Thresholds
     is_judged: bool = True
+    is_cycled: bool = True
+
+    def shows(self, effect: Effect) -> bool:
+        """Whether this data holds any of what shows an effect; later load cycles show what stays or grows, too."""
+        return self.is_cycled or effect.is_memoryless or not effect.exposed_by or bool(effect.exposed_by & self.present)
 
     @property
     def goes_with_the_clock(self) -> bool:
@@ -55,7 +62,9 @@ class Excitation:
                 " nothing of slow creep"
             )
         if "rests" not in self.present:
-            said.append("the unit is never seen unloaded: zero, tare and what lies near zero load cannot be judged")
+            said.append(
+                "the unit is never seen at rest without load: zero, tare and what lies near zero load cannot be judged"
+            )
         if self.goes_with_the_clock:
             said.append(
                 "peak loads grow, or fall, with the clock, so that a drift, a leak or a set may do what the curve of"
@@ -79,7 +88,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     hold_s = max(
         (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
     )
-    rests_s = [[n * session.conditions.step_s for n in _runs(session.resting)] for session in sessions]
+    rests_s = [[n * session.conditions.step_s for n in _runs(_rested(session, thresholds))] for session in sessions]
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rises], thresholds.same)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
     rest_s = max((rest for own in rests_s for rest in own), default=0.0)
@@ -99,7 +108,8 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
-    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged)
+    is_cycled = any(load_cycles([one], thresholds) > 1 for one in sessions)
+    return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled)
 
 
 class _Rise(NamedTuple):
@@ -141,10 +151,19 @@ def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bo
     return not trends or min(trends) < 1.0 - thresholds.same
 
 
+def _still(session: Session, thresholds: Thresholds) -> Mask:
+    """(n,) True where the load does not move."""
+    return np.asarray(np.abs(session.conditions.rate_per_s) < thresholds.still_per_s)
+
+
 def _held(session: Session, thresholds: Thresholds) -> Mask:
     """(n,) True where a load is borne and does not move."""
-    flat = np.abs(session.conditions.rate_per_s) < thresholds.still_per_s
-    return np.asarray(flat & ~session.resting & (session.conditions.load > thresholds.cycle))
+    return np.asarray(_still(session, thresholds) & ~session.resting & (session.conditions.load > thresholds.cycle))
+
+
+def _rested(session: Session, thresholds: Thresholds) -> Mask:
+    """(n,) True where no load is borne, and none comes or goes."""
+    return np.asarray(_still(session, thresholds) & session.resting)
 
 
 def _runs(mask: Mask) -> list[int]:

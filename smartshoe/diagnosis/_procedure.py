@@ -42,6 +42,7 @@ from smartshoe.diagnosis._verdict import (
     few_cycles_of,
     known_error,
     moved_of,
+    not_shown_of,
     off_elsewhere,
     other_kind_of,
     own_gains_of,
@@ -240,7 +241,8 @@ def _diagnosed(
         is_unsteady=bool(found.zero_changes),
         alone=found.alone,
     )
-    unclear = [(one, said) for one in names if (said := other_kind_of(one, extended, thresholds))]
+    kinds = ((one, other_kind_of(one, extended, thresholds) or not_shown_of(one, given.excitation)) for one in names)
+    unclear = [(one, said) for one, said in kinds if said is not None]
     unnamed = max((one.member.size for one, _ in unclear), default=0.0)
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = _less(names, unclear)

@@ -10,6 +10,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
+from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
@@ -22,6 +23,7 @@ from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
+from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
 SAID = 4  # changes of a gain, or a zero, that are said one by one
@@ -61,6 +63,20 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
             " be the other's, or undo it, so that it is not named"
         )
     return None
+
+
+def not_shown_of(name: Name, excitation: Excitation) -> str | None:
+    """What is said of a memory of which recordings of one load cycle hold nothing that shows it.
+
+    A set that stays and an arm that relaxes slowly end such a cycle alike.
+    """
+    if excitation.shows(name.effect):
+        return None
+    ways = " or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
+    return (
+        f"{name.effect.name.replace('_', ' ')} fits, but recordings of one load cycle show it only with {ways}, so that"
+        " it is not named"
+    )
 
 
 def moved_of(name: Name) -> str:

@@ -87,7 +87,8 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     fitted, held = _Session("fitted", 0, np.array([True, True, False])), _Session("held", 1, np.zeros(3, dtype=bool))
     given = SimpleNamespace(
         sessions=[held, fitted], fine=["fine"], scale=SCALE, limits=["limit"], start="start",
-        excitation=SimpleNamespace(goes_with_the_clock=False), is_no_unit=False, clocks=(), is_moved=False,
+        excitation=SimpleNamespace(goes_with_the_clock=False, shows=lambda _: True),
+        is_no_unit=False, clocks=(), is_moved=False,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")

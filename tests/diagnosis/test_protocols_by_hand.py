@@ -24,7 +24,7 @@ from smartshoe.diagnosis._excitation import (
 )
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._session import Quiet, Session
-from smartshoe.models.effects import Conditions
+from smartshoe.models.effects import Conditions, effect
 
 Array = NDArray[np.float64]
 
@@ -284,6 +284,27 @@ def test_times_are_at_least_as_long_as_said(word: str, below: list[Any], at: lis
     assert word in _shown(_with(below), _with(at)).present
 
 
+def test_a_load_that_only_passes_through_nothing_is_no_rest() -> None:
+    passing = _with([(False, 5), (True, 30), (False, 5)])
+    passing.conditions.cache["rate_per_s"][:] = STANDARD.still_per_s
+    assert "rests" not in _shown(passing).present
+    passing.conditions.cache["rate_per_s"][:] = 0.99 * STANDARD.still_per_s
+    assert "rests" in _shown(passing).present
+
+
+def test_a_recording_of_one_load_cycle_shows_a_memory_only_by_what_it_holds_beside() -> None:
+    once, twice = [_rising((0.1, 1.0))], [_rising((0.1, 1.0), (0.1, 1.0))]
+    # A set that stays and an arm that relaxes slowly end such a cycle alike; a curve is seen along any.
+    for name, in_once, in_held in (("permanent_set", False, True), ("zero_drift", False, False),
+                                   ("sensor_nonlinearity", True, True)):  # fmt: skip
+        for sessions, is_shown in ((once, in_once), (twice, True)):
+            found = replace(_shown(*sessions), present=frozenset())
+            assert found.shows(effect(name)) is is_shown
+        assert replace(_shown(*once), present=frozenset({"holds", "rates"})).shows(effect(name)) is in_held
+    assert not _shown(*once, *once).is_cycled
+    assert _shown(*once, *twice).is_cycled
+
+
 def _rising(*rises: tuple[float, float]) -> Any:
     """Rises at such rates to such peaks, long rests between them."""
     corners: list[tuple[int, float]] = [(20, 0.0)]
@@ -340,7 +361,7 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
     for changes, words in (
         ({"rates_per_s": (0.1,)}, "one loading rate only"),
         ({"present": every - {"holds"}}, "no hold longer than 3 s under load"),
-        ({"present": every - {"rests"}}, "never seen unloaded"),
+        ({"present": every - {"rests"}}, "never seen at rest without load"),
         ({"present": every - {"repeats"}}, "no load cycle is repeated"),
         ({"peaks": (1.0,)}, "one peak load only"),
     ):

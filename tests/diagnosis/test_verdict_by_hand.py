@@ -12,6 +12,7 @@ import pytest
 from told_evidence import STANDARD, ToldEvidence, candidate, worth
 
 from smartshoe.diagnosis import _inference, _zero
+from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
@@ -22,6 +23,7 @@ from smartshoe.diagnosis._validation import cancelling
 from smartshoe.diagnosis._verdict import (
     crept_of,
     known_error,
+    not_shown_of,
     other_kind_of,
     own_gains_of,
     parted_clocks,
@@ -116,6 +118,16 @@ def test_a_block_that_follows_what_no_law_does_is_said_and_not_named_but_by_a_la
     assert said(0.9) is None
     kind: Any = SimpleNamespace(effect=effect("permanent_set"), member=SimpleNamespace(name="flexible_set"), by=None)
     assert other_kind_of(kind, MODEL.with_part("flexible_set"), STANDARD) is None
+
+
+def test_a_memory_of_which_single_load_cycles_show_nothing_is_said_with_what_would_show_it() -> None:
+    once = Excitation((0.1, 0.5), (1.0,), 1, frozenset({"rates"}), STANDARD, is_cycled=False)
+    told = str(not_shown_of(_named("permanent_set"), once))
+    assert told.startswith("permanent set fits, but recordings of one load cycle show it only with loads held")
+    assert "or rests without load" in told
+    assert "pauses" not in told  # of which there are none before a second cycle
+    assert not_shown_of(_named("second_relaxation"), once) is None
+    assert not_shown_of(_named("permanent_set"), replace(once, is_cycled=True)) is None
 
 
 def _named(name: str) -> Any:

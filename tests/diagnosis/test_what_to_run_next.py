@@ -79,7 +79,7 @@ def test_rates_peaks_and_repeats_are_those_of_the_rises() -> None:
 def test_what_is_lacking_is_said_and_nothing_else() -> None:
     poor = _shown(_course((2.0, 0.3), (2.0, 1.0), (2.0, 0.3)))
     said = " | ".join(poor.limits())
-    for words in ("one loading rate only", "no hold longer", "never seen unloaded", "no load cycle is repeated"):
+    for words in ("one loading rate only", "no hold longer", "never seen at rest", "no load cycle is repeated"):
         assert words in said
     shown = frozenset({"holds", "rests", "repeats", "peaks", "shuffled_loads"})
     rich = Excitation((0.1, 0.5), (0.5, 1.0), 3, shown, STANDARD)
