@@ -263,7 +263,7 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
 
 def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
     few = [f"by {100 * one.share:+.2g} % at {one.begins_s:.4g} s in {one.recording}" for one in changes[:SAID]]
-    return f"{', '.join(few)}{f' and {len(changes) - SAID} times more' if len(changes) > SAID else ''}"
+    return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 
 
 def refusals_of(found: Inference) -> list[str]:

@@ -314,7 +314,7 @@ class TestSensors:
     @pytest.mark.bank
     @pytest.mark.parametrize("seed", range(6))
     def test_a_set_is_not_named_of_single_cycles_that_neither_rest_nor_hold(self, measured: Path, seed: int) -> None:
-        """It fits in a half of all draws, in the place of a slow relaxation: nothing in the strip's files tells."""
+        """It fits in many draws, in the place of a slow relaxation: nothing in the strip's files tells."""
         found = _sensor(measured, "vhb_two_rates", seed)
         assert "zero" not in {cause.effect.family for cause in found.causes}
         if "permanent_set" in found.minor:

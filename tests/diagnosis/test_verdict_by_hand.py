@@ -348,7 +348,7 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     (said,) = own_gains_of(gains)
     assert said.startswith(
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
-        " d and 1 times more, as where a unit slips or is set anew:"
+        " d and 1 more, as where a unit slips or is set anew:"
     )
 
 
@@ -357,6 +357,6 @@ def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
     (said,) = zero_changes_said(changes)
     assert said.startswith(
         "the zero changes, in shares of full scale, by +3 % at 7.5 s in a, by +1.5 % at 15 s in a, by +1 % at 22.5 s in"
-        " a, by +0.75 % at 30 s in a and 2 times more, as where a unit slips or water moves in a line:"
+        " a, by +0.75 % at 30 s in a and 2 more, as where a unit slips or water moves in a line:"
     )
     assert zero_changes_said([]) == []
