@@ -14,6 +14,7 @@ from smartshoe.arrays import Mask
 from smartshoe.diagnosis._session import LEAST_WINDOW, Session, load_cycles
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
+from smartshoe.models.effects.exposure import LATER_CYCLES
 from smartshoe.signals.loading import turning_points
 from smartshoe.signals.masks import runs_of
 
@@ -35,8 +36,14 @@ class Excitation:
     is_cycled: bool = True
 
     def shows(self, effect: Effect) -> bool:
-        """Whether this data holds any of what shows an effect; later load cycles show what stays or grows, too."""
-        return self.is_cycled or effect.is_memoryless or not effect.exposed_by or bool(effect.exposed_by & self.present)
+        """Whether this data holds any of what shows an effect.
+
+        Any loading shows a curve, and a loop or a lag, of whatever kind. What stays, or goes on under load, needs
+        more, be it later load cycles.
+        """
+        if self.is_cycled or effect.is_memoryless or not effect.exposed_by:
+            return True
+        return bool(effect.exposed_by & ({"rates"} | self.present) - LATER_CYCLES)
 
     @property
     def goes_with_the_clock(self) -> bool:

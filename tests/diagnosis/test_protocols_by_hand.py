@@ -296,11 +296,14 @@ def test_a_recording_of_one_load_cycle_shows_a_memory_only_by_what_it_holds_besi
     once, twice = [_rising((0.1, 1.0))], [_rising((0.1, 1.0), (0.1, 1.0))]
     # A set that stays and an arm that relaxes slowly end such a cycle alike; a curve is seen along any.
     for name, in_once, in_held in (("permanent_set", False, True), ("zero_drift", False, False),
+                                   ("play_hysteresis", True, True), ("delay", True, True), ("cross_talk", True, True),
                                    ("sensor_nonlinearity", True, True)):  # fmt: skip
         for sessions, is_shown in ((once, in_once), (twice, True)):
             found = replace(_shown(*sessions), present=frozenset())
             assert found.shows(effect(name)) is is_shown
-        assert replace(_shown(*once), present=frozenset({"holds", "rates"})).shows(effect(name)) is in_held
+        assert replace(_shown(*once), present=frozenset({"holds", "peaks"})).shows(effect(name)) is in_held
+    # Peaks of several single cycles show no memory.
+    assert not replace(_shown(*once), present=frozenset({"peaks"})).shows(effect("orifice_leak"))
     assert not _shown(*once, *once).is_cycled
     assert _shown(*once, *twice).is_cycled
 
