@@ -30,7 +30,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, cycle, pairwise
+from itertools import combinations, cycle
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -46,7 +46,7 @@ from smartshoe.diagnosis._sensitivity import (
     ridged,
     where,
 )
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._steps import Steps
 
 Members = tuple[int, ...]
 
@@ -73,29 +73,6 @@ class _Columns:
 
     seen: Sequence[Array]
     past: Sequence[Array]
-
-
-@dataclass(frozen=True, eq=False)
-class Steps:
-    """What a session's ``by`` (n,) adds from each of ``starts`` (k,) on, both counted over what is fitted."""
-
-    by: Array
-    starts: Index
-
-    @classmethod
-    def of(cls, session: Session, by: Array, moments: Index) -> Steps:
-        """``by`` (n,) and ``moments`` (k,) of all samples, in order."""
-        return cls(by[session.fitted], np.searchsorted(np.flatnonzero(session.fitted), moments))
-
-    def products(self, columns: Array) -> Array:
-        """(m, k) inner products with columns (n, m)."""
-        parts = [columns[a:b].T @ self.by[a:b] for a, b in pairwise((*self.starts, self.by.size))]
-        return np.asarray(np.cumsum(np.stack(parts[::-1], axis=1), axis=1)[:, ::-1])
-
-    @property
-    def power(self) -> Array:
-        """(k,) sums of squares."""
-        return np.asarray(self.products(self.by[:, None])[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,13 +19,7 @@ from smartshoe.diagnosis._arms import (
     with_another_pole,
 )
 from smartshoe.diagnosis._evidence import Evidence, Posterior
-from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
-from smartshoe.diagnosis._members import Member, begun_with, members_of
-from smartshoe.diagnosis._naming import probability_of_kind
-from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._own_gains import (
+from smartshoe.diagnosis._gains_and_zeros import (
     OwnGain,
     ZeroChange,
     foretells,
@@ -33,6 +27,12 @@ from smartshoe.diagnosis._own_gains import (
     with_likelier_gains,
     zero_changes_of,
 )
+from smartshoe.diagnosis._held_out import residual_of
+from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._members import Member, begun_with, members_of
+from smartshoe.diagnosis._naming import probability_of_kind
+from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, load_cycles
 from smartshoe.diagnosis._settling import (

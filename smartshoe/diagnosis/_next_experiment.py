@@ -9,9 +9,9 @@ import numpy as np
 
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import EXPERIMENTS
+from smartshoe.diagnosis._gains_and_zeros import changes_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
-from smartshoe.diagnosis._own_gains import changes_of
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by

@@ -11,10 +11,10 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
 from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._held_out import Errors, Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._own_gains import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale, Session

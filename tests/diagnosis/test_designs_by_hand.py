@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, _next_experiment
 from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
 from smartshoe.diagnosis._next_experiment import _in_place_of, expected_margin, next_experiment
-from smartshoe.diagnosis._own_gains import OwnGain, ZeroChange
 from smartshoe.diagnosis.design import Design, _commanded, _compared, _not_followed, design
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel

@@ -14,7 +14,7 @@ from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, 
 from smartshoe import Recording
 from smartshoe.diagnosis import _procedure
 from smartshoe.diagnosis._force import ForceError
-from smartshoe.diagnosis._own_gains import ZeroChange
+from smartshoe.diagnosis._gains_and_zeros import ZeroChange
 from smartshoe.diagnosis._procedure import _diagnosed, _prepared
 from smartshoe.diagnosis._zero import Zero, shift_of
 from smartshoe.models.effects import effect

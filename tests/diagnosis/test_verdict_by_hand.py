@@ -13,10 +13,10 @@ from told_evidence import STANDARD, ToldEvidence, candidate, worth
 
 from smartshoe.diagnosis import _inference, _zero
 from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
-from smartshoe.diagnosis._own_gains import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling

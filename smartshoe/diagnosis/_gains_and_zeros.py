@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Index
-from smartshoe.diagnosis._evidence import Evidence, Members, Steps
+from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._noise import correlated_sd
@@ -23,6 +23,7 @@ from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._search import needed, search
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, with_members
+from smartshoe.diagnosis._steps import Steps
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._evidence import Evidence, Steps
-from smartshoe.diagnosis._held_out import own_of
-from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._own_gains import (
+from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._gains_and_zeros import (
     _Gained,
     changes_of,
     foretells,
@@ -24,9 +22,12 @@ from smartshoe.diagnosis._own_gains import (
     with_likelier_gains,
     zero_changes_of,
 )
+from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Scale, Session, prepare
 from smartshoe.diagnosis._state import State, state_at
+from smartshoe.diagnosis._steps import Steps
 from smartshoe.diagnosis._validation import error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel

@@ -1,0 +1,34 @@
+"""What begins at moments of a session and stays, without a column of samples for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from smartshoe.arrays import Array, Index
+from smartshoe.diagnosis._session import Session
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """What a session's ``by`` (n,) adds from each of ``starts`` (k,) on, both counted over what is fitted."""
+
+    by: Array
+    starts: Index
+
+    @classmethod
+    def of(cls, session: Session, by: Array, moments: Index) -> Steps:
+        """``by`` (n,) and ``moments`` (k,) of all samples, in order."""
+        return cls(by[session.fitted], np.searchsorted(np.flatnonzero(session.fitted), moments))
+
+    def products(self, columns: Array) -> Array:
+        """(m, k) inner products with columns (n, m)."""
+        parts = [columns[a:b].T @ self.by[a:b] for a, b in pairwise((*self.starts, self.by.size))]
+        return np.asarray(np.cumsum(np.stack(parts[::-1], axis=1), axis=1)[:, ::-1])
+
+    @property
+    def power(self) -> Array:
+        """(k,) sums of squares."""
+        return np.asarray(self.products(self.by[:, None])[0])
