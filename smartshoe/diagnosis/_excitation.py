@@ -96,7 +96,9 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
     )
     rests_s = [[n * session.conditions.step_s for n in _runs(_rested(session, thresholds))] for session in sessions]
-    rates = _distinct_rates([(rise.rate, rise.samples) for rise in rises], thresholds.same)
+    # Where a ramp begins and ends is smeared by its window, and found to a sample.
+    ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
+    rates = _distinct_rates([(rise.rate, rise.samples) for rise in rises], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
     rest_s = max((rest for own in rests_s for rest in own), default=0.0)
     pauses = [rest for own in rests_s for rest in own[1:-1]]
@@ -144,7 +146,12 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
             continue  # a sample more or less makes another rate of it
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
         above = float(load[first]) - float(load.min()) > thresholds.clear * thresholds.cycle * span
-        yield _Rise(rate, samples * min(1.0, session.thinned / LEAST_WINDOW), float(load[last]), above)
+        yield _Rise(rate, samples * _windows(session), float(load[last]), above)
+
+
+def _windows(session: Session) -> float:
+    """Windows that the load was smoothed by, a sample."""
+    return min(1.0, session.thinned / LEAST_WINDOW)
 
 
 def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bool:
@@ -190,21 +197,22 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
     return found
 
 
-def _distinct_rates(rates: Sequence[tuple[float, float]], same: float) -> list[float]:
+def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: float = 2.0) -> list[float]:
     """Rates that differ by more than ``same``, and by more than ramps of so few samples tell.
 
-    Both ends of a ramp lie within a sample, since load is smoothed over two: a ramp of n samples lasted n +- 2. A
-    stray ramp beside a single rate, a first one say, makes no second rate.
+    A ramp of n samples, each a window, lasted n +- ``ends``: half a window and half a step are open at either end, two
+    in all where each window is a step of its own. A stray ramp beside a single rate, a first one say, makes no second
+    rate.
     """
     found: list[float] = []
     ramps: list[int] = []
     reach = 0.0
     for rate, samples in sorted(rates):
         n = max(samples, 1.0)
-        if not found or (rate > found[-1] * (1.0 + same) and rate * n / (n + 2.0) > reach):
+        if not found or (rate > found[-1] * (1.0 + same) and rate * n / (n + ends) > reach):
             found.append(rate)
             ramps.append(0)
-            reach = rate * n / max(n - 2.0, 0.1)
+            reach = rate * n / max(n - ends, 0.1)
         ramps[-1] += 1
     most = int(np.argmax(ramps)) if ramps else 0
     return [found[most]] if ramps and ramps[most] >= (1.0 - same) * sum(ramps) else found

@@ -321,6 +321,11 @@ class TestSensors:
             assert "permanent set fits, but recordings of one load cycle" in _limit(found, "permanent set fits")
 
     @pytest.mark.bank
+    def test_rates_three_times_apart_are_several_though_presses_have_few_samples(self, measured: Path) -> None:
+        """The microfluidic sensor was pressed at five speeds, of which a press has 26 samples down to 4."""
+        assert not [said for said in _sensor(measured, "microfluidic").limits if "one loading rate only" in said]
+
+    @pytest.mark.bank
     @pytest.mark.parametrize("which", ["as they are", "swapped", "three speeds"])
     def test_the_curve_of_the_microfluidic_sensor_does_not_hang_on_what_is_fitted(
         self, measured: Path, which: str

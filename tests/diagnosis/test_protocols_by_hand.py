@@ -229,6 +229,14 @@ def test_rates_of_short_ramps_differ_by_more_than_two_samples_at_either_end() ->
     assert len(_distinct_rates([(1.0, 10**6), (2.999, 0)], 0.25)) == 1
 
 
+def test_ramps_sampled_finely_are_open_by_their_windows_and_by_less_than_one_more() -> None:
+    """Of ramps of 4 1/3 and 1 1/3 windows: three times as fast is another rate, where samples are thirds of windows."""
+    slow, fast = (0.6, 13.0 / 3.0), (1.9, 4.0 / 3.0)
+    assert _distinct_rates([slow, fast], 0.25, 4.0 / 3.0) == [0.6, 1.9]
+    assert _distinct_rates([slow, (1.7, 4.0 / 3.0)], 0.25, 4.0 / 3.0) == [0.6]
+    assert _distinct_rates([slow, fast], 0.25) == [0.6]
+
+
 def test_a_stray_ramp_makes_no_second_rate() -> None:
     one, other = (1.0, 1000), (2.0, 1000)
     assert _distinct_rates([one, other, other, other], 0.25) == [2.0]  # three quarters of all

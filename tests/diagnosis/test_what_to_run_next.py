@@ -44,6 +44,14 @@ def _heights(*peaks: float) -> tuple[tuple[float, float], ...]:
     return tuple(corner for peak in peaks for corner in ((2.0, peak), (2.0, 0.0), (2.0, 0.0)))
 
 
+@pytest.mark.parametrize("samples", [6, 8, 12, 24, 60])
+def test_short_ramps_of_one_rate_to_many_heights_are_of_one_rate(samples: int) -> None:
+    """However few samples a rise to the full load has."""
+    heights = (1.0, 0.7, 1.0, 0.5, 0.85, 1.0, 0.6)
+    corners = [(samples * peak * STEP_S, share) for peak in heights for share in (peak, 0.0)]
+    assert "rates" not in _shown(_course((1.0, 0.0), *corners, (1.0, 0.0))).present
+
+
 @pytest.mark.parametrize(
     ("word", "without", "corners"),
     [
