@@ -46,7 +46,7 @@ from smartshoe.diagnosis._sensitivity import (
     ridged,
     where,
 )
-from smartshoe.diagnosis._steps import Steps
+from smartshoe.diagnosis._step_columns import StepColumns
 
 Members = tuple[int, ...]
 
@@ -259,7 +259,7 @@ class Evidence:
         free = (np.linalg.slogdet(one)[1] + len(one) * 2.0 * math.log(self.noise_sd) for one in self._inverse)
         return self.posterior(members).score - float(sum(free))
 
-    def falls_beside(self, members: Members, steps: Sequence[Steps]) -> Array:
+    def falls_beside(self, members: Members, steps: Sequence[StepColumns]) -> Array:
         """By how much a set's score falls with each of the sessions' ``steps``, in order, of unit prior."""
         past = [one.products(own) for one, own in zip(steps, self.given.past, strict=True)]
         cross = self._with_steps(self._all, steps, past)
@@ -280,7 +280,7 @@ class Evidence:
         asked = free[0] - beside.T @ pull
         return np.asarray(asked**2 / (1.0 + left) - np.log1p(left))
 
-    def _with_steps(self, columns: _Columns, steps: Sequence[Steps], past: Sequence[Array]) -> Array:
+    def _with_steps(self, columns: _Columns, steps: Sequence[StepColumns], past: Sequence[Array]) -> Array:
         """`_free` of columns and all ``steps``, whose products with their sessions' nuisances are ``past``."""
         each = zip(columns.seen, columns.past, steps, past, self._inverse, strict=True)
         parts = [one.products(seen) - own @ inverse @ beside for seen, own, one, beside, inverse in each]

@@ -23,7 +23,7 @@ from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._search import needed, search
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, with_members
-from smartshoe.diagnosis._steps import Steps
+from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of, fitted_rms
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
@@ -177,7 +177,7 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     by = [np.full(one.reading.size, state.thresholds.strength_sd) for one in fitted]
     if not of_zero:
         by = [one.own_gain_sd * state.given.model.simulate(one.conditions) for one in fitted]
-    steps = [Steps.of(one, own, _moments_of(one)) for one, own in zip(fitted, by, strict=True)]
+    steps = [StepColumns.of(one, own, _moments_of(one)) for one, own in zip(fitted, by, strict=True)]
     for _ in range(MOST_CHANGES * len(fitted)):
         falls = gained.evidence.falls_beside(gained.kept, steps)
         if falls.max() < gained.odds_of_a_change:

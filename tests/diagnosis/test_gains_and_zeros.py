@@ -27,7 +27,7 @@ from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
 from smartshoe.diagnosis._session import Scale, Session, prepare
 from smartshoe.diagnosis._state import State, state_at
-from smartshoe.diagnosis._steps import Steps
+from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -254,7 +254,7 @@ def test_what_a_step_takes_off_a_score_is_what_the_score_with_it_says(is_changed
     (curve,) = (k for k, one in enumerate(given.candidates) if one.name == "gas_compression")
     at = gained[0].reading.size // 3
     by = [STANDARD.strength_sd * MODEL.simulate(one.conditions) for one in gained]
-    steps = [Steps.of(one, own, np.array([at])) for one, own in zip(gained, by, strict=True)]
+    steps = [StepColumns.of(one, own, np.array([at])) for one, own in zip(gained, by, strict=True)]
     changed = replace(given, sessions=(replace(gained[0], gain_changes=(at,)), gained[1]))
     for members in ((), (curve,)):
         fall, _ = Evidence(given, SD).falls_beside(members, steps)

@@ -1,4 +1,4 @@
-"""What begins at moments of a session and stays, without a column of samples for each."""
+"""Steps at moments of a session: what begins there and stays, without a column of samples for each."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from smartshoe.diagnosis._session import Session
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class StepColumns:
     """What a session's ``by`` (n,) adds from each of ``starts`` (k,) on, both counted over what is fitted."""
 
     by: Array
     starts: Index
 
     @classmethod
-    def of(cls, session: Session, by: Array, moments: Index) -> Steps:
+    def of(cls, session: Session, by: Array, moments: Index) -> StepColumns:
         """``by`` (n,) and ``moments`` (k,) of all samples, in order."""
         return cls(by[session.fitted], np.searchsorted(np.flatnonzero(session.fitted), moments))
 
