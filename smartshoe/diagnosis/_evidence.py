@@ -123,7 +123,7 @@ class Evidence:
             if one.effect.why_unnamed:  # what no law does is no small imperfection of a good unit
                 self._sds[np.array(one.columns) - 1] = 0.0
         inner = self.gram[1:, 1:] * np.outer(self._sds, self._sds)
-        inner[np.diag_indices_from(inner)] += 1.0
+        inner.flat[:: inner.shape[0] + 1] += 1.0
         self._factor = _factor(inner)
         self._half = self._taken_out(self.gram)
         self._directions = directions(self.thresholds)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from smartshoe.arrays import Mask
-from smartshoe.diagnosis._session import LEAST_WINDOW, Session, load_cycles
+from smartshoe.diagnosis._session import LEAST_WINDOW, Session, have_later_cycles
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import LATER_CYCLES
@@ -117,7 +117,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "low_loads": bool(peaks) and min(peaks) < thresholds.same,
     }
     present = frozenset(word for word, is_there in found.items() if is_there)
-    is_cycled = any(load_cycles([one], thresholds) > 1 for one in sessions)
+    is_cycled = have_later_cycles(sessions, thresholds)
     return Excitation(tuple(rates), tuple(peaks), repeats, present, thresholds, is_judged, is_cycled)
 
 

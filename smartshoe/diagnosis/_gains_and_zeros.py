@@ -174,10 +174,11 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     fitted = _fitted(gained.sessions)
     if len(fitted) > MOST_FOLDS:
         return gained
-    by = [np.full(one.reading.size, state.thresholds.strength_sd) for one in fitted]
-    if not of_zero:
-        by = [one.own_gain_sd * state.given.model.simulate(one.conditions) for one in fitted]
-    steps = [StepColumns.of(one, own, _moments_of(one)) for one, own in zip(fitted, by, strict=True)]
+    model, zero_sd = state.given.model, state.thresholds.strength_sd
+    steps = []
+    for one in fitted:
+        by = np.full(one.reading.size, zero_sd) if of_zero else one.own_gain_sd * model.simulate(one.conditions)
+        steps.append(StepColumns.of(one, by, _moments_of(one)))
     for _ in range(MOST_CHANGES * len(fitted)):
         falls = gained.evidence.falls_beside(gained.kept, steps)
         if falls.max() < gained.odds_of_a_change:

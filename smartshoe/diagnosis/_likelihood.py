@@ -253,7 +253,7 @@ def _bounded_step(
             break
         root = np.sqrt((1.0 + damping) * diagonal[index])
         part = normal[index[:, None], index] / (root[:, None] * root)
-        part.flat[:: index.size + 1] = 1.0
+        np.fill_diagonal(part, 1.0)
         found, failed = dposv(part, right[index] / root, lower=1)[1:]
         if failed:  # rounding has made it indefinite
             found = np.linalg.lstsq(part, right[index] / root, rcond=1e-12)[0]

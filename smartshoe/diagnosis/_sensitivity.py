@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._session import Session, load_cycles
+from smartshoe.diagnosis._session import Session, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue
@@ -70,7 +70,7 @@ def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effec
     (`smartshoe.diagnosis._zero`); nor those that only later load cycles show, where no recording has any.
     """
     has = logged_channels(sessions)
-    has_cycles = any(load_cycles([one], thresholds) > 1 for one in sessions)
+    has_cycles = have_later_cycles(sessions, thresholds)
     flexible = [block for family in blocks().values() for block in family]
     found = [e for e in (*catalogue().values(), *flexible) if e.is_physical and e.shifts is None]
     return [e for e in found if e.needs <= has and not e.is_refinement and (has_cycles or not e.needs_cycles)]

@@ -391,6 +391,11 @@ def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     return sum(_rises(session.conditions, thresholds) for session in sessions if session.fitted.any())
 
 
+def have_later_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
+    """Whether a recording of which anything is fitted holds more than one load cycle."""
+    return any(load_cycles([session], thresholds) > 1 for session in sessions)
+
+
 def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
     def count() -> Array:
         load = conditions.load

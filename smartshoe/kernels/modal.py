@@ -14,19 +14,10 @@ def respond(u, decay, before, after, weights, direct, state, out):  # type: igno
     """
     modes = decay.size
     last = u[0]
-    if modes == 1:  # the commonest: a state that stays in a register takes half the time
+    if 0 < modes <= 2:  # the commonest: states that stay in registers take half the time
+        j = modes - 1  # a single mode is its own second, of no weight
         e, b, a, w, m = decay[0], before[0], after[0], weights[0], state[0]
-        out[0] = direct * last + w * m
-        for k in range(1, u.size):
-            now = u[k]
-            m = e * m + (b * last + a * now)
-            out[k] = direct * now + w * m
-            last = now
-        state[0] = m
-        return
-    if modes == 2:
-        e, b, a, w, m = decay[0], before[0], after[0], weights[0], state[0]
-        e2, b2, a2, w2, m2 = decay[1], before[1], after[1], weights[1], state[1]
+        e2, b2, a2, w2, m2 = decay[j], before[j], after[j], j * weights[j], state[j]
         out[0] = direct * last + w * m + w2 * m2
         for k in range(1, u.size):
             now = u[k]
@@ -34,7 +25,7 @@ def respond(u, decay, before, after, weights, direct, state, out):  # type: igno
             m2 = e2 * m2 + (b2 * last + a2 * now)
             out[k] = direct * now + w * m + w2 * m2
             last = now
-        state[0], state[1] = m, m2
+        state[0], state[j] = m, m2
         return
     for k in range(u.size):
         now = u[k]
