@@ -404,22 +404,27 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
 @njit(cache=True)
 def rise(largest, raised, width):  # type: ignore[no-untyped-def]
     """u/phi of a first loading, 1 + raised tanh(M^2/width), M the ``largest`` load so far."""
-    return 1.0 + raised * math.tanh(largest * largest / width) if raised > 0.0 else 1.0
+    return 1.0 + raised * tanh(largest * largest / width) if raised > 0.0 else 1.0
 
 
 @njit(cache=True)
-def softness(below, wide, power):  # type: ignore[no-untyped-def]
-    """Share of the softening that is there ``below`` M^2, tanh(x^power), x = below/wide, and its slope in x.
+def tanh(x):  # type: ignore[no-untyped-def]
+    """By one exponential, to the last digit of 1: in a third of the time of `math.tanh`."""
+    return 1.0 - 2.0 / (math.exp(2.0 * x) + 1.0)
 
-    A power that is no 1 has its corner at the largest load rounded by EASED.
+
+@njit(cache=True)
+def softness(x, power, corner):  # type: ignore[no-untyped-def]
+    """Share of the softening that is there at x = (M^2 - u^2)/wide below the largest, tanh(x^power), and its slope.
+
+    A power that is no 1 has its corner at the largest load rounded by EASED, which leaves ``corner``, EASED^power.
     """
-    x = below / wide
     if power == 1.0:
-        bend = 1.0 - 2.0 / (math.exp(2.0 * x) + 1.0)  # tanh
+        bend = tanh(x)
         return bend, 1.0 - bend * bend
-    eased = (x + EASED) ** power
-    bend = 1.0 - 2.0 / (math.exp(2.0 * (eased - EASED**power)) + 1.0)
-    return bend, (1.0 - bend * bend) * power * eased / (x + EASED)
+    rooted = (x + EASED) ** power
+    bend = tanh(rooted - corner)
+    return bend, (1.0 - bend * bend) * power * rooted / (x + EASED)
 
 
 @njit(cache=True)
@@ -434,7 +439,7 @@ def first_loading(load, raised, width, own, arm, phi):  # type: ignore[no-untype
     low, high = min(one, other), max(one, other)
     phi, slope = min(max(phi, low), high), 1.0
     for _ in range(STEPS):
-        bend = math.tanh(phi * phi / width)
+        bend = tanh(phi * phi / width)
         off = phi * (own + arm * (1.0 + raised * bend)) - load
         slope = 1.0 + raised * (bend + 2.0 * phi * phi / width * (1.0 - bend * bend))  # of u in phi
         phi, low, high, step = newton(phi, off, own + arm * slope, low, high)
@@ -449,14 +454,15 @@ def softened_undone(signal, strength, width, widening, raised, power, dead_zone,
 
     ``state`` (1,): that largest, less ``dead_zone``.
     """
-    largest = state[0]
+    largest, corner = state[0], EASED**power
     for k in range(signal.size):
         u, more = signal[k], rise(largest, raised, width)
         if u >= largest * more:
             f = first_loading(u, raised, width, 0.0, 1.0, u)[0]
         else:
             below = max(largest * largest * more * more - u * u, 0.0)
-            f = u * (1.0 - strength * softness(below, width + widening * largest * largest, power)[0]) / more
+            x = below / (width + widening * largest * largest)
+            f = u * (1.0 - strength * softness(x, power, corner)[0]) / more
         largest = max(largest, f - dead_zone)
         out[k] = f
     state[0] = largest

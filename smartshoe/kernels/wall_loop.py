@@ -11,7 +11,7 @@ import math
 
 from numba import njit
 
-from smartshoe.kernels.memory import first_loading, newton, rise, softness
+from smartshoe.kernels.memory import EASED, first_loading, newton, rise, softness
 
 CLOSE = 1e-8  # of full scale: a step of Newton's that is less leaves about its square
 STEPS = 30
@@ -72,13 +72,14 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
     # no such bound near its corner: a step of CLOSE is the last there.
     bound = strength / width * (3.0 + 2.0 / width) if power == 1.0 else 1e-10 / (CLOSE * CLOSE)
     arm = held = 0.0
-    u, q, phi, known, slope = 0.0, 0.0, 0.0, 0.0, 1.0
-    most, more, wide = 0.0, 1.0, width
+    u, q, phi, known, slope, corner = 0.0, 0.0, 0.0, 0.0, 1.0, EASED**power
+    most, more, per_wide, top = 0.0, 1.0, 1.0 / width, 0.0
     for k in range(load.size):
         last, f = u, load[k] + held
         reached = max(largest - dead_zone, 0.0)
         if reached != most:
-            most, more, wide = reached, rise(reached, raised, width), width + widening * reached * reached
+            most, more = reached, rise(reached, raised, width)
+            per_wide, top = 1.0 / (width + widening * reached * reached), (most * more) ** 2
         if f >= most * (1.0 + arm * more):
             phi, slope = first_loading(f, raised, width, 1.0, arm, phi)
             u = phi * rise(phi, raised, width)
@@ -88,15 +89,15 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
             straight = given / (1.0 + beside)
             low, high = straight, most * more
             if f <= 0.0:
-                lost = min(strength * softness(high * high, wide, power)[0], 0.95)  # more leaves nothing to pull
+                lost = min(strength * softness(top * per_wide, power, corner)[0], 0.95)  # more leaves nothing to pull
                 low, high = given / (1.0 - lost + beside), straight
             u = min(max(u + (f - known) / slope, low), high)
             for _ in range(STEPS):
-                bend, steep = softness(max(most * most * more * more - u * u, 0.0), wide, power)
+                bend, steep = softness(max(top - u * u, 0.0) * per_wide, power, corner)
                 slope = 1.0 - strength * bend + beside
                 off = u * slope - given
                 if bend > 0.0:
-                    slope += 2.0 * strength / wide * u * u * steep
+                    slope += 2.0 * strength * per_wide * u * u * steep
                 u, low, high, step = newton(u, off, slope, low, high)
                 if bound * step * step <= 1e-10:
                     break

@@ -125,11 +125,11 @@ def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, fl
 
     Beside an arm of ``share``: one that pushes leaves a tenth of the wall's own stiffness, at least, softened or not.
     """
-    from smartshoe.kernels.memory import softness
+    from smartshoe.kernels.memory import EASED, softness
 
     gained, width, at_once, widening, power = (float(value) for value in values)
     below = (1.0 - at_once) * gained
-    lost = below / (1.0 + below) / softness(0.75, width + widening, power)[0]
+    lost = below / (1.0 + below) / softness(0.75 / (width + widening), power, EASED**power)[0]
     raised = min(at_once * gained / math.tanh(0.75 / width), most_beside(share))
     if share < 0.0:
         lost = min(lost, max(0.9 + share * (1.0 + raised), 0.0))
