@@ -16,22 +16,29 @@ from smartshoe.models.effects import Effect, catalogue
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """``confidence`` that it is this effect or one of ``equivalents``, which nothing tells from it; ``law`` of the two.
+    """``effect`` and ``equivalents``, which nothing tells from it, in the place of a member.
 
-    ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
-    family is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this
-    family. ``by``: the law as it was fitted in the place of a flexible block, which stays in the model, since the law
-    departs by more than a little and by no more than laws do.
+    ``kind``: probability that an effect of this family is there. ``law``: that it is then this one and not its nearest
+    rival, one half in a dead heat; ``among``: that it is this one or one of ``equivalents``. ``kind_only``: its family
+    is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this family.
+    ``by``: the law as it was fitted in the place of a flexible block, which stays in the model, since the law departs
+    by more than a little and by no more than laws do.
     """
 
     member: Member
     effect: Effect
-    confidence: float
+    kind: float
     law: float
+    among: float
     equivalents: tuple[str, ...]
     kind_only: bool = False
     is_sure: bool = True
     by: Alternative | None = None
+
+    @property
+    def confidence(self) -> float:
+        """That it is this effect or one of its ``equivalents``."""
+        return self.kind * self.among
 
 
 def names_of(
@@ -66,11 +73,11 @@ def names_of(
     ]
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
-        is_firm = not is_clocked and any(one.confidence >= thresholds.least_confidence for one in likely)
+        is_firm = not is_clocked and any(one.kind >= thresholds.least_confidence for one in likely)
         return tuple(
             one
             for one in likely
-            if one.is_sure or (is_firm and one.confidence > 0.5 and one.member.size > thresholds.tolerable)
+            if one.is_sure or (is_firm and one.kind > 0.5 and one.member.size > thresholds.tolerable)
         )
     larger = tuple(one for one in likely if one.member.size > left)
     if larger and is_followed:
@@ -92,21 +99,20 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     by = _law_in_its_place(one)
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
-        followed = catalogue()[str(by.effect)]
-        kin = _kin_of(followed)
-        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
+        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a is not by)
         as_law = replace(one, laws=beside, fall=one.fall - by.margin)
+        followed = catalogue()[str(by.effect)]
         return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
     if not (one.effect.is_flexible or one.is_any_curve):
-        law, equivalents = probability_of_law(one, thresholds)
-        return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
+        return Name(one, one.effect, kind, *probability_of_law(one, thresholds), is_sure=is_sure)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
-    others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
+    curves = [str(a.effect) for a in one.laws if one.is_any_curve]
+    others = dict.fromkeys((*_kin_of(nearest), *curves))
     kin = tuple(name for name in others if name != nearest.name)
     # Of a family of one law nothing follows better or worse than another.
     lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
     sure = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
-    return Name(one, nearest, sure, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
+    return Name(one, nearest, sure, 1.0 / (1.0 + len(kin)), 1.0, kin, True, is_sure)
 
 
 def _law_in_its_place(one: Member) -> Alternative | None:
@@ -136,7 +142,7 @@ def _nearest_of_kind(block: Member) -> Effect:
 
 
 def _doubted(name: Name) -> Name:
-    return replace(name, confidence=min(name.confidence, 0.5), is_sure=False)
+    return replace(name, kind=min(name.kind, 0.5), is_sure=False)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
@@ -155,14 +161,16 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, law
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 
 
-def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
-    """That it is this law of its family, and the laws that this data cannot tell from it.
+def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, float, tuple[str, ...]]:
+    """That it is this law of its family, that it is it or one that this data cannot tell from it, and those laws.
 
-    It is held against its nearest rival: one half in a dead heat.
+    The former is held against its nearest rival: one half in a dead heat. Laws that are told from it, each a little,
+    may together be one half as likely: they count against the latter.
     """
-    odds = {a.effect: float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws if a.effect is not None}
+    odds = {str(a.effect): float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws}
     equivalents = tuple(name for name, other in odds.items() if other > thresholds.equivalent_odds)
-    return 1.0 / (1.0 + max(odds.values(), default=0.0)), equivalents
+    among = (1.0 + sum(odds[name] for name in equivalents)) / (1.0 + sum(odds.values()))
+    return 1.0 / (1.0 + max(odds.values(), default=0.0)), among, equivalents
 
 
 def odds_of_law(margin: Array | float, fall: float, thresholds: Thresholds) -> Array:

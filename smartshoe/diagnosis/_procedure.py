@@ -249,7 +249,7 @@ def _diagnosed(
     unclear += [(one, said) for one in names if (said := departure_of(one, names))]
     names = _less(names, unclear)
     cycles = load_cycles(sessions, thresholds)
-    surest = sorted(names, key=lambda one: -one.confidence)[:cycles]
+    surest = sorted(names, key=lambda one: -one.kind)[:cycles]
     unclear += [(one, few_cycles_of(one, cycles)) for one in names if one not in surest]
     names = _less(names, unclear)
     parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
@@ -387,13 +387,13 @@ def _cause(
         evidence.append(
             Statement(
                 "confidence of its kind",
-                name.confidence,
+                name.kind,
                 thresholds.least_confidence,
                 f"it is not sure, since others may do what it does: {why}",
             )
         )
     elif name.kind_only:
-        is_certain = name.confidence >= thresholds.least_confidence
+        is_certain = name.kind >= thresholds.least_confidence
         why = (
             "the kind is sure, the law is not: no equation of it follows better than others"
             if is_certain

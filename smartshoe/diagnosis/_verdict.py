@@ -98,7 +98,7 @@ def few_cycles_of(name: Name, cycles: int) -> str:
 def departure_of(name: Name, names: Sequence[Name]) -> str | None:
     """What is said of an effect beside a surer one of its mechanism, of whose law it may be the departure."""
     alike = (one for one in names if one.effect.mechanism == name.effect.mechanism != "")
-    surest = max(alike, key=lambda one: one.confidence, default=name)
+    surest = max(alike, key=lambda one: one.kind, default=name)
     if surest is name:
         return None
     said, other = (one.effect.name.replace("_", " ") for one in (name, surest))

@@ -376,13 +376,13 @@ def _member(
 
 
 def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
-    """2.77; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -1.09; -2.22 a likeness."""
+    """3.5; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -1.09; -2.22 a likeness."""
     for size, departed, left, margin, lawless, others, likeness in (
         (0.01, 0.5, 0.002, 40.0, False, 0.003, 0.4), (0.001, 2.0, 0.01, 3.0, True, 0.0, 0.0),
         (0.05, 0.0, 0.0, 0.5, False, 0.01, 0.9),
     ):  # fmt: skip
         ratio = (math.hypot(left, others) + 2e-4) / (size + 2e-4)
-        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departed - 1.09 * lawless - 2.22 * likeness
+        score = 3.5 - 1.12 * math.log(ratio) - 0.99 * departed - 1.09 * lawless - 2.22 * likeness
         expected = 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-margin / 2.0))
         one = _member(size, departed, margin, others=others, likeness=likeness)
         assert probability_of_kind(one, left, STANDARD, lawless=lawless) == pytest.approx(expected)
@@ -392,14 +392,15 @@ def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
 
 def test_a_law_is_as_sure_as_its_nearest_rivals_odds_say() -> None:
     """Margins in units of twice one and of the squared departure times the fall."""
-    found = _member(fall=100.0, laws=((None, 0.0), ("orifice_leak", 12.0), ("zero_drift", 30.0)))
-    law, equivalents = probability_of_law(found, STANDARD)
+    found = _member(fall=100.0, laws=(("orifice_leak", 12.0), ("zero_drift", 30.0)))
+    law, among, equivalents = probability_of_law(found, STANDARD)
     assert law == pytest.approx(1.0 / (1.0 + math.exp(-12.0 / (2.0 * 7.25))))
     ruled = {name: math.exp(-by / (2.0 * 7.25)) for name, by in (("orifice_leak", 12.0), ("zero_drift", 30.0))}
-    assert equivalents == tuple(name for name, odds in ruled.items() if odds > 0.3)
+    assert equivalents == tuple(name for name, odds in ruled.items() if odds > 0.3) == ("orifice_leak",)
+    assert among == pytest.approx(1.0 - ruled["zero_drift"] / (1.0 + sum(ruled.values())))
     bound = -math.log(0.3) * 14.5
     for by, told in ((0.999, ("orifice_leak",)), (1.001, ())):
-        assert probability_of_law(_member(laws=(("orifice_leak", by * bound),)), STANDARD)[1] == told
+        assert probability_of_law(_member(laws=(("orifice_leak", by * bound),)), STANDARD)[2] == told
     # What explains nothing departs by nothing; a rival that follows better is as good at the most.
     below = _member(fall=-50.0, laws=(("orifice_leak", 3.0),))
     assert probability_of_law(below, STANDARD)[0] == pytest.approx(1.0 / (1.0 + math.exp(-1.5)))

@@ -149,10 +149,10 @@ def _run_diagnosis(parts: Any) -> Any:
     return result
 
 
-def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, confidence: float = 0.9) -> Any:
+def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, kind: float = 0.9) -> Any:
     known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
     return SimpleNamespace(
-        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, confidence=confidence
+        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind=kind
     )
 
 
@@ -228,7 +228,7 @@ def test_of_two_effects_of_one_mechanism_the_surer_is_named(parts: Any) -> None:
     for sure, named in ((0.8, ["play_hysteresis"]), (0.95, ["load_unload_asymmetry"])):
         other = "load unload asymmetry" if sure < 0.9 else "play hysteresis"
         parts.sizes |= {"play_hysteresis": 0.1, "load_unload_asymmetry": 0.1}
-        parts.names = [_name("play_hysteresis"), _name("delay"), _name("load_unload_asymmetry", confidence=sure)]
+        parts.names = [_name("play_hysteresis"), _name("delay"), _name("load_unload_asymmetry", kind=sure)]
         parts.seen.clear()
         told = _run_diagnosis(parts)
         assert {one.name for one in told.causes} == {*named, "delay"}
@@ -238,7 +238,7 @@ def test_of_two_effects_of_one_mechanism_the_surer_is_named(parts: Any) -> None:
 def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The surest of them; and one that is none for a reason of its own counts for nothing."""
     for cycles, sure, named in ((1, 0.8, ["linear_leak"]), (2, 0.8, ["delay", "linear_leak"]), (1, 0.95, ["delay"])):
-        parts.names = [_name("turned"), _name("linear_leak"), _name("delay", confidence=sure)]
+        parts.names = [_name("turned"), _name("linear_leak"), _name("delay", kind=sure)]
         parts.seen.clear()
         monkeypatch.setattr(_procedure, "load_cycles", lambda sessions, thresholds, cycles=cycles: cycles)
         told = _run_diagnosis(parts)

@@ -21,7 +21,7 @@ from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._laws import likelier_laws
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._members import Alternative, Member
-from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law
+from smartshoe.diagnosis._naming import Name, names_of, odds_of_law, probability_of_kind, probability_of_law
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -54,16 +54,16 @@ def only(names: tuple[Name, ...]) -> Name:
 @given(st.floats(0.0, 1e6))
 def test_two_laws_in_a_dead_heat_share_the_probability_and_name_each_other(fall: float) -> None:
     for one, other in (("linear_leak", "orifice_leak"), ("orifice_leak", "linear_leak")):
-        share, equivalents = probability_of_law(member(one, fall=fall, laws=((other, 0.0),)), STANDARD)
+        share, among, equivalents = probability_of_law(member(one, fall=fall, laws=((other, 0.0),)), STANDARD)
         assert share == pytest.approx(0.5)
-        assert equivalents == (other,)
+        assert (among, equivalents) == (1.0, (other,))
 
 
 @given(st.floats(0.0, 1e5), st.floats(0.0, 1e3), st.floats(0.0, 1e3))
 def test_the_farther_the_rival_the_surer_the_law(fall: float, margin: float, further: float) -> None:
     near, far = (member(fall=fall, laws=(("orifice_leak", by),)) for by in (margin, margin + further))
     assert probability_of_law(near, STANDARD)[0] <= probability_of_law(far, STANDARD)[0]
-    assert set(probability_of_law(far, STANDARD)[1]) <= set(probability_of_law(near, STANDARD)[1])
+    assert set(probability_of_law(far, STANDARD)[2]) <= set(probability_of_law(near, STANDARD)[2])
 
 
 def test_a_rival_that_leaves_as_much_as_laws_usually_depart_is_one_standard_deviation_away() -> None:
@@ -76,18 +76,30 @@ def test_a_rival_that_leaves_as_much_as_laws_usually_depart_is_one_standard_devi
 def test_a_name_is_as_sure_as_its_kind_and_its_law_shared_with_the_nearest_rival(margin: float) -> None:
     one = member(size=0.1, laws=(("orifice_leak", margin),))
     name = only(names_of([one], 0.0, STANDARD))
-    assert name.confidence == probability_of_kind(one, 0.0, STANDARD)
-    assert (name.law, name.equivalents) == probability_of_law(one, STANDARD)
-    assert 0.5 <= name.law <= 1.0
+    assert name.kind == probability_of_kind(one, 0.0, STANDARD)
+    assert (name.law, name.among, name.equivalents) == probability_of_law(one, STANDARD)
+    assert 0.5 <= name.law <= name.among <= 1.0
+    assert name.confidence == name.kind * name.among
+
+
+@given(st.lists(st.floats(0.0, 1e3), max_size=5))
+def test_laws_that_are_told_apart_one_by_one_count_together_against_a_name(margins: list[float]) -> None:
+    """What is named is a set: of all laws' odds it has its share, each law in it or beside it."""
+    laws = tuple((f"law {k}", by) for k, by in enumerate(margins))
+    _, among, equivalents = probability_of_law(member(laws=laws), STANDARD)
+    odds = {name: float(odds_of_law(by, 1000.0, STANDARD)) for name, by in laws}
+    beside = sum(other for name, other in odds.items() if name not in equivalents)
+    assert among == pytest.approx(1.0 - beside / (1.0 + sum(odds.values())))
+    assert all((odds[name] > STANDARD.equivalent_odds) == (name in equivalents) for name, _ in laws)
 
 
 def test_a_dead_heat_of_two_laws_is_one_half() -> None:
     name = only(names_of([member(size=0.1, laws=(("orifice_leak", 0.0),))], 0.0, STANDARD))
-    assert (name.law, name.equivalents) == (0.5, ("orifice_leak",))
+    assert (name.law, name.among, name.equivalents) == (0.5, 1.0, ("orifice_leak",))
 
 
 def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
-    assert probability_of_law(member("rate_gain"), STANDARD) == (1.0, ())
+    assert probability_of_law(member("rate_gain"), STANDARD) == (1.0, 1.0, ())
 
 
 def test_a_law_that_follows_better_takes_its_rivals_place_once() -> None:
@@ -146,7 +158,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
 
 
 @pytest.mark.parametrize(("of", "law"), [("static_curve", "dead_band"), ("zero", "permanent_set")])
-def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_against_it(of: str, law: str) -> None:
+def test_a_law_within_departures_gives_a_block_its_name_and_others_are_weighed_against_it(of: str, law: str) -> None:
     """Of a curve any law that is one, of another family too."""
     (block, *_) = blocks()[of]
     least = STANDARD.departure**2 * 1000.0
@@ -158,10 +170,10 @@ def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_
         assert name.kind_only is not is_law
         if is_law:
             assert (name.effect.name, name.by, name.member) == (law, one.laws[0], one)
-            assert name.confidence == probability_of_kind(one, 0.0, STANDARD)
-            as_law = member(law, laws=rivals[:1] if of == "zero" else (), fall=1000.0 - margin)
-            assert (name.law, name.equivalents) == probability_of_law(as_law, STANDARD)
-            assert name.equivalents == (("zero_drift",) if of == "zero" else ())
+            assert name.kind == probability_of_kind(one, 0.0, STANDARD)
+            as_law = member(law, laws=rivals, fall=1000.0 - margin)
+            assert (name.law, name.among, name.equivalents) == probability_of_law(as_law, STANDARD)
+            assert name.equivalents == (kin, "wall_hardening")
         else:
             assert name.by is None
 
@@ -185,8 +197,8 @@ def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_
     (block, *_) = blocks()["static_curve"]
     laws = (("contact_area", 1.0), ("dead_band", 90.0))
     curve, other = (
-        member(block, size=0.01, departed=3.0, laws=laws),
-        member("play_hysteresis", size=0.012, departed=3.0),
+        member(block, size=0.01, departed=3.7, laws=laws),
+        member("play_hysteresis", size=0.012, departed=3.7),
     )
     left = 0.02
     assert names_of([curve, other], left, STANDARD) == ()
@@ -265,7 +277,7 @@ def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> No
 
 
 def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_what_is_left() -> None:
-    doubted = [member(size=0.05, departed=5.0), member("rate_gain", size=0.02, departed=5.0)]
+    doubted = [member(size=0.05, departed=5.7), member("rate_gain", size=0.02, departed=5.7)]
     assert not names_of(doubted, 0.03, STANDARD)
     name = only(names_of(doubted, 0.03, STANDARD, is_followed=True))
     assert name.effect.name == "linear_leak"
@@ -275,12 +287,12 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
 
 def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cannot_be_ruled_out() -> None:
     likely, less, small = (
-        member(size=0.05, departed=2.5), member("rate_gain", size=0.04, departed=2.5), member(size=0.05, departed=4.8)
+        member(size=0.05, departed=3.2), member("rate_gain", size=0.04, departed=3.2), member(size=0.05, departed=5.5)
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     name = only(names_of([less, likely], 0.03, STANDARD))
     assert (name.member, name.confidence, name.is_sure) == (likely, 0.5, False)
-    open_ = replace(likely, departed=3.5)
+    open_ = replace(likely, departed=4.2)
     assert only(names_of([open_], 0.03, STANDARD)).confidence == probability_of_kind(open_, 0.03, STANDARD) < 0.5
     assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     assert not names_of([small, less], 0.03, STANDARD)  # the largest can be ruled out
@@ -289,7 +301,7 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cann
 
 def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_than_not() -> None:
     sure = member("rate_gain", size=0.04)
-    likely, less = member(size=0.05, departed=2.5), member(size=0.05, departed=4.0)
+    likely, less = member(size=0.05, departed=3.2), member(size=0.05, departed=4.7)
     assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
@@ -303,8 +315,8 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_t
 
 def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> None:
     (block, *_) = blocks()["static_curve"]
-    curve = member(block, size=0.06, departed=1.5, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
-    likely = member(size=0.05, departed=2.5)
+    curve = member(block, size=0.06, departed=2.2, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
+    likely = member(size=0.05, departed=3.2)
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     for size, count in ((0.06, 1), (0.6, 2)):  # the larger, the surer also without a law
         named = names_of([replace(curve, size=size), likely], 0.03, STANDARD)
@@ -368,8 +380,8 @@ def test_departure_counts_margins_where_an_effect_brings_much() -> None:
 @pytest.mark.parametrize(("field", "few", "many"), [("departure", 0.02, 0.5), ("equivalent_odds", 0.9, 0.01)])
 def test_laws_are_ruled_out_by_departure_and_equivalent_odds(field: str, few: float, many: float) -> None:
     rival = member(fall=10_000.0, laws=(("orifice_leak", 2_000.0),))
-    assert probability_of_law(rival, replace(STANDARD, **{field: few}))[1] == ()
-    assert probability_of_law(rival, replace(STANDARD, **{field: many}))[1] == ("orifice_leak",)
+    assert probability_of_law(rival, replace(STANDARD, **{field: few}))[2] == ()
+    assert probability_of_law(rival, replace(STANDARD, **{field: many}))[2] == ("orifice_leak",)
 
 
 # -- whole diagnoses ---------------------------------------------------------------------------------------------

@@ -192,7 +192,7 @@ def _told(
     is_sure: bool = True,
     by: Any = None,
     alone: Any = None,
-    confidence: float = 0.9,
+    kind: float = 0.9,
 ) -> Any:
     asked: list[Any] = []
 
@@ -214,7 +214,8 @@ def _told(
     name: Any = SimpleNamespace(
         member=member,
         effect=one,
-        confidence=confidence,
+        kind=kind,
+        confidence=0.8 * kind,
         law=0.6,
         equivalents=("orifice_leak",),
         kind_only=kind_only,
@@ -227,7 +228,7 @@ def _told(
     assert asked == [("fine", "without")]
     fitted = ("fit", "static_curve_block") if by is None else (by.fit, "linear_leak")
     assert cause.parameters == {"of": (*fitted, SCALE)}
-    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, confidence, 0.6)
+    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, 0.8 * kind, 0.6)
     assert (cause.equivalents, cause.size) == (("orifice_leak",), 0.0123)
     assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
     return cause
@@ -253,7 +254,7 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     assert lacking.says == "the data holds no " + ", no ".join(sorted(one.replace("_", " ") for one in exposed))
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 1.0, 1.0)
-    kind = _told(monkeypatch, exposed, kind_only=True, confidence=0.5).evidence[-1]
+    kind = _told(monkeypatch, exposed, kind_only=True, kind=0.5).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.0, 1.0)
     assert "a kind that the catalogue does not have" in kind.says
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
