@@ -4,6 +4,7 @@
 single   one effect of the catalogue, each once in 35 cases, log-uniform from 0.05 to 5 % of full scale
 two      two physical effects of families that do not imitate each other, 0.3 to 3 % each
 three    three of them
+alike    two physical effects of families that imitate each other, 0.3 to 3 % each
 none     nothing but nuisances and conditions
 outside  one effect that the catalogue does not have, 0.3 to 3 %
 worlds   one physical effect: unit, machine, protocols, strength, nuisances and noise are the same in the cases 3k,
@@ -21,14 +22,14 @@ import numpy as np
 from simulators.hidden.effects import BY_LAW_ALONE, EFFECTS, Hideable
 from smartshoe.errors import UsageError
 
-KINDS = ("single", "two", "three", "none", "outside", "worlds")
+KINDS = ("single", "two", "three", "alike", "none", "outside", "worlds")
 ALL = {**EFFECTS, **BY_LAW_ALONE}
 INSIDE = tuple(name for name, effect in ALL.items() if effect.inside)
 OUTSIDE = tuple(name for name, effect in ALL.items() if not effect.inside)
 PHYSICAL = tuple(name for name in INSIDE if ALL[name].family not in ("noise", "data"))
 LAWS = 3  # of each effect, in the rotation of `worlds`
 
-# Families of which small amounts imitate each other: never hidden together, never the nuisance beside.
+# Families of which small amounts imitate each other: hidden together in `alike` only, never the nuisance beside.
 IMITATE = {
     "zero": {"leak", "relaxation", "tare"}, "leak": {"zero", "relaxation"}, "tare": {"zero"},
     "relaxation": {"gas_heat", "zero", "leak"}, "gas_heat": {"relaxation", "rate", "timing"},
@@ -41,7 +42,10 @@ STRONGEST = {
     "sensor_nonlinearity": 2.5, "held_samples": 1.0, "delay": 1.5, "rate_gain": 2.5, "linear_leak": 2.5,
     "orifice_leak": 2.5, "cycle_conditioning": 3.0, "mullins_softening": 3.0, "clock_drift": 2.5,
 }  # fmt: skip
-STRENGTHS = {"single": (0.05, 5.0), "worlds": (0.3, 2.0), "two": (0.3, 3.0), "three": (0.3, 2.5), "outside": (0.3, 3.0)}
+STRENGTHS = {
+    "single": (0.05, 5.0), "worlds": (0.3, 2.0), "two": (0.3, 3.0), "three": (0.3, 2.5), "alike": (0.3, 3.0),
+    "outside": (0.3, 3.0),
+}  # fmt: skip
 MOST_DEPARTURE = 0.4
 
 # What shows an effect, and tells it from its neighbours as far as a load history does: the first recording is of these.
@@ -160,12 +164,15 @@ def _names(kind: str, group: int, rng: np.random.Generator) -> tuple[str, ...]:
         order = np.random.default_rng(seeded("order", kind, group // len(pool))).permutation(pool)
         return (str(order[group % len(pool)]),)
     names: list[str] = []
-    while len(names) < (2 if kind == "two" else 3):
+    while len(names) < (3 if kind == "three" else 2):
         name = str(rng.choice(PHYSICAL))
         taken = {ALL[other].family for other in names}
-        near = taken.union(*(IMITATE.get(family, set()) for family in taken))
-        if ALL[name].family not in near:
+        imitators = set[str]().union(*(IMITATE.get(family, set()) for family in taken)) - taken
+        family = ALL[name].family
+        if (family in imitators or not names) if kind == "alike" else family not in taken | imitators:
             names.append(name)
+        elif kind == "alike" and not imitators:  # nothing imitates the first
+            names.clear()
     return tuple(names)
 
 

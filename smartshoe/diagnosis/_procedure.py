@@ -246,7 +246,7 @@ def _diagnosed(
     unnamed = max((one.member.size for one, _ in unclear), default=0.0)
     unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
     names = _less(names, unclear)
-    unclear += [(one, said) for one in names if (said := departure_of(one, names))]
+    unclear += [(one, said) for one in names if (said := departure_of(one, names, thresholds))]
     names = _less(names, unclear)
     cycles = load_cycles(sessions, thresholds)
     surest = sorted(names, key=lambda one: -one.kind)[:cycles]

@@ -95,11 +95,14 @@ def few_cycles_of(name: Name, cycles: int) -> str:
     )
 
 
-def departure_of(name: Name, names: Sequence[Name]) -> str | None:
-    """What is said of an effect beside a surer one of its mechanism, of whose law it may be the departure."""
+def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> str | None:
+    """What is said of an effect beside a surer one of its mechanism, of whose law it may be the departure.
+
+    It is none where it is larger than laws depart by.
+    """
     alike = (one for one in names if one.effect.mechanism == name.effect.mechanism != "")
     surest = max(alike, key=lambda one: one.kind, default=name)
-    if surest is name:
+    if surest is name or name.member.size > thresholds.law_departure * surest.member.size:
         return None
     said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
     return (

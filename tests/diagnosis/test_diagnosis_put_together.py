@@ -223,16 +223,24 @@ def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts
     assert said.startswith("delay fits, but readings were moved to the load's clock before")
 
 
-def test_of_two_effects_of_one_mechanism_the_surer_is_named(parts: Any) -> None:
+def test_of_two_effects_of_one_mechanism_the_surer_is_named_unless_the_other_is_no_departure(parts: Any) -> None:
     """Friction that grows with the load and friction that does not are limits of one law."""
-    for sure, named in ((0.8, ["play_hysteresis"]), (0.95, ["load_unload_asymmetry"])):
-        other = "load unload asymmetry" if sure < 0.9 else "play hysteresis"
-        parts.sizes |= {"play_hysteresis": 0.1, "load_unload_asymmetry": 0.1}
-        parts.names = [_name("play_hysteresis"), _name("delay"), _name("load_unload_asymmetry", kind=sure)]
-        parts.seen.clear()
-        told = _run_diagnosis(parts)
-        assert {one.name for one in told.causes} == {*named, "delay"}
-        assert any(said.startswith(f"{other} fits beside") for said in told.limits)
+    most = STANDARD.law_departure * 0.1
+    for other, sure, named in (
+        ("load_unload_asymmetry", 0.8, ["play_hysteresis"]),
+        ("play_hysteresis", 0.95, ["load_unload_asymmetry"]),
+    ):
+        sizes = {"play_hysteresis": 0.1, "load_unload_asymmetry": 0.1, other: most}
+        for size, is_departure in ((most, True), (1.001 * most, False)):
+            parts.sizes |= {**sizes, other: size}
+            sized = {name: _name(name, size=parts.sizes[name]) for name in ("play_hysteresis", "delay")}
+            asymmetry = _name("load_unload_asymmetry", size=parts.sizes["load_unload_asymmetry"], kind=sure)
+            parts.names = [*sized.values(), asymmetry]
+            parts.seen.clear()
+            told = _run_diagnosis(parts)
+            assert {one.name for one in told.causes} == {*named, "delay"} | (set() if is_departure else {other})
+            said = f"{other.replace('_', ' ')} fits beside"
+            assert any(limit.startswith(said) for limit in told.limits) is is_departure
 
 
 def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
