@@ -89,17 +89,17 @@ class Thresholds:
         "about 1 in 4",
     )
     kind_odds: tuple[float, ...] = threshold(
-        (3.5, -1.12, -0.99, -1.09, -2.22),
+        (3.7, -1.12, -0.99, -1.09, -2.22),
         "log odds",
         "of a kind: intercept; per log of what no equation follows over its size; per standard deviation of its"
         " departure; where no law of it follows; for its likeness to another effect that is there",
-        "logistic regression on the effects that were fitted to 661 cases of two worlds; the intercept to 400 later",
+        "logistic regression on the effects that were fitted to 661 cases of two worlds; the intercept to 800 later",
     )
     least_confidence: float = threshold(
-        0.86,
+        0.88,
         "probability",
         "of the kind; below it a cause is named for its size alone; of a zero that is never seen",
-        "six to one for being right",
+        "seven to one for being right",
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
     memory_s: tuple[float, ...] = threshold(

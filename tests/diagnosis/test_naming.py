@@ -287,12 +287,12 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
 
 def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cannot_be_ruled_out() -> None:
     likely, less, small = (
-        member(size=0.05, departed=3.2), member("rate_gain", size=0.04, departed=3.2), member(size=0.05, departed=5.5)
+        member(size=0.05, departed=3.4), member("rate_gain", size=0.04, departed=3.4), member(size=0.05, departed=5.8)
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     name = only(names_of([less, likely], 0.03, STANDARD))
     assert (name.member, name.confidence, name.is_sure) == (likely, 0.5, False)
-    open_ = replace(likely, departed=4.2)
+    open_ = replace(likely, departed=4.5)
     assert only(names_of([open_], 0.03, STANDARD)).confidence == probability_of_kind(open_, 0.03, STANDARD) < 0.5
     assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     assert not names_of([small, less], 0.03, STANDARD)  # the largest can be ruled out
@@ -301,7 +301,7 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cann
 
 def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_than_not() -> None:
     sure = member("rate_gain", size=0.04)
-    likely, less = member(size=0.05, departed=3.2), member(size=0.05, departed=4.7)
+    likely, less = member(size=0.05, departed=3.4), member(size=0.05, departed=5.0)
     assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
@@ -315,8 +315,8 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_t
 
 def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> None:
     (block, *_) = blocks()["static_curve"]
-    curve = member(block, size=0.06, departed=2.2, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
-    likely = member(size=0.05, departed=3.2)
+    curve = member(block, size=0.06, departed=2.4, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
+    likely = member(size=0.05, departed=3.4)
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     for size, count in ((0.06, 1), (0.6, 2)):  # the larger, the surer also without a law
         named = names_of([replace(curve, size=size), likely], 0.03, STANDARD)
