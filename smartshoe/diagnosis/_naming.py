@@ -18,27 +18,22 @@ from smartshoe.models.effects import Effect, catalogue
 class Name:
     """``effect`` and ``equivalents``, which nothing tells from it, in the place of a member.
 
-    ``kind``: probability that an effect of this family is there. ``law``: that it is then this one and not its nearest
-    rival, one half in a dead heat; ``among``: that it is this one or one of ``equivalents``. ``kind_only``: its family
-    is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this family.
-    ``by``: the law as it was fitted in the place of a flexible block, which stays in the model, since the law departs
-    by more than a little and by no more than laws do.
+    ``kind``: probability that an effect of this family is there, by which it is named. ``confidence``: that it is this
+    effect or one of ``equivalents``. ``law``: that it is then this one and not its nearest rival, one half in a dead
+    heat. ``kind_only``: its family is what was found; its equation follows no better than others of the family.
+    ``is_sure``: that it is of this family. ``by``: the law as it was fitted in the place of a flexible block, which
+    stays in the model, since the law departs by more than a little and by no more than laws do.
     """
 
     member: Member
     effect: Effect
     kind: float
+    confidence: float
     law: float
-    among: float
     equivalents: tuple[str, ...]
     kind_only: bool = False
     is_sure: bool = True
     by: Alternative | None = None
-
-    @property
-    def confidence(self) -> float:
-        """That it is this effect or one of its ``equivalents``."""
-        return self.kind * self.among
 
 
 def names_of(
@@ -96,15 +91,19 @@ def names_of(
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     kind = probability_of_kind(one, left, thresholds)
     is_sure = kind >= thresholds.least_confidence
+
+    def followed_by(effect: Effect, as_law: Member, by: Alternative | None = None) -> Name:
+        law, among, equivalents = probability_of_law(as_law, thresholds)
+        named = among * probability_when_named(kind, thresholds)
+        return Name(one, effect, kind, named, law, equivalents, is_sure=is_sure, by=by)
+
     by = _law_in_its_place(one)
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
         beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a is not by)
-        as_law = replace(one, laws=beside, fall=one.fall - by.margin)
-        followed = catalogue()[str(by.effect)]
-        return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
+        return followed_by(catalogue()[str(by.effect)], replace(one, laws=beside, fall=one.fall - by.margin), by)
     if not (one.effect.is_flexible or one.is_any_curve):
-        return Name(one, one.effect, kind, *probability_of_law(one, thresholds), is_sure=is_sure)
+        return followed_by(one.effect, one)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
     curves = [str(a.effect) for a in one.laws if one.is_any_curve]
     others = dict.fromkeys((*_kin_of(nearest), *curves))
@@ -112,7 +111,8 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     # Of a family of one law nothing follows better or worse than another.
     lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
     sure = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
-    return Name(one, nearest, sure, 1.0 / (1.0 + len(kin)), 1.0, kin, True, is_sure)
+    named = probability_when_named(sure, thresholds)
+    return Name(one, nearest, sure, named, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 
 
 def _law_in_its_place(one: Member) -> Alternative | None:
@@ -142,7 +142,7 @@ def _nearest_of_kind(block: Member) -> Effect:
 
 
 def _doubted(name: Name) -> Name:
-    return replace(name, kind=min(name.kind, 0.5), is_sure=False)
+    return replace(name, kind=min(name.kind, 0.5), confidence=min(name.confidence, 0.5), is_sure=False)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
@@ -159,6 +159,13 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, law
     score += without_law * lawless + per_likeness * one.likeness
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
+
+
+def probability_when_named(kind: float, thresholds: Thresholds) -> float:
+    """That a ``kind`` is there which is sure enough to be named, and is: more than by its odds; else no more."""
+    if kind < thresholds.least_confidence:
+        return kind
+    return kind / (kind + (1.0 - kind) * math.exp(-thresholds.named_odds))
 
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, float, tuple[str, ...]]:

@@ -376,13 +376,13 @@ def _member(
 
 
 def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
-    """3.7; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -1.09; -2.22 a likeness."""
+    """2.77; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -1.09; -2.22 a likeness."""
     for size, departed, left, margin, lawless, others, likeness in (
         (0.01, 0.5, 0.002, 40.0, False, 0.003, 0.4), (0.001, 2.0, 0.01, 3.0, True, 0.0, 0.0),
         (0.05, 0.0, 0.0, 0.5, False, 0.01, 0.9),
     ):  # fmt: skip
         ratio = (math.hypot(left, others) + 2e-4) / (size + 2e-4)
-        score = 3.7 - 1.12 * math.log(ratio) - 0.99 * departed - 1.09 * lawless - 2.22 * likeness
+        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departed - 1.09 * lawless - 2.22 * likeness
         expected = 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-margin / 2.0))
         one = _member(size, departed, margin, others=others, likeness=likeness)
         assert probability_of_kind(one, left, STANDARD, lawless=lawless) == pytest.approx(expected)
@@ -414,4 +414,4 @@ def test_a_member_is_named_from_what_is_material_and_sure_on() -> None:
     sure = probability_of_kind(_member(), 0.002, STANDARD)
     for least, is_sure in ((sure, True), (sure + 1e-9, False)):
         (name,) = names_of([_member()], 0.002, replace(STANDARD, least_confidence=least))
-        assert (name.is_sure, name.confidence) == (is_sure, sure if is_sure else 0.5)
+        assert (name.is_sure, name.kind) == (is_sure, sure if is_sure else 0.5)

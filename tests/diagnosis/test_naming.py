@@ -21,7 +21,14 @@ from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._laws import likelier_laws
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._members import Alternative, Member
-from smartshoe.diagnosis._naming import Name, names_of, odds_of_law, probability_of_kind, probability_of_law
+from smartshoe.diagnosis._naming import (
+    Name,
+    names_of,
+    odds_of_law,
+    probability_of_kind,
+    probability_of_law,
+    probability_when_named,
+)
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -77,9 +84,10 @@ def test_a_name_is_as_sure_as_its_kind_and_its_law_shared_with_the_nearest_rival
     one = member(size=0.1, laws=(("orifice_leak", margin),))
     name = only(names_of([one], 0.0, STANDARD))
     assert name.kind == probability_of_kind(one, 0.0, STANDARD)
-    assert (name.law, name.among, name.equivalents) == probability_of_law(one, STANDARD)
-    assert 0.5 <= name.law <= name.among <= 1.0
-    assert name.confidence == name.kind * name.among
+    law, among, equivalents = probability_of_law(one, STANDARD)
+    assert (name.law, name.equivalents) == (law, equivalents)
+    assert 0.5 <= law <= among <= 1.0
+    assert name.confidence == among * probability_when_named(name.kind, STANDARD)
 
 
 @given(st.lists(st.floats(0.0, 1e3), max_size=5))
@@ -95,7 +103,7 @@ def test_laws_that_are_told_apart_one_by_one_count_together_against_a_name(margi
 
 def test_a_dead_heat_of_two_laws_is_one_half() -> None:
     name = only(names_of([member(size=0.1, laws=(("orifice_leak", 0.0),))], 0.0, STANDARD))
-    assert (name.law, name.among, name.equivalents) == (0.5, 1.0, ("orifice_leak",))
+    assert (name.law, name.equivalents) == (0.5, ("orifice_leak",))
 
 
 def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
@@ -110,9 +118,24 @@ def test_a_law_that_follows_better_takes_its_rivals_place_once() -> None:
     assert likelier_laws((better, other), ()) == {"linear_leak": "orifice_leak", "gas_compression": "contact_area"}
     assert likelier_laws((better, other), ("orifice_leak",)) == {"gas_compression": "contact_area"}
     assert not likelier_laws((member(laws=(("orifice_leak", 3.0),)), member("rate_gain")), ())
+    # One of another family, of the same mechanism, is weighed and takes no place.
+    other = ("load_unload_asymmetry", -3.0)
+    assert not likelier_laws((member("play_hysteresis", laws=(other, ("bouc_wen_hysteresis", 2.0))),), ())
     (block, *_) = blocks()["static_curve"]
     # A curve gives way under conditions of its own.
     assert not likelier_laws((member(block, laws=(("contact_area", -3.0),)),), ())
+
+
+@given(st.floats(0.0, 1.0))
+def test_a_kind_that_is_sure_is_surer_for_being_named_by_the_same_odds(kind: float) -> None:
+    named = probability_when_named(kind, STANDARD)
+    if kind < STANDARD.least_confidence:
+        assert named == kind
+        return
+    assert kind <= named <= 1.0
+    odds, before = (p / (1.0 - p) if p < 1.0 else math.inf for p in (named, kind))
+    assert odds == pytest.approx(before * math.exp(STANDARD.named_odds), rel=1e-6) or odds > 1e9
+    assert probability_when_named(kind, replace(STANDARD, named_odds=0.0)) == pytest.approx(kind)
 
 
 # -- which kind -----------------------------------------------------------------------------------------------
@@ -152,8 +175,9 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family
-    assert name.confidence == probability_of_kind(name.member, 0.0, STANDARD, lawless=True)
-    assert name.confidence < probability_of_kind(name.member, 0.0, STANDARD)
+    assert name.kind == probability_of_kind(name.member, 0.0, STANDARD, lawless=True)
+    assert name.kind < probability_of_kind(name.member, 0.0, STANDARD)
+    assert name.confidence == probability_when_named(name.kind, STANDARD)
     assert name.law == pytest.approx(1.0 / len(family))
 
 
@@ -172,7 +196,7 @@ def test_a_law_within_departures_gives_a_block_its_name_and_others_are_weighed_a
             assert (name.effect.name, name.by, name.member) == (law, one.laws[0], one)
             assert name.kind == probability_of_kind(one, 0.0, STANDARD)
             as_law = member(law, laws=rivals, fall=1000.0 - margin)
-            assert (name.law, name.among, name.equivalents) == probability_of_law(as_law, STANDARD)
+            assert (name.law, name.equivalents) == probability_of_law(as_law, STANDARD)[::2]
             assert name.equivalents == (kin, "wall_hardening")
         else:
             assert name.by is None
@@ -188,7 +212,7 @@ def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> 
         ("contact_area", "saturation"),
         True,
     )
-    assert name.confidence == probability_of_kind(one, 0.0, STANDARD, lawless=True)
+    assert name.kind == probability_of_kind(one, 0.0, STANDARD, lawless=True)
     assert name.law == pytest.approx(1.0 / 3.0)
 
 
@@ -197,8 +221,8 @@ def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_
     (block, *_) = blocks()["static_curve"]
     laws = (("contact_area", 1.0), ("dead_band", 90.0))
     curve, other = (
-        member(block, size=0.01, departed=3.7, laws=laws),
-        member("play_hysteresis", size=0.012, departed=3.7),
+        member(block, size=0.01, departed=3.0, laws=laws),
+        member("play_hysteresis", size=0.012, departed=3.0),
     )
     left = 0.02
     assert names_of([curve, other], left, STANDARD) == ()
@@ -236,7 +260,8 @@ def test_a_kind_without_a_law_is_half_sure_at_most_or_as_sure_as_a_name_must_be(
         one = member(block, size=0.06, departed=departed, laws=margins)
         name = only(names_of([one], 0.03, STANDARD))
         kind = probability_of_kind(one, 0.03, STANDARD, lawless=True)
-        assert name.confidence == (kind if kind >= STANDARD.least_confidence else min(kind, 0.5))
+        assert name.kind == (kind if kind >= STANDARD.least_confidence else min(kind, 0.5))
+        assert name.confidence == probability_when_named(name.kind, STANDARD)
         seen.add((kind >= STANDARD.least_confidence, kind > 0.5))
     assert seen == {(True, True), (False, True), (False, False)}
 
@@ -254,7 +279,7 @@ def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
     (block,) = blocks()["gain_drift"]
     name = only(names_of([member(block)], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == ("gain_drift", (), True)
-    assert name.confidence == probability_of_kind(name.member, 0.0, STANDARD)
+    assert name.kind == probability_of_kind(name.member, 0.0, STANDARD)
 
 
 def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:
@@ -277,7 +302,7 @@ def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> No
 
 
 def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_what_is_left() -> None:
-    doubted = [member(size=0.05, departed=5.7), member("rate_gain", size=0.02, departed=5.7)]
+    doubted = [member(size=0.05, departed=5.0), member("rate_gain", size=0.02, departed=5.0)]
     assert not names_of(doubted, 0.03, STANDARD)
     name = only(names_of(doubted, 0.03, STANDARD, is_followed=True))
     assert name.effect.name == "linear_leak"
@@ -287,12 +312,12 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
 
 def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cannot_be_ruled_out() -> None:
     likely, less, small = (
-        member(size=0.05, departed=3.4), member("rate_gain", size=0.04, departed=3.4), member(size=0.05, departed=5.8)
+        member(size=0.05, departed=2.5), member("rate_gain", size=0.04, departed=2.5), member(size=0.05, departed=4.8)
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     name = only(names_of([less, likely], 0.03, STANDARD))
     assert (name.member, name.confidence, name.is_sure) == (likely, 0.5, False)
-    open_ = replace(likely, departed=4.5)
+    open_ = replace(likely, departed=3.5)
     assert only(names_of([open_], 0.03, STANDARD)).confidence == probability_of_kind(open_, 0.03, STANDARD) < 0.5
     assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     assert not names_of([small, less], 0.03, STANDARD)  # the largest can be ruled out
@@ -301,7 +326,7 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cann
 
 def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_than_not() -> None:
     sure = member("rate_gain", size=0.04)
-    likely, less = member(size=0.05, departed=3.4), member(size=0.05, departed=5.0)
+    likely, less = member(size=0.05, departed=2.5), member(size=0.05, departed=4.0)
     assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
@@ -315,8 +340,8 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_t
 
 def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> None:
     (block, *_) = blocks()["static_curve"]
-    curve = member(block, size=0.06, departed=2.4, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
-    likely = member(size=0.05, departed=3.4)
+    curve = member(block, size=0.06, departed=1.5, laws=(("dead_band", 500.0), ("contact_area", 510.0)))
+    likely = member(size=0.05, departed=2.5)
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     for size, count in ((0.06, 1), (0.6, 2)):  # the larger, the surer also without a law
         named = names_of([replace(curve, size=size), likely], 0.03, STANDARD)

@@ -14,9 +14,7 @@ def test_a_loop_and_an_asymmetry_of_one_size_are_named_both_where_neither_law_fo
     """Where a loop's law takes up most of the asymmetry, that stays in the model: one of them is named at least."""
     both = 0
     for seed in range(28, 34):
-        case = hide(
-            {LOOPS[seed // 2 % 2]: 1.5, "load_unload_asymmetry": 1.5}, protocol=PROTOCOLS[seed % 2], seed=seed
-        )
+        case = hide({LOOPS[seed // 2 % 2]: 1.5, "load_unload_asymmetry": 1.5}, protocol=PROTOCOLS[seed % 2], seed=seed)
         found = diagnose(case.recordings, case.hold_out)
         sure = {cause.name for cause in found.causes if cause.confidence > 0.5 and cause.size > 1.5e-3}
         assert sure & FRICTION
