@@ -52,12 +52,7 @@ def likelier_laws(members: Sequence[Member], banned: Sequence[str]) -> dict[str,
 
     The linearised search prefers what comes nearest to all equations of the family.
     """
-    laws = catalogue()
-    nearest = (
-        (one, next((law for law in one.laws if laws[str(law.effect)].slot == one.effect.slot), None))
-        for one in members
-        if not one.effect.is_flexible
-    )
+    nearest = ((one, next(iter(one.laws), None)) for one in members if not one.effect.is_flexible)
     return {
         one.name: str(law.effect)
         for one, law in nearest

@@ -36,11 +36,11 @@ class Member:
 
     ``size``: rms by which the reading moves without it, all else fitted anew (``without``).
     ``departed``: how far the data asks its equation to depart, in standard deviations of the departure allowed.
-    ``alternatives``: by evidence about the fit, nearest first. ``laws``: the other laws of its family or mechanism,
-    each fitted in its place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood.
-    ``others_depart``: rms by which the other members' equations are asked to depart. ``likeness``: largest cosine of
-    what it adds to the reading with what another member adds, 0 where all pull against it. ``is_ended``: it lies where
-    it turns into an effect of another kind.
+    ``alternatives``: by evidence about the fit, nearest first. ``laws``: the family's other laws, each fitted in its
+    place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood. ``others_depart``: rms by
+    which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
+    with what another member adds, 0 where all pull against it. ``is_ended``: it lies where it turns into an effect of
+    another kind.
     """
 
     effect: Effect
@@ -118,13 +118,12 @@ def _without(name: str, model: ExtendedModel) -> ExtendedModel:
 def _other_laws(
     one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit, thresholds: Thresholds, *, is_ended: bool
 ) -> tuple[Alternative, ...]:
-    """The other laws of a member's family or mechanism, each fitted in its place, nearest first; of any curve all."""
+    """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
     of_curves = _is_any_curve(one.effect, is_ended)
     channels = {e.name for e in available(likelihood.sessions, thresholds)}
     found = []
     for law in catalogue().values():
-        is_of_its_kind = one.slot == law.slot or law.mechanism == one.effect.mechanism != ""
-        is_other = law.is_memoryless if of_curves else is_of_its_kind
+        is_other = law.is_memoryless if of_curves else law.slot == one.effect.slot
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         start = begun_with(law, less.model, likelihood)

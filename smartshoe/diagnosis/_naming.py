@@ -16,13 +16,13 @@ from smartshoe.models.effects import Effect, catalogue
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """``effect`` and ``equivalents``, which nothing tells from it, in the place of a member.
+    """``confidence`` that it is this effect or one of ``equivalents``, which nothing tells from it; ``law`` of the two.
 
-    ``kind``: probability that an effect of this family is there, by which it is named. ``confidence``: that it is this
-    effect or one of ``equivalents``. ``law``: that it is then this one and not its nearest rival, one half in a dead
-    heat. ``kind_only``: its family is what was found; its equation follows no better than others of the family.
-    ``is_sure``: that it is of this family. ``by``: the law as it was fitted in the place of a flexible block, which
-    stays in the model, since the law departs by more than a little and by no more than laws do.
+    ``kind``: probability that one of its family is there, by which it is named. ``law``: that it is this effect and not
+    its nearest rival in the family, one half in a dead heat. ``kind_only``: its family is what was found; its equation
+    follows no better than others of the family. ``is_sure``: that it is of this family. ``by``: the law as it was
+    fitted in the place of a flexible block, which stays in the model, since the law departs by more than a little and
+    by no more than laws do.
     """
 
     member: Member
@@ -90,29 +90,26 @@ def names_of(
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     kind = probability_of_kind(one, left, thresholds)
-    is_sure = kind >= thresholds.least_confidence
-
-    def followed_by(effect: Effect, as_law: Member, by: Alternative | None = None) -> Name:
-        law, among, equivalents = probability_of_law(as_law, thresholds)
-        named = among * probability_when_named(kind, thresholds)
-        return Name(one, effect, kind, named, law, equivalents, is_sure=is_sure, by=by)
-
+    is_sure, sure = kind >= thresholds.least_confidence, probability_when_named(kind, thresholds)
     by = _law_in_its_place(one)
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
-        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a is not by)
-        return followed_by(catalogue()[str(by.effect)], replace(one, laws=beside, fall=one.fall - by.margin), by)
+        followed = catalogue()[str(by.effect)]
+        kin = _kin_of(followed)
+        beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
+        as_law = replace(one, laws=beside, fall=one.fall - by.margin)
+        return Name(one, followed, kind, sure, *probability_of_law(as_law, thresholds), False, is_sure, by)
     if not (one.effect.is_flexible or one.is_any_curve):
-        return followed_by(one.effect, one)
+        law, equivalents = probability_of_law(one, thresholds)
+        return Name(one, one.effect, kind, sure, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
-    curves = [str(a.effect) for a in one.laws if one.is_any_curve]
-    others = dict.fromkeys((*_kin_of(nearest), *curves))
+    others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
     kin = tuple(name for name in others if name != nearest.name)
     # Of a family of one law nothing follows better or worse than another.
     lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
-    sure = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
-    named = probability_when_named(sure, thresholds)
-    return Name(one, nearest, sure, named, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
+    kind = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
+    sure = probability_when_named(kind, thresholds)
+    return Name(one, nearest, kind, sure, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 
 
 def _law_in_its_place(one: Member) -> Alternative | None:
@@ -168,16 +165,14 @@ def probability_when_named(kind: float, thresholds: Thresholds) -> float:
     return kind / (kind + (1.0 - kind) * math.exp(-thresholds.named_odds))
 
 
-def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, float, tuple[str, ...]]:
-    """That it is this law of its family, that it is it or one that this data cannot tell from it, and those laws.
+def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:
+    """That it is this law of its family, and the laws that this data cannot tell from it.
 
-    The former is held against its nearest rival: one half in a dead heat. Laws that are told from it, each a little,
-    may together be one half as likely: they count against the latter.
+    It is held against its nearest rival: one half in a dead heat.
     """
-    odds = {str(a.effect): float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws}
+    odds = {a.effect: float(odds_of_law(a.margin, one.fall, thresholds)) for a in one.laws if a.effect is not None}
     equivalents = tuple(name for name, other in odds.items() if other > thresholds.equivalent_odds)
-    among = (1.0 + sum(odds[name] for name in equivalents)) / (1.0 + sum(odds.values()))
-    return 1.0 / (1.0 + max(odds.values(), default=0.0)), among, equivalents
+    return 1.0 / (1.0 + max(odds.values(), default=0.0)), equivalents
 
 
 def odds_of_law(margin: Array | float, fall: float, thresholds: Thresholds) -> Array:

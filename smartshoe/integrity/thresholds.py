@@ -102,10 +102,10 @@ class Thresholds:
         "three to one for being right",
     )
     named_odds: float = threshold(
-        0.9,
+        0.5,
         "log odds",
         "by which a kind that is sure is surer for being named: what else speaks against a name has not",
-        "names of 400 cases of two worlds, of which 97 in 100 were of the right kind for 92 by their odds",
+        "1,489 names of two worlds",
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
     memory_s: tuple[float, ...] = threshold(
