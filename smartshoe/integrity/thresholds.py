@@ -104,7 +104,7 @@ class Thresholds:
     named_odds: float = threshold(
         0.5,
         "log odds",
-        "by which a kind that is sure is surer for being named: what else speaks against a name has not",
+        "by which a kind beyond least_confidence is likelier for being named: what else speaks against it has not",
         "1,489 names of two worlds",
     )
     still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
