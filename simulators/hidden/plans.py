@@ -15,6 +15,7 @@ worlds   one physical effect: unit, machine, protocols, strength, nuisances and 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,8 +103,7 @@ class Plan:
     @property
     def families(self) -> frozenset[str]:
         """Of the effects, and of what imitates them."""
-        own = {ALL[name].family for name in self.effects}
-        return frozenset(own.union(*(IMITATE.get(family, set()) for family in own)) if own else own)
+        return frozenset(_near({ALL[name].family for name in self.effects}))
 
 
 def seeded(*key: object) -> int:
@@ -141,7 +141,7 @@ def plan(kind: str, index: int) -> Plan:
         0.0 if zero == "seen" else 60.0 * (len(fitted) + 1)
     )
     rate = rate if rate * total_s <= MOST_SAMPLES else 100.0
-    near = families.union(*(IMITATE.get(family, set()) for family in families))
+    near = _near(families)
     tare, offset, late = rng.random() < 0.3, rng.random() < 0.25, rng.random() < 0.25
     sizes = [_log(rng, 0.002, 0.03), _log(rng, 0.001, 0.015), _log(rng, 0.002, 0.02)]
     signs = rng.choice([-1.0, 1.0], 3)
@@ -166,14 +166,18 @@ def _names(kind: str, group: int, rng: np.random.Generator) -> tuple[str, ...]:
     names: list[str] = []
     while len(names) < (3 if kind == "three" else 2):
         name = str(rng.choice(PHYSICAL))
-        taken = {ALL[other].family for other in names}
-        imitators = set[str]().union(*(IMITATE.get(family, set()) for family in taken)) - taken
-        family = ALL[name].family
-        if (family in imitators or not names) if kind == "alike" else family not in taken | imitators:
+        family, taken = ALL[name].family, {ALL[other].family for other in names}
+        near = _near(taken)
+        if not names or (family in near - taken if kind == "alike" else family not in near):
             names.append(name)
-        elif kind == "alike" and not imitators:  # nothing imitates the first
+        elif kind == "alike" and near == taken:  # nothing imitates the first
             names.clear()
     return tuple(names)
+
+
+def _near(families: Set[str]) -> set[str]:
+    """``families`` and those that imitate them."""
+    return {*families}.union(*(IMITATE.get(family, set()) for family in families))
 
 
 def _laws(effect: Hideable) -> tuple[str, ...]:

@@ -16,19 +16,17 @@ from smartshoe.models.effects import Effect, catalogue
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """``confidence`` that it is this effect or one of ``equivalents``, which nothing tells from it; ``law`` of the two.
+    """``kind``: by its odds, that it is this effect or one of ``equivalents``, which nothing tells from it.
 
-    ``kind``: probability that one of its family is there, by which it is named. ``law``: that it is this effect and not
-    its nearest rival in the family, one half in a dead heat. ``kind_only``: its family is what was found; its equation
-    follows no better than others of the family. ``is_sure``: that it is of this family. ``by``: the law as it was
-    fitted in the place of a flexible block, which stays in the model, since the law departs by more than a little and
-    by no more than laws do.
+    ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
+    family is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this
+    family. ``by``: the law as it was fitted in the place of a flexible block, which stays in the model, since the law
+    departs by more than a little and by no more than laws do.
     """
 
     member: Member
     effect: Effect
     kind: float
-    confidence: float
     law: float
     equivalents: tuple[str, ...]
     kind_only: bool = False
@@ -90,7 +88,7 @@ def names_of(
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     kind = probability_of_kind(one, left, thresholds)
-    is_sure, sure = kind >= thresholds.least_confidence, probability_when_named(kind, thresholds)
+    is_sure = kind >= thresholds.least_confidence
     by = _law_in_its_place(one)
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
@@ -98,18 +96,17 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
         kin = _kin_of(followed)
         beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
         as_law = replace(one, laws=beside, fall=one.fall - by.margin)
-        return Name(one, followed, kind, sure, *probability_of_law(as_law, thresholds), False, is_sure, by)
+        return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
     if not (one.effect.is_flexible or one.is_any_curve):
         law, equivalents = probability_of_law(one, thresholds)
-        return Name(one, one.effect, kind, sure, law, equivalents, is_sure=is_sure)
+        return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
     others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
     kin = tuple(name for name in others if name != nearest.name)
     # Of a family of one law nothing follows better or worse than another.
     lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
     kind = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
-    sure = probability_when_named(kind, thresholds)
-    return Name(one, nearest, kind, sure, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
+    return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 
 
 def _law_in_its_place(one: Member) -> Alternative | None:
@@ -139,7 +136,7 @@ def _nearest_of_kind(block: Member) -> Effect:
 
 
 def _doubted(name: Name) -> Name:
-    return replace(name, kind=min(name.kind, 0.5), confidence=min(name.confidence, 0.5), is_sure=False)
+    return replace(name, kind=min(name.kind, 0.5), is_sure=False)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
@@ -158,11 +155,11 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, law
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 
 
-def probability_when_named(kind: float, thresholds: Thresholds) -> float:
-    """That a ``kind`` is there which is sure enough to be named, and is: more than by its odds; else no more."""
-    if kind < thresholds.least_confidence:
-        return kind
-    return kind / (kind + (1.0 - kind) * math.exp(-thresholds.named_odds))
+def confidence_of(name: Name, thresholds: Thresholds) -> float:
+    """That it is what it is named, or one of its equivalents: more than by its odds where it is sure, else no more."""
+    if not name.is_sure or name.kind < thresholds.least_confidence:
+        return name.kind
+    return name.kind / (name.kind + (1.0 - name.kind) * math.exp(-thresholds.named_odds))
 
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:

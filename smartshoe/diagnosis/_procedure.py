@@ -16,7 +16,7 @@ from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._force import force_error, force_of, undoes
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
-from smartshoe.diagnosis._naming import Name, names_of
+from smartshoe.diagnosis._naming import Name, confidence_of, names_of
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import in_unit, joint_parameters, parameters_of
@@ -419,7 +419,7 @@ def _cause(
         )
     by = None if name.by is None else name.by.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, given.scale)
-    sure = name.confidence, name.law
+    sure = confidence_of(name, thresholds), name.law
     return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals, member.name)
 
 

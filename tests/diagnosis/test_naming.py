@@ -21,7 +21,7 @@ from smartshoe.diagnosis import Diagnosis, Thresholds
 from smartshoe.diagnosis._laws import likelier_laws
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._members import Alternative, Member
-from smartshoe.diagnosis._naming import Name, names_of, probability_of_kind, probability_of_law, probability_when_named
+from smartshoe.diagnosis._naming import Name, confidence_of, names_of, probability_of_kind, probability_of_law
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, Effect, EffectParameter, blocks, by, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
@@ -77,7 +77,6 @@ def test_a_name_is_as_sure_as_its_kind_and_its_law_shared_with_the_nearest_rival
     one = member(size=0.1, laws=(("orifice_leak", margin),))
     name = only(names_of([one], 0.0, STANDARD))
     assert name.kind == probability_of_kind(one, 0.0, STANDARD)
-    assert name.confidence == probability_when_named(name.kind, STANDARD)
     assert (name.law, name.equivalents) == probability_of_law(one, STANDARD)
     assert 0.5 <= name.law <= 1.0
 
@@ -106,14 +105,16 @@ def test_a_law_that_follows_better_takes_its_rivals_place_once() -> None:
 
 @given(st.floats(0.0, 1.0))
 def test_a_kind_that_is_sure_is_surer_for_being_named_by_the_same_odds(kind: float) -> None:
-    named = probability_when_named(kind, STANDARD)
+    one = Name(member(), effect("linear_leak"), kind, 1.0, ())
+    named = confidence_of(one, STANDARD)
+    assert confidence_of(replace(one, is_sure=False), STANDARD) == kind
     if kind < STANDARD.least_confidence:
         assert named == kind
         return
     assert kind <= named <= 1.0
     odds, before = (p / (1.0 - p) if p < 1.0 else math.inf for p in (named, kind))
     assert odds == pytest.approx(before * math.exp(STANDARD.named_odds), rel=1e-6) or odds > 1e9
-    assert probability_when_named(kind, replace(STANDARD, named_odds=0.0)) == pytest.approx(kind)
+    assert confidence_of(one, replace(STANDARD, named_odds=0.0)) == pytest.approx(kind)
 
 
 # -- which kind -----------------------------------------------------------------------------------------------
@@ -155,7 +156,6 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert {name.effect.name, *name.equivalents} == family
     assert name.kind == probability_of_kind(name.member, 0.0, STANDARD, lawless=True)
     assert name.kind < probability_of_kind(name.member, 0.0, STANDARD)
-    assert name.confidence == probability_when_named(name.kind, STANDARD)
     assert name.law == pytest.approx(1.0 / len(family))
 
 
@@ -206,7 +206,7 @@ def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_
     assert names_of([curve, other], left, STANDARD) == ()
     name = only(names_of([curve, other], left, STANDARD, alone=effect("saturation")))
     assert name.effect.name == "contact_area"
-    assert name.confidence < 0.5
+    assert name.kind < 0.5
     assert not name.is_sure
     assert names_of([curve, other], left, STANDARD, alone=effect("linear_leak")) == ()
     small = replace(curve, size=STANDARD.tolerable)
@@ -239,7 +239,6 @@ def test_a_kind_without_a_law_is_half_sure_at_most_or_as_sure_as_a_name_must_be(
         name = only(names_of([one], 0.03, STANDARD))
         kind = probability_of_kind(one, 0.03, STANDARD, lawless=True)
         assert name.kind == (kind if kind >= STANDARD.least_confidence else min(kind, 0.5))
-        assert name.confidence == probability_when_named(name.kind, STANDARD)
         seen.add((kind >= STANDARD.least_confidence, kind > 0.5))
     assert seen == {(True, True), (False, True), (False, False)}
 
@@ -267,15 +266,15 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
     assert [one.member for one in names_of([fast, slow], 0.0, STANDARD, is_clocked=True)] == [fast]
     told = names_of([slow, doubted], 0.0, STANDARD, is_clocked=True, is_followed=True)
     assert [(one.member, one.is_sure) for one in told] == [(slow, False), (doubted, False)]
-    assert told[0].confidence == 0.5
-    assert told[1].confidence == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
+    assert told[0].kind == 0.5
+    assert told[1].kind == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
 
 
 def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
     sure = member("play_hysteresis", size=0.05)
-    assert only(names_of([sure], 0.0, STANDARD)).confidence > 0.5
+    assert only(names_of([sure], 0.0, STANDARD)).kind > 0.5
     (told,) = names_of([sure], 0.0, STANDARD, is_unsteady=True)  # larger than what is left, and not to be ruled out
-    assert (told.confidence, told.is_sure) == (0.5, False)
+    assert (told.kind, told.is_sure) == (0.5, False)
     assert not names_of([member(size=0.05, departed=9.0)], 0.06, STANDARD, is_unsteady=True)
 
 
@@ -285,7 +284,7 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
     name = only(names_of(doubted, 0.03, STANDARD, is_followed=True))
     assert name.effect.name == "linear_leak"
     assert not name.is_sure
-    assert name.confidence == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
+    assert name.kind == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
 
 
 def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cannot_be_ruled_out() -> None:
@@ -294,9 +293,9 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cann
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     name = only(names_of([less, likely], 0.03, STANDARD))
-    assert (name.member, name.confidence, name.is_sure) == (likely, 0.5, False)
+    assert (name.member, name.kind, name.is_sure) == (likely, 0.5, False)
     open_ = replace(likely, departed=3.5)
-    assert only(names_of([open_], 0.03, STANDARD)).confidence == probability_of_kind(open_, 0.03, STANDARD) < 0.5
+    assert only(names_of([open_], 0.03, STANDARD)).kind == probability_of_kind(open_, 0.03, STANDARD) < 0.5
     assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     assert not names_of([small, less], 0.03, STANDARD)  # the largest can be ruled out
     assert not names_of([likely], 0.051, STANDARD)  # and more is left than it explains
@@ -308,7 +307,7 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_t
     assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
-    assert told[0].confidence == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
+    assert told[0].kind == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     assert only(names_of([less, sure], 0.03, STANDARD, is_followed=True)).member is sure
     assert only(names_of([likely, sure], 0.03, STANDARD, is_clocked=True)).member is sure
     # One that moves no more than a good unit's imperfections do may be another's shadow.
@@ -324,7 +323,7 @@ def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> No
     for size, count in ((0.06, 1), (0.6, 2)):  # the larger, the surer also without a law
         named = names_of([replace(curve, size=size), likely], 0.03, STANDARD)
         assert named[0].is_sure
-        assert (named[0].confidence >= STANDARD.least_confidence) == (count == 2)
+        assert (named[0].kind >= STANDARD.least_confidence) == (count == 2)
         assert len(named) == count
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _procedure
 from smartshoe.diagnosis._held_out import Errors, Gain, own_of
+from smartshoe.diagnosis._naming import confidence_of
 from smartshoe.diagnosis._procedure import (
     _cause,
     _goodness,
@@ -215,7 +216,6 @@ def _told(
         member=member,
         effect=one,
         kind=kind,
-        confidence=0.8 * kind,
         law=0.6,
         equivalents=("orifice_leak",),
         kind_only=kind_only,
@@ -228,7 +228,7 @@ def _told(
     assert asked == [("fine", "without")]
     fitted = ("fit", "static_curve_block") if by is None else (by.fit, "linear_leak")
     assert cause.parameters == {"of": (*fitted, SCALE)}
-    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, 0.8 * kind, 0.6)
+    assert (cause.effect, cause.confidence, cause.law_confidence) == (one, confidence_of(name, STANDARD), 0.6)
     assert (cause.equivalents, cause.size) == (("orifice_leak",), 0.0123)
     assert (cause.held_out.rmse_before, cause.held_out.rmse_after) == (pytest.approx(28.0), pytest.approx(14.0))
     return cause
