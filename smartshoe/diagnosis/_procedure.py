@@ -187,7 +187,7 @@ class _Prepared:
 
 
 def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
-    clocks = aligned(recordings, integrity, thresholds)
+    clocks = aligned(recordings, integrity)
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)

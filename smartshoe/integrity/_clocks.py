@@ -9,15 +9,14 @@ powers and stop operators must fit the reading much better on the shifted clock 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._fault import Finding, OneClock
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -29,23 +28,70 @@ WINDOWS = 8  # at most: octants of the load's movement
 OCTAVES: Array = 2.0 ** np.arange(-2.0, 4.0)  # what a bank of plays spans about the share that stands still
 
 
-def align(view: View) -> tuple[View, float]:
+@dataclass(frozen=True, eq=False)
+class Lags:
+    """By how much the reading follows best, of a clock or of the unit, about some moments of a recording.
+
+    ``lag_s`` (w,) at ``at_s`` (w,) from its beginning; none where nothing tells.
+    """
+
+    at_s: Array
+    lag_s: Array
+
+    @property
+    def middle_s(self) -> float:
+        """The median lag."""
+        return float(np.median(self.lag_s))
+
+
+UNSEEN = Lags(np.zeros(0), np.zeros(0))
+
+
+def align(view: View) -> tuple[View, Lags]:
     """The view with its load on the reading's clock, where the clocks differ; else as it was, with all it has found.
 
-    And the lag in s by which the reading follows best, of a clock or of the unit: NaN where none stands out.
+    And by how much the reading follows. One that is late by a quarter of a step falls as the load rises: where it
+    follows turned over, and else hardly, that is the view.
     """
     followed = _followed(view)
+    if not _follows(followed, view.thresholds):
+        over = _followed(view.turned())
+        if _follows(over, view.thresholds):
+            view, followed = view.turned(), over
     if followed is None:
-        return view, math.nan
-    seen_s = _middle(followed.best, followed.weights)
+        return view, UNSEEN
+    seen = Lags(followed.places - view.time_s[0], followed.best)
     line = _lag_line(view, followed)
     if line is None:
-        return view, seen_s
+        return view, seen
     offset_s, rate = line
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
     moved = view.time_s - offset_s - rate * (view.time_s - middle)
     load = np.interp(moved, view.time_s, view.load.values)
-    return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate), seen_s
+    return replace(view, load=Signal(load, view.thresholds), offset_s=offset_s, rate=rate), seen
+
+
+def one_clock(each: Sequence[Lags], thresholds: Thresholds) -> OneClock | None:
+    """The one pair of clocks that accounts for all lags that are seen, a recording each; one delay, where that does.
+
+    Slow or few movements tell no clock alone, and what is told alone differs by chance. One line through the lags of
+    all recordings (Theil 1950, Sen 1968) must leave none of them off by more than a share of the longest lag, nor most
+    of the moments in any.
+    """
+    there = [one for one in each if one.at_s.size]
+    if not there:
+        return None
+    at_s, lag_s = np.concatenate([one.at_s for one in there]), np.concatenate([one.lag_s for one in there])
+    rate = _slope(at_s, lag_s)
+    middle_s = np.array([one.middle_s for one in there])
+    for found in (OneClock(float(np.mean(middle_s)), 0.0), OneClock(float(np.median(lag_s - rate * at_s)), rate)):
+        lines = [found.before_s + found.rate * one.at_s for one in there]
+        off = [one.lag_s - line for one, line in zip(there, lines, strict=True)]
+        allowed = thresholds.same * float(np.max(np.abs([*middle_s, *np.concatenate(lines)])))
+        within = max(float(np.quantile(np.abs(one), 1.0 - thresholds.same)) for one in off)
+        if max(within, float(np.ptp([np.median(one) for one in off]))) <= allowed:
+            return found
+    return None
 
 
 def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
@@ -103,9 +149,15 @@ def _followed(view: View) -> _Followed | None:
     for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
         smooth_s = echoes * given.echo_s
         places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s, given)
-        if weights.size and float(np.median(weights)) >= 1.0 - given.same:
+        found = _Followed(grid, load, reading, smooth_s, places, smallest, best, weights) if places.size else None
+        if _follows(found, given):
             break
-    return _Followed(grid, load, reading, smooth_s, places, smallest, best, weights) if places.size else None
+    return found
+
+
+def _follows(of: _Followed | None, thresholds: Thresholds) -> bool:
+    """Whether the reading's edges are the load's."""
+    return of is not None and float(np.median(of.weights)) >= 1.0 - thresholds.same
 
 
 def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
@@ -245,14 +297,19 @@ def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tu
     """
     found = []
     if places.size >= 4:
-        i, j = np.triu_indices(places.size, 1)
-        apart = places[j] - places[i] > np.ptp(places) / places.size
-        rate = float(np.median((lags[j] - lags[i])[apart] / (places[j] - places[i])[apart]))
+        rate = _slope(places, lags)
         left = lags - rate * places
         if np.median(np.abs(left - np.median(left))) < 0.5 * np.median(np.abs(lags - np.median(lags))):
             found.append((_middle(left, weights), rate))
     grown = _middle(lags / (places + half_s), weights)
     return [*found, (grown * half_s, grown), (_middle(lags, weights), 0.0)]
+
+
+def _slope(places: Array, lags: Array) -> float:
+    """The median slope of all pairs that are not close together, 0 of a single place."""
+    i, j = np.triu_indices(places.size, 1)
+    apart = np.abs(places[j] - places[i]) > np.ptp(places) / places.size
+    return float(np.median((lags[j] - lags[i])[apart] / (places[j] - places[i])[apart])) if apart.any() else 0.0
 
 
 def _middle(values: Array, weights: Array) -> float:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.errors import InputError
-from smartshoe.integrity._clocks import align, two_clocks
+from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
 from smartshoe.integrity._dropouts import dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
@@ -43,8 +42,8 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     hum,
 )
 NONE: Array = np.zeros(0)
-Clock = tuple[float, float, float]  # offset, rate and lag that is seen, as in `Integrity`
-UNSEEN: Clock = (0.0, 0.0, float("nan"))
+Clock = tuple[float, float, Lags]  # offset and rate as in `Integrity`, lags that are seen
+UNTOLD: Clock = (0.0, 0.0, UNSEEN)
 
 
 def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
@@ -76,8 +75,9 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         usable.append(np.zeros_like(mask) if refused else mask)
         clocks.append(clock)
         refusals += refused[:1]
-    offset_s, rate, seen_s = zip(*clocks, strict=True)
-    return Integrity(tuple(faults), tuple(usable), offset_s, rate, seen_s, tuple(refusals))
+    offset_s, rate, seen = zip(*clocks, strict=True)
+    told = [one for one, mask in zip(seen, usable, strict=True) if mask.any()]
+    return Integrity(tuple(faults), tuple(usable), offset_s, rate, one_clock(told, decided), tuple(refusals))
 
 
 def _examined(
@@ -87,7 +87,7 @@ def _examined(
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
     if findings:
-        return findings, ~usable, UNSEEN
+        return findings, ~usable, UNTOLD
     findings = [finding for detect in OF_RECORDING for finding in detect(recording, thresholds)]
     for finding in findings:
         if finding.masks:
@@ -102,8 +102,8 @@ def _examined(
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
     if view is None:
-        return findings, usable, UNSEEN
-    view, seen_s = align(view)
+        return findings, usable, UNTOLD
+    view, seen = align(view)
     for detect in OF_VIEW:
         bad = ~usable[view.index]
         for finding in detect(view, bad):
@@ -112,7 +112,7 @@ def _examined(
                 usable &= ~finding.at
         if any(finding.severity == "fatal" for finding in findings):
             break
-    return findings, usable, (view.offset_s, view.rate, seen_s)
+    return findings, usable, (view.offset_s, view.rate, seen)
 
 
 def _lacking(recording: Recording) -> str | None:
@@ -144,10 +144,8 @@ def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> Vi
     force = Signal(load_n, thresholds)
     view = View(recording, index, time_s, force, Signal(reading, thresholds), 1, thresholds, dropped_to=dropped_to)
     at, middle = view.curve
-    turned = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
-    if turned:
-        view = replace(view, reading=Signal(-reading, thresholds), sign=-1)
-    return view
+    falls = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
+    return view.turned() if falls else view
 
 
 def _fault(number: int, recording: Recording, finding: Finding) -> DataFault:

@@ -59,20 +59,28 @@ class Finding:
     error: float = 0.0
 
 
+@dataclass(frozen=True)
+class OneClock:
+    """One pair of clocks for all recordings: the lag ``before_s`` at the beginning of each, its growth ``rate``."""
+
+    before_s: float
+    rate: float
+
+
 @dataclass(frozen=True, eq=False)
 class Integrity:
-    """What `examine` found: one entry a recording in ``usable``, ``clock_offset_s``, ``clock_rate``, ``lag_seen_s``.
+    """What `examine` found: one entry a recording in ``usable``, ``clock_offset_s``, ``clock_rate``.
 
     ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
     held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
-    recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``lag_seen_s`` is the lag at
-    which the reading follows best, of a clock or of the unit, NaN where none stands out. ``refusals`` says in a
-    sentence each, in their order, why the recordings without a usable sample are of no use.
+    recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``one_clock`` is what all of
+    them share, where one pair of clocks accounts for how late their readings follow. ``refusals`` says in a sentence
+    each, in their order, why the recordings without a usable sample are of no use.
     """
 
     faults: tuple[DataFault, ...]
     usable: tuple[Mask, ...]
     clock_offset_s: tuple[float, ...]
     clock_rate: tuple[float, ...]
-    lag_seen_s: tuple[float, ...]
+    one_clock: OneClock | None
     refusals: tuple[str, ...]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -296,6 +296,10 @@ class View:
         """(m,) the static curve at each sample's load, the load's noise averaged."""
         out: Array = np.interp(self.steady_load, *self.curve)
         return out
+
+    def turned(self) -> View:
+        """The same with the reading turned over."""
+        return replace(self, reading=Signal(-self.reading.values, self.thresholds), sign=-self.sign)
 
     def whole(self, at: Mask) -> Mask:
         """A mask (m,) over this view as one over all of the recording's samples."""

@@ -17,6 +17,7 @@ from smartshoe.diagnosis._force import ForceError
 from smartshoe.diagnosis._gains_and_zeros import ZeroChange
 from smartshoe.diagnosis._procedure import _diagnosed, _prepared
 from smartshoe.diagnosis._zero import Zero, shift_of
+from smartshoe.integrity._fault import OneClock
 from smartshoe.models.effects import effect
 
 Array = NDArray[np.float64]
@@ -35,8 +36,8 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     usable = tuple(np.ones(600, dtype=bool) for _ in runs)
 
     def integrity(lag_s: float) -> Any:
-        lags_s = (lag_s,) * 3
-        return SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0,) * 3, lag_seen_s=lags_s, usable=usable)
+        lags_s, shared = (lag_s,) * 3, OneClock(lag_s, 0.0)
+        return SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0,) * 3, one_clock=shared, usable=usable)
 
     found = _prepared(runs, 2, integrity(0.0), STANDARD)
     assert [bool(one.held_out.all()) for one in found.sessions] == [False, False, True]
@@ -52,7 +53,7 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     assert not late.is_moved
     # A reading that is moved by itself matters where it is fitted.
     for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
-        apart = SimpleNamespace(clock_offset_s=lags, clock_rate=(0.0,) * 3, lag_seen_s=lags, usable=usable)
+        apart = SimpleNamespace(clock_offset_s=lags, clock_rate=(0.0,) * 3, one_clock=None, usable=usable)
         assert _prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
     # Friction in each recording is no unit's; in one of them it is said.
     rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +10,13 @@ from deciding import STANDARD, decides
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, described
-from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.diagnosis._zero import first_rests
 from smartshoe.diagnosis.decay import decay_of
+from smartshoe.integrity._clocks import Lags, one_clock
+from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity.thresholds import largest_of_noise
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
@@ -102,12 +101,9 @@ def test_hold_is_how_long_a_first_rest_shows_a_zero() -> None:
 
 
 def test_same_is_how_far_lags_of_one_delay_differ() -> None:
-    pair = [_pressed(TRIANGLE), _pressed(TRIANGLE)]
-    usable = tuple(one.sensor.present for one in pair)
-    lags_s = (1.0, 1.4)
-    lagging: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0, 0.0), lag_seen_s=lags_s, usable=usable)
-    each, shared = decides("same", 0.2, 0.4, lambda t: [one.name for one, _ in aligned(pair, lagging, t).parts])
-    assert (each, shared) == ([], ["delay"])
+    pair = [Lags(np.array([10.0]), np.array([lag_s])) for lag_s in (1.0, 1.4)]
+    each, shared = decides("same", 0.2, 0.4, lambda t: one_clock(pair, t))
+    assert (each, shared) == (None, OneClock(1.2, 0.0))
 
 
 @pytest.mark.parametrize(("field", "word"), [("hold_s", "holds"), ("idle_s", "idle")])

@@ -18,6 +18,7 @@ from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
 from smartshoe.errors import InputError
+from smartshoe.integrity._fault import OneClock
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -229,10 +230,12 @@ def test_a_lag_comes_to_a_step_by_its_time_constant() -> None:
 
 
 # -- two clocks -------------------------------------------------------------------------------------------------
-def _told(offset_s: tuple[float, ...], rate: tuple[float, ...], runs: list[Recording]) -> Any:
+def _told(
+    offset_s: tuple[float, ...], rate: tuple[float, ...], runs: list[Recording], shared: OneClock | None = None
+) -> Any:
     usable = tuple(one.sensor.present for one in runs)
-    integrity: Any = SimpleNamespace(clock_offset_s=offset_s, clock_rate=rate, lag_seen_s=offset_s, usable=usable)
-    return aligned(runs, integrity, STANDARD)
+    integrity: Any = SimpleNamespace(clock_offset_s=offset_s, clock_rate=rate, one_clock=shared, usable=usable)
+    return aligned(runs, integrity)
 
 
 def _late(lag_s: float, rate: float = 0.0) -> Recording:
@@ -271,61 +274,44 @@ def test_what_was_not_usable_stays_so_where_it_is_moved_to() -> None:
     masks = [one.sensor.present.copy() for one in runs]
     masks[0][500:520] = False
     lags_s = (0.6, 0.0)
-    integrity: Any = SimpleNamespace(
-        clock_offset_s=lags_s, clock_rate=(0.0, 0.0), lag_seen_s=lags_s, usable=tuple(masks)
-    )
-    lost = np.flatnonzero(~aligned(runs, integrity, STANDARD).usable[0][:1400])
+    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0, 0.0), one_clock=None, usable=tuple(masks))
+    lost = np.flatnonzero(~aligned(runs, integrity).usable[0][:1400])
     assert lost[0] == pytest.approx(500 - 0.6 / STEP_S, abs=1)
     assert lost.size == pytest.approx(20, abs=1)
 
 
 def test_a_lag_that_all_share_is_the_models() -> None:
-    found = _told((0.5, 0.52), (0.0, 0.0), [_run(), _run()])
+    runs = [_run(), _run()]
+    found = _told((0.5, 0.0), (0.0, 0.0), runs, OneClock(0.51, 0.0))
     ((one, value),) = found.parts
-    assert (one.name, found.says) == ("delay", ())
+    assert (one.name, found.says, found.moved) == ("delay", (), frozenset())
     assert value == pytest.approx([0.51])
-    assert _told((0.0, 0.0), (0.0, 0.0), [_run()]).parts == ()
-    # A delay of the catalogue is no longer than its bound.
-    assert _told((9.0, 9.1), (0.0, 0.0), [_run(), _run()]).parts == ()
+    assert found.recordings == runs
+    # What is seen to follow late, where no clock is told, is the unit's.
+    assert _told((0.0, 0.0), (0.0, 0.0), runs, OneClock(0.1, 0.0)).parts == ()
 
 
 def test_clocks_that_part_from_the_start_on_are_a_drift() -> None:
     rate = 0.002
     half_s = 0.5 * float(TIME_S[-1] - TIME_S[0])
-    found = _told((rate * half_s, rate * half_s), (rate, rate), [_run(), _run()])
-    (one, value), _ = found.parts
-    assert one.name == "clock_drift"
-    assert value == pytest.approx([rate], rel=0.01)
+    # They may have been apart at the start, by as much in each.
+    for before_s in (0.0, 0.5, -0.5):
+        both = _told((before_s + rate * half_s,) * 2, (rate, rate), [_run(), _run()], OneClock(before_s, rate)).parts
+        assert [(one.name, float(value[0])) for one, value in both] == [("clock_drift", rate), ("delay", before_s)]
     # It is what such a clock makes of a reading.
+    (one, value), _ = both
     drifted = MODEL.with_part(one, value).simulate(Conditions(TIME_S, PRESSED, STEP_S))
     late = _late(rate * half_s, rate).sensor.values / FULL_MBAR
     plain = MODEL.simulate(Conditions(TIME_S, late, STEP_S))
     assert np.sqrt(np.mean((drifted - plain) ** 2)) < 5e-3
-    # They may have been apart at the start, by as much in each; else the recordings are moved one by one.
-    for before_s in (0.5, -0.5):
-        both = _told((before_s + rate * half_s,) * 2, (rate, rate), [_run(), _run()]).parts
-        assert [(one.name, float(value[0])) for one, value in both] == [
-            ("clock_drift", pytest.approx(rate)),
-            ("delay", pytest.approx(before_s)),
-        ]
-    assert _told((0.5 + rate * half_s, 2.0 + rate * half_s), (rate, rate), [_run(), _run()]).parts == ()
-    assert _told((7.0 + rate * half_s,) * 2, (rate, rate), [_run(), _run()]).parts == ()  # longer than any delay
 
 
-@pytest.mark.parametrize(("short_s", "is_one_cause"), [(20.0, True), (60.0, False)])
-def test_a_drift_is_one_cause_where_it_cannot_be_seen_in_the_others(short_s: float, is_one_cause: bool) -> None:
-    """In a short one two clocks part by less than is told; one as long as the first would have shown it."""
-    rate = 0.01
-    half_s = 0.5 * float(TIME_S[-1] - TIME_S[0])
-    whole = _run()
-    count = round(short_s / STEP_S)
-    short = Recording.from_arrays(
-        time_s=TIME_S[:count], force_n=whole.force_n[:count], pressure_mbar=whole.sensor.values[:count], name="short"
-    )
-    assert (rate * short_s < STANDARD.settled_s) is is_one_cause
-    found = _told((rate * half_s, 0.0), (rate, 0.0), [whole, short])
-    assert [one.name for one, _ in found.parts] == ["clock_drift", "delay"] * is_one_cause
-    if is_one_cause:
-        assert found.parts[0][1] == pytest.approx([rate], rel=0.01)
-    else:
-        assert found.recordings[1] is short
+@pytest.mark.parametrize("rate", [0.0, 0.01])
+def test_clocks_that_are_further_apart_than_a_delay_can_be_are_put_right_one_by_one(rate: float) -> None:
+    upper = effect("delay").parameters[0].upper
+    half = 0.5 * float(TIME_S[-1] - TIME_S[0]) * rate
+    for by, is_told in ((0.99, True), (1.01, False), (-0.99, True), (-1.01, False)):
+        shared = OneClock(by * upper, rate)
+        found = _told((by * upper + half,) * 2, (rate,) * 2, [_run(), _run()], shared)
+        assert [one.name for one, _ in found.parts] == ["clock_drift", "delay"][rate == 0.0 :] * is_told
+        assert len(found.moved) == 2 * (not is_told)

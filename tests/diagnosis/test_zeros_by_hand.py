@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from smartshoe.diagnosis import Thresholds, _noise_kinds, _zero
-from smartshoe.diagnosis._aligned import _on_one_clock, _one_pair, aligned
+from smartshoe.diagnosis._aligned import _on_one_clock
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._session import Scale
@@ -255,48 +255,6 @@ def _run(name: str = "run", size: int = 400) -> Recording:
     return Recording.from_arrays(time_s=T[:size] + 3.0, force_n=T[:size], pressure_mbar=10.0 * T[:size], name=name)
 
 
-def _aligned(lags_s: tuple[float, ...], rates: tuple[float, ...], seen_s: tuple[float, ...] | None = None) -> Any:
-    runs = [_run(f"run_{k}") for k in range(len(lags_s))]
-    usable = tuple(np.ones(400, dtype=bool) for _ in runs)
-    seen_s = seen_s or lags_s
-    integrity: Any = SimpleNamespace(clock_offset_s=lags_s, clock_rate=rates, lag_seen_s=seen_s, usable=usable)
-    return aligned(runs, integrity, STANDARD)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_lags_within_a_quarter_of_the_largest_are_one_delay(sign: float) -> None:
-    for other, is_one in ((0.751, True), (0.749, False)):
-        found = _aligned((sign, sign * other), (0.0, 0.0))
-        assert [one.name for one, _ in found.parts] == ["delay"] * is_one
-        assert len(found.says) == 2 * (not is_one)
-    assert found.parts == ()
-    ((_, value),) = _aligned((sign, sign * 0.8), (0.0, 0.0)).parts
-    assert value == pytest.approx([sign * 0.9])
-    upper = effect("delay").parameters[0].upper
-    assert _aligned((sign * upper,) * 2, (0.0, 0.0)).parts == ()
-    assert len(_aligned((sign * 0.999 * upper,) * 2, (0.0, 0.0)).parts) == 1
-    assert _aligned((0.0, 0.0), (0.0, 0.0)).says == ()
-    assert _aligned((), ()).parts == ()
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_lag_is_shared_with_a_recording_that_is_seen_to_follow_by_it_or_in_which_none_is_seen(sign: float) -> None:
-    """A recording of slow or few movements tells no clock alone."""
-    for seen, is_one in ((0.8, True), (0.76, True), (0.74, False), (0.0, False), (1.3, True), (1.34, False)):
-        found = _aligned((sign, 0.0), (0.0, 0.0), (sign, sign * seen))
-        assert [(one.name, float(value[0])) for one, value in found.parts] == [("delay", sign)] * is_one
-        assert found.moved == (frozenset() if is_one else {0})
-    ((one, value),) = _aligned((sign, 0.0), (0.0, 0.0), (sign, float("nan"))).parts
-    assert (one.name, list(value)) == ("delay", [sign])
-
-
-def test_a_lag_that_wanders_by_less_than_a_quarter_is_one_delay_and_no_parting_of_clocks() -> None:
-    half = 0.5 * T[-1]
-    for wanders, is_one in ((0.12, True), (0.15, False)):  # from the middle to either end
-        found = _aligned((1.0, 1.0), (wanders / half, -wanders / half))
-        assert [one.name for one, _ in found.parts] == ["delay"] * is_one
-
-
 def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_was_taken() -> None:
     """Its clock shows the middle late by the lag, and runs fast by the rate."""
     kept = np.ones(400, dtype=bool)
@@ -311,42 +269,6 @@ def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_wa
         expected = inside & kept[nearest]
         assert list(np.flatnonzero(usable != expected)) == []
         assert list(moved.force_n) == list(_run().force_n)
-
-
-def test_one_line_through_the_beginnings_and_ends_is_one_pair_of_clocks() -> None:
-    duration = np.array([100.0, 60.0, 30.0])
-    rate, before = 0.002, 0.3
-
-    def told(lags: Any, rates: Any) -> tuple[float, float] | None:
-        return _one_pair(np.array(lags), np.array(rates), duration, STANDARD)
-
-    lags = before + 0.5 * rate * duration
-    assert told(lags, [rate] * 3) == pytest.approx((before, rate))
-    assert told(lags, [rate, rate, -rate]) is None
-    assert told([*lags[:2], 0.35], [rate, rate, 0.0]) is None  # it shows a lag and no drift
-    # What is hidden in the last: less than what has settled, four tenths of a second.
-    assert told([*lags[:2], 0.0], [rate, rate, 0.0]) == pytest.approx((before, rate))
-    assert told([*(0.2 + lags[:2]), 0.0], [rate, rate, 0.0]) is None
-    for by, is_hidden in ((0.999, True), (1.001, False)):
-        shift = by * STANDARD.settled_s - rate * 30.0
-        assert (told([shift + 0.1, shift + 0.06, 0.0], [rate, rate, 0.0]) is not None) is is_hidden
-        turned = told([-shift - 0.1, -shift - 0.06, 0.0], [-rate, -rate, 0.0])
-        assert (turned is not None) is is_hidden
-    # Lines that differ by more than a quarter of the largest lag are of two pairs.
-    both = [100.0, 100.0]
-    for apart, is_one in ((0.99, True), (1.01, False)):  # half of it from the line through both
-        found = _one_pair(np.array([1.0, 1.0 + apart]), np.array([1e-9, 1e-9]), np.array(both), STANDARD)
-        assert (found is not None) is is_one
-
-
-def test_a_pair_of_clocks_is_a_drift_and_a_delay_no_longer_than_a_delay_can_be() -> None:
-    upper = effect("delay").parameters[0].upper
-    half = 0.5 * T[-1]
-    for by, is_told in ((0.99, True), (1.01, False), (-0.99, True), (-1.01, False)):
-        found = _aligned((by * upper + 0.01 * half,) * 2, (0.01, 0.01))
-        assert [one.name for one, _ in found.parts] == ["clock_drift", "delay"] * is_told
-        if is_told:
-            assert [float(value[0]) for _, value in found.parts] == pytest.approx([0.01, by * upper])
 
 
 # -- kinds of noise ---------------------------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ def test_a_drift_of_the_clock_in_all_recordings_is_one_cause_and_none_is_moved()
     runs = [staircase(levels, 3.0, 0.1, drift=0.004, seed=levels) for levels in (6, 8, 11)]
     integrity = examine(runs, Thresholds())
     assert all(integrity.clock_rate)
-    found = aligned(runs, integrity, Thresholds())
+    found = aligned(runs, integrity)
     (effect, values), (before, nothing) = found.parts
     assert (effect.name, before.name) == ("clock_drift", "delay")
     assert values[0] == pytest.approx(0.004, rel=0.15)
@@ -64,7 +64,7 @@ def test_a_drift_that_is_too_small_to_be_seen_in_a_short_recording_is_one_all_th
     integrity = examine(runs, Thresholds())
     assert integrity.clock_rate[0] > 0.0
     assert integrity.clock_rate[1] == 0.0
-    (effect, values), _ = aligned(runs, integrity, Thresholds()).parts
+    (effect, values), _ = aligned(runs, integrity).parts
     assert effect.name == "clock_drift"
     assert values[0] == pytest.approx(0.003, rel=0.2)
 

@@ -1,0 +1,173 @@
+"""Lags that several recordings show are put to one pair of clocks; a late reading of steps is no reversed one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from smartshoe.diagnosis import Thresholds, diagnose
+from smartshoe.diagnosis._aligned import aligned
+from smartshoe.integrity import examine
+from smartshoe.integrity._clocks import UNSEEN, Lags, one_clock
+from smartshoe.integrity._fault import OneClock
+from smartshoe.recording import Recording
+
+STANDARD = Thresholds()
+RATE_HZ = 100.0
+
+
+def _seen(lag_s: Sequence[float], at_s: Sequence[float] | None = None) -> Lags:
+    return Lags(np.array(at_s or 20.0 * np.arange(1.0, len(lag_s) + 1.0)), np.array(lag_s))
+
+
+# -- by hand ----------------------------------------------------------------------------------------------------------
+@given(
+    before_s=st.floats(-0.5, 0.5),
+    rate=st.floats(0.001, 0.01),
+    ahead=st.booleans(),
+    begins=st.lists(st.floats(5.0, 60.0), min_size=1, max_size=4),
+    bin_s=st.sampled_from([0.0, 0.01, 0.02, 0.05]),
+)
+def test_lags_on_one_line_are_one_pair_of_clocks(
+    before_s: float, rate: float, ahead: bool, begins: list[float], bin_s: float
+) -> None:
+    """Each lag is known to a bin; recordings differ in when they move."""
+    rate = -rate if ahead else rate
+    each = []
+    for begin in begins:
+        at_s = begin + 40.0 * np.arange(6.0)
+        line = before_s + rate * at_s
+        each.append(Lags(at_s, bin_s * np.rint(line / bin_s) if bin_s else line))
+    longest = max(float(np.max(np.abs(one.lag_s))) for one in each)
+    found = one_clock([*each, UNSEEN], STANDARD)
+    if found is None:  # a bin may be more than a share of all lags
+        assert bin_s > STANDARD.same * longest
+        return
+    for one in each:
+        off = found.before_s + found.rate * one.at_s - one.lag_s
+        assert np.quantile(np.abs(off), 0.75) <= STANDARD.same * longest * (1.0 + 1e-9)
+    if not found.rate:
+        return  # a delay that wanders by less than a share of itself
+    if not bin_s:
+        assert (found.before_s, found.rate) == (pytest.approx(before_s, abs=1e-9), pytest.approx(rate))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_lags_within_a_share_of_the_longest_are_one_delay(sign: float) -> None:
+    for other, is_one in ((0.751, True), (0.749, False)):
+        found = one_clock([_seen([sign] * 3), _seen([sign * other] * 3)], STANDARD)
+        assert found == (OneClock(pytest.approx(sign * 0.5 * (1.0 + other)), 0.0) if is_one else None)
+
+
+def test_nothing_is_shared_where_nothing_is_seen() -> None:
+    assert one_clock([], STANDARD) is None
+    assert one_clock([UNSEEN, UNSEEN], STANDARD) is None
+    assert one_clock([UNSEEN, _seen([0.3])], STANDARD) == OneClock(0.3, 0.0)
+
+
+def test_a_delay_that_wanders_is_one_until_most_of_its_moments_are_off() -> None:
+    for wanders, is_one in ((0.24, True), (0.27, False)):
+        found = one_clock([_seen([1.0, 1.0 + wanders, 1.0 - wanders, 1.0 + wanders, 1.0 - wanders, 1.0])], STANDARD)
+        assert (found == OneClock(1.0, 0.0)) is is_one
+    # A moment or two that are off by a step of a walk, say, change nothing.
+    assert one_clock([_seen([0.3] * 7 + [1.3])], STANDARD) == OneClock(0.3, 0.0)
+
+
+def test_recordings_of_two_pairs_of_clocks_share_none() -> None:
+    drifts = [0.04, 0.08, 0.12, 0.16]
+    assert one_clock([_seen(drifts), _seen(drifts)], STANDARD) == OneClock(pytest.approx(0.0), pytest.approx(0.002))
+    assert one_clock([_seen(drifts), _seen([-one for one in drifts])], STANDARD) is None
+    assert one_clock([_seen(drifts), _seen([0.5 + one for one in drifts])], STANDARD) is None
+
+
+# -- readings ---------------------------------------------------------------------------------------------------------
+def _walked(late_s: float, seed: int = 1, unit: str = "mbar") -> Recording:
+    """A few holds among steps of about a second, read ``late_s`` late."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 90.0, 1.0 / RATE_HZ)
+    load = np.zeros(time_s.size)
+    begins_s = 2.0
+    while begins_s < 40.0:
+        lasts_s, height = 0.62 + 0.06 * rng.standard_normal(), 0.85 + 0.1 * rng.random()
+        share = (time_s - begins_s) / lasts_s
+        there = (share > 0.0) & (share < 1.0)
+        load[there] += height * np.sin(np.pi * share[there]) * (1.0 + 0.4 * np.cos(2.0 * np.pi * share[there])) / 1.4
+        begins_s += 1.05 + 0.05 * rng.standard_normal()
+    load += np.interp(
+        time_s, [45.0, 48.0, 60.0, 62.0, 70.0, 71.0, 80.0, 82.0], [0.0, 0.6, 0.6, 0.0, 0.0, 0.4, 0.4, 0.0]
+    )
+    read = np.interp(time_s - late_s, time_s, load)
+    keep = float(np.exp(-1.0 / RATE_HZ / 3.0))
+    slow = np.empty(read.size)
+    state = 0.0
+    for k, value in enumerate(read):
+        state = keep * state + (1.0 - keep) * value
+        slow[k] = state
+    return Recording.from_arrays(
+        time_s=time_s,
+        force_n=800.0 * load + rng.normal(0.0, 0.5, time_s.size),
+        name=f"walked_{seed}",
+        **{f"pressure_{unit}": 100.0 * (read + 0.05 * slow) + rng.normal(0.0, 0.1, time_s.size)},
+    )
+
+
+def _ramps(late_s: float, drift: float = 0.0, seed: int = 2, step_s: float = 20.0) -> Recording:
+    """Triangles and holds whose reading's clock begins ``late_s`` late and falls behind by ``drift``."""
+    rng = np.random.default_rng(seed)
+    corners_s: NDArray[np.float64] = np.cumsum(np.tile([2.0, 4.0, 0.3 * step_s, 4.0, 0.7 * step_s], 6))
+    loads = np.tile([0.0, 1.0, 1.0, 0.0, 0.0], 6) * np.repeat(rng.uniform(0.4, 1.0, 6), 5)
+    time_s = np.arange(0.0, corners_s[-1], 1.0 / RATE_HZ)
+    return Recording.from_arrays(
+        time_s=time_s,
+        force_n=800.0 * np.interp(time_s, corners_s, loads) + rng.normal(0.0, 0.5, time_s.size),
+        pressure_mbar=100.0 * np.interp(time_s * (1.0 - drift) - late_s, corners_s, loads)
+        + rng.normal(0.0, 0.1, time_s.size),
+        name=f"ramps_{seed}",
+    )
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.05, 0.2, 0.25, 0.3, 0.35])
+def test_a_walk_that_is_read_late_does_not_fall_as_the_load_rises(late_s: float) -> None:
+    """By a quarter of a step the reading is high where the load is low."""
+    found = examine([_walked(late_s)], STANDARD)
+    assert "wrong_sign" not in {fault.kind for fault in found.faults}
+    if found.clock_offset_s[0]:
+        assert found.clock_offset_s[0] == pytest.approx(late_s, abs=0.06)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.25])
+def test_a_walk_whose_reading_is_reversed_is_told_so_however_late(late_s: float) -> None:
+    walked = _walked(late_s)
+    turned = walked.with_channel(replace(walked.sensor, values=-walked.sensor.values))
+    assert "wrong_sign" in {fault.kind for fault in examine([turned], STANDARD).faults}
+
+
+def test_a_walk_shares_the_delay_that_ramps_show() -> None:
+    runs = [_ramps(0.25), _walked(0.25)]
+    integrity = examine(runs, STANDARD)
+    assert integrity.clock_offset_s[0] == pytest.approx(0.25, abs=0.06)
+    ((one, value),) = aligned(runs, integrity).parts
+    assert (one.name, float(value[0])) == ("delay", pytest.approx(0.25, abs=0.06))
+    found = diagnose(runs, hold_out=[_ramps(0.25, seed=3)])
+    (cause,) = [cause for cause in found.causes if cause.name == "delay"]
+    assert cause.parameters["delay"].value == pytest.approx(0.25, abs=0.005)
+    assert not any("was moved" in said for said in found.limits)
+
+
+def test_a_drift_that_one_recording_tells_and_others_follow_is_one_cause() -> None:
+    """A long one shows two clocks; a shorter one is late by less than is told, but on the same line."""
+    drift = 0.0015
+    runs = [_ramps(0.0, drift, step_s=40.0), _ramps(0.0, drift, seed=4, step_s=10.0)]
+    integrity = examine(runs, STANDARD)
+    assert [bool(one) for one in integrity.clock_offset_s] == [True, False]
+    parts = aligned(runs, integrity).parts
+    assert [one.name for one, _ in parts] == ["clock_drift", "delay"]
+    assert float(parts[0][1][0]) == pytest.approx(drift, rel=0.25)
+    causes = {cause.name: cause for cause in diagnose(runs, hold_out=[_ramps(0.0, drift, seed=5)]).causes}
+    assert causes["clock_drift"].parameters["clock_rate_error"].value == pytest.approx(drift, rel=0.02)
