@@ -5,6 +5,7 @@ single   one effect of the catalogue, each once in 35 cases, log-uniform from 0.
 two      two physical effects of families that do not imitate each other, 0.3 to 3 % each
 three    three of them
 alike    two physical effects of families that imitate each other, 0.3 to 3 % each
+family   two physical effects of one family, by causes of their own, 0.3 to 3 % each
 none     nothing but nuisances and conditions
 outside  one effect that the catalogue does not have, 0.3 to 3 %
 worlds   one physical effect: unit, machine, protocols, strength, nuisances and noise are the same in the cases 3k,
@@ -23,7 +24,7 @@ import numpy as np
 from simulators.hidden.effects import BY_LAW_ALONE, EFFECTS, Hideable
 from smartshoe.errors import UsageError
 
-KINDS = ("single", "two", "three", "alike", "none", "outside", "worlds")
+KINDS = ("single", "two", "three", "alike", "family", "none", "outside", "worlds")
 ALL = {**EFFECTS, **BY_LAW_ALONE}
 INSIDE = tuple(name for name, effect in ALL.items() if effect.inside)
 OUTSIDE = tuple(name for name, effect in ALL.items() if not effect.inside)
@@ -38,6 +39,11 @@ IMITATE = {
     "hysteresis": {"asymmetry", "relaxation"}, "rate": {"gas_heat"}, "dead_band": {"static_curve", "zero", "tare"},
     "static_curve": {"dead_band", "saturation"}, "saturation": {"static_curve"}, "timing": {"gas_heat"},
 }  # fmt: skip
+# Of one family, and yet by causes of their own: both may be there.
+ONE_FAMILY = (
+    ("delay", "clock_drift"), ("delay", "sensor_lag"), ("clock_drift", "sensor_lag"), ("permanent_set", "warm_up"),
+    ("permanent_set", "zero_drift"), ("mullins_softening", "cycle_conditioning"),
+)  # fmt: skip
 STRONGEST = {
     "second_relaxation": 0.8, "power_law_creep": 1.5, "gas_heat": 0.7, "gas_compression": 1.4, "sensor_lag": 0.7,
     "sensor_nonlinearity": 2.5, "held_samples": 1.0, "delay": 1.5, "rate_gain": 2.5, "linear_leak": 2.5,
@@ -45,7 +51,7 @@ STRONGEST = {
 }  # fmt: skip
 STRENGTHS = {
     "single": (0.05, 5.0), "worlds": (0.3, 2.0), "two": (0.3, 3.0), "three": (0.3, 2.5), "alike": (0.3, 3.0),
-    "outside": (0.3, 3.0),
+    "family": (0.3, 3.0), "outside": (0.3, 3.0),
 }  # fmt: skip
 MOST_DEPARTURE = 0.4
 
@@ -163,6 +169,8 @@ def _names(kind: str, group: int, rng: np.random.Generator) -> tuple[str, ...]:
         # Every one once, in a drawn order, before any comes again.
         order = np.random.default_rng(seeded("order", kind, group // len(pool))).permutation(pool)
         return (str(order[group % len(pool)]),)
+    if kind == "family":
+        return ONE_FAMILY[int(rng.integers(len(ONE_FAMILY)))]
     names: list[str] = []
     while len(names) < (3 if kind == "three" else 2):
         name = str(rng.choice(PHYSICAL))

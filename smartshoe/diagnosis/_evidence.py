@@ -338,10 +338,10 @@ class Evidence:
         return np.array(index, dtype=np.intp), np.array(sds)
 
     def _others_of(self, member: int) -> list[int]:
-        """The columns of all other equations and blocks of a member's family."""
+        """The columns of all other equations and blocks of a member's family, but those that may be beside it."""
         own = self.given.candidates[member]
-        alike = (one for one in self.given.candidates if one.effect.family == own.effect.family)
-        return [column for one in alike if one.name != own.name for column in one.columns]
+        family = (one for one in self.given.candidates if one.effect.family == own.effect.family)
+        return [column for one in family if one.slot == own.slot and one.name != own.name for column in one.columns]
 
     def _moved(self, index: Index, sds: Array) -> tuple[Array, Array, float]:
         """Factor of I + D R, its solution (k,) of D q, and by how much -2 log evidence falls; D by halves each side."""

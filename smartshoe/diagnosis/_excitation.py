@@ -43,7 +43,12 @@ class Excitation:
         """
         if self.is_cycled or effect.is_memoryless or not effect.exposed_by:
             return True
-        return bool(effect.exposed_by & ({"rates"} | self.present) - LATER_CYCLES)
+        return bool(effect.exposed_by & ({"rates"} | self.tells_apart))
+
+    @property
+    def tells_apart(self) -> frozenset[str]:
+        """``present``, but for what recordings of a single load cycle do not show."""
+        return self.present if self.is_cycled else self.present - LATER_CYCLES
 
     @property
     def goes_with_the_clock(self) -> bool:

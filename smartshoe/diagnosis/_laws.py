@@ -66,7 +66,8 @@ def with_likelier_laws(
     """``state`` at ``model`` with each of ``laws`` in its member's place, and not the other way round again."""
     likelihood = state.likelihood(sessions)
     for name, law in laws.items():
-        model = begun_with(catalogue()[law], model.without(name), likelihood)
+        if law not in model.names:  # it may follow better in the place of more than one
+            model = begun_with(catalogue()[law], model.without(name), likelihood)
     return state_at(fit(likelihood, model), sessions, state.thresholds, (*state.banned, *laws))
 
 

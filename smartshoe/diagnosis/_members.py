@@ -123,7 +123,7 @@ def _other_laws(
     channels = {e.name for e in available(likelihood.sessions, thresholds)}
     found = []
     for law in catalogue().values():
-        is_other = law.is_memoryless if of_curves else law.slot == one.effect.slot
+        is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
         start = begun_with(law, less.model, likelihood)

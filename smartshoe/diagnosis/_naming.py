@@ -64,6 +64,8 @@ def names_of(
     likely = [
         _doubted(name) if is_unsteady or (is_clocked and name.effect.goes_with_the_clock) else name for name in likely
     ]
+    found = {one.effect.name for one in likely}  # what is there itself stands for no other
+    likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
         is_firm = not is_clocked and any(one.kind >= thresholds.least_confidence for one in likely)
@@ -82,7 +84,7 @@ def names_of(
             return (_doubted(largest),)
     if alone is None:
         return ()
-    by_itself = (one for one in likely if one.member.effect.slot == alone.slot)
+    by_itself = (one for one in likely if one.member.effect.kind == alone.kind)
     return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
 
 
@@ -121,7 +123,7 @@ def _law_in_its_place(one: Member) -> Alternative | None:
 
 def _kin_of(law: Effect) -> tuple[str, ...]:
     """The other laws of its family, and of those that count as its members."""
-    return tuple(one.name for one in catalogue().values() if one.slot == law.slot and one is not law)
+    return tuple(one.name for one in catalogue().values() if one.kind == law.kind and one is not law)
 
 
 def _nearest_of_kind(block: Member) -> Effect:

@@ -252,8 +252,8 @@ def _diagnosed(
     surest = sorted(names, key=lambda one: -one.kind)[:cycles]
     unclear += [(one, few_cycles_of(one, cycles)) for one in names if one not in surest]
     names = _less(names, unclear)
-    parted = [said for one, values in given.clocks if (said := parted_clocks(one, values, extended, thresholds))]
-    names = tuple(one for one in names if not parted or one.effect not in [clock for clock, _ in given.clocks])
+    parted = parted_clocks(given.clocks, extended, sessions, thresholds)
+    names = tuple(one for one in names if parted is None or one.effect not in [clock for clock, _ in given.clocks])
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds, within.memory)
     zeros = tuple(one for one in zeros if one.size >= thresholds.material)
@@ -311,7 +311,7 @@ def _diagnosed(
             *([worse_of(won, ways)] if won.is_loss else []),
             *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
             *([told_force] if told_force else []),
-            *parted,
+            *([] if parted is None else [parted]),
             *(said for _, said in unclear),
             *past,
             *(crept_of(*one) for one in crept),
@@ -378,7 +378,7 @@ def _cause(
             )
         )
     if not name.is_sure:
-        does_most_alone = found.alone is not None and found.alone.slot == name.effect.slot
+        does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
         why = (
             "by itself it foresees best what is left out"
             if does_most_alone

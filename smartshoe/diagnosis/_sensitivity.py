@@ -17,21 +17,26 @@ import numpy as np
 from scipy.signal import lfilter
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._session import Session, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import Effect, blocks, catalogue
+from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family
 from smartshoe.models.extended import ExtendedModel
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect, or a flexible block, at one point of its shapes, and where its strengths' columns stand."""
+    """An effect, or a flexible block, at one point of its shapes, and where its strengths' columns stand.
+
+    ``is_apart``: the data tells its cause from others of its family.
+    """
 
     effect: Effect
     shape: Mapping[str, float]
     columns: tuple[int, ...]
+    is_apart: bool = True
 
     @property
     def name(self) -> str:
@@ -40,8 +45,8 @@ class Candidate:
 
     @property
     def slot(self) -> str:
-        """Of what there is one in a set."""
-        return self.effect.slot
+        """Of what there is one in a set: a law, or a flexible block in its place, of each cause of a family."""
+        return (self.is_apart and self.effect.cause) or self.effect.kind
 
     def start(self, strengths: Array) -> Array:
         """Parameter values (p,) with these changes of the strengths from null, within their bounds."""
@@ -235,15 +240,18 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     inside = {part.name: part for part in model.parts}
     outside = [e for e in available(fitted, thresholds) if e.name not in inside]
     channels = logged_channels(fitted)
+    present = excitation_of(fitted, thresholds).tells_apart
+    apart = {one.name: is_told_from_its_family(one, present) for one in (*outside, *(p.effect for p in model.parts))}
     candidates: list[Candidate] = []
     place = 4
     for part in model.parts:
-        candidates.append(Candidate(part.effect, _shape_of(part.effect, part.values), (place,)))
+        candidates.append(Candidate(part.effect, _shape_of(part.effect, part.values), (place,), apart[part.name]))
         place += 1
     for effect in outside:
         strengths = sum(parameter.null is not None for parameter in effect.parameters)
         for shape in effect.shapes_with(channels):
-            candidates.append(Candidate(effect, shape, tuple(range(place, place + strengths))))
+            own = tuple(range(place, place + strengths))
+            candidates.append(Candidate(effect, shape, own, apart[effect.name]))
             place += strengths
     beyond = [model.extended_by(one.effect, one.effect.start(one.shape)) for one in candidates[len(model.parts) :]]
     less = [model.without(part.name) for part in model.parts]

@@ -29,11 +29,19 @@ from smartshoe.models.extended import ExtendedModel
 SAID = 4  # changes of a gain, or a zero, that are said one by one
 
 
-def parted_clocks(told: Effect, values: Array, model: ExtendedModel, thresholds: Thresholds) -> str | None:
-    """What is said of a lag between clocks that the fit sees otherwise than the edges of load and reading did."""
-    lag_s, unit = float(values[0]), told.parameters[0].unit
-    fitted_s = next((float(part.values[0]) for part in model.parts if part.name == told.name), lag_s)
-    if unit != "s" or abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
+def parted_clocks(
+    told: Sequence[tuple[Effect, Array]], model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds
+) -> str | None:
+    """What is said of a lag between clocks that the fit sees otherwise than the edges of load and reading did.
+
+    By all that makes the model late in the middle of what is fitted.
+    """
+    if not {one.name for one, _ in told} & {*model.names}:
+        return None
+    middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in sessions if one.fitted.any()]))
+    lag_s = sum(one.late_s(values, middle_s) for one, values in told)
+    fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
+    if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
         return None
     return (
         f"the reading is {lag_s:.3g} s late by the edges of load and reading, {fitted_s:.3g} s beside the other"

@@ -33,7 +33,8 @@ from smartshoe.diagnosis._sensitivity import (
 )
 from smartshoe.diagnosis._session import Scale
 from smartshoe.models.core import USUAL_WALL_RATIO
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, is_told_from_its_family
+from smartshoe.models.effects.exposure import WORDS
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR, VOLT
 
@@ -53,7 +54,7 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
         cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
-        own_gain_sd=0.0, gain_parts=(), zero_changes=(),
+        own_gain_sd=0.0, gain_parts=(), zero_changes=(), thinned=1, resting=load <= 0.0,
     )  # fmt: skip
 
 
@@ -105,9 +106,30 @@ def test_a_strength_has_the_sign_that_its_bounds_allow() -> None:
     assert not both.has_sign_of(np.array([-1.0, -1.0]))
 
 
-def test_a_slot_is_a_family_or_the_one_that_is_imitated() -> None:
-    assert {effect(name).slot for name in ("saturation", "contact_area")} == {"static_curve"}
-    assert (effect("linear_leak").slot, _candidate((0.0, 0.0, 5.0)).name) == ("leak", "one")
+def test_of_a_family_or_the_one_that_is_imitated_there_is_one_but_for_causes_that_the_data_tells() -> None:
+    def slot(name: str, is_apart: bool = True) -> str:
+        return Candidate(effect(name), {}, (), is_apart).slot
+
+    assert {slot("saturation"), slot("contact_area"), effect("saturation").kind} == {"static_curve"}
+    assert (slot("linear_leak"), _candidate((0.0, 0.0, 5.0)).name) == ("leak", "one")
+    for family in (("delay", "sensor_lag", "clock_drift"), ("permanent_set", "zero_drift")):
+        assert len({slot(name) for name in family}) == len(family)
+        assert {slot(name, False) for name in family} == {effect(family[0]).family}
+    assert (slot("flexible_set"), slot("flexible_lag")) == (slot("permanent_set"), slot("sensor_lag"))
+    assert slot("warm_up") == slot("zero_drift")
+
+
+def test_what_tells_a_cause_from_its_family_is_what_separates_any_of_its_laws_from_others() -> None:
+    for name, words in (
+        ("permanent_set", {"pauses", "shuffled_loads"}),
+        ("flexible_set", {"pauses", "shuffled_loads"}),
+        ("mullins_softening", {"shuffled_loads"}),
+        ("clock_drift", {"repeats", "steps"}),
+    ):
+        told = {word for word in WORDS if is_told_from_its_family(effect(name), frozenset({word}))}
+        assert told == words
+        assert not is_told_from_its_family(effect(name), frozenset())
+    assert not is_told_from_its_family(effect("linear_leak"), WORDS)  # none of its family has another cause
 
 
 def test_an_effect_needs_its_channel_in_every_session() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -27,7 +28,7 @@ FAMILIES = {"one": "kind", "two": "kind", "three": "another"}
 OTHERS = ([4, 5], [3, 7], [], [4, 5])  # columns of the families' other equations
 
 
-def _given() -> Linearised:
+def _given(slots: Mapping[str, str] = FAMILIES) -> Linearised:
     rng = np.random.default_rng(2)
     sessions, rows = [], []
     for size in (70, 50):
@@ -38,7 +39,7 @@ def _given() -> Linearised:
         target = columns @ np.array([0.4, -0.3, 0.05, 0.02, -0.03, 0.0, 0.01]) + SD * rng.standard_normal(size) + 0.2
         rows.append(np.column_stack([target, columns]))
     candidates: Any = tuple(
-        SimpleNamespace(name=n, columns=c, effect=SimpleNamespace(family=FAMILIES[n], why_unnamed=""))
+        SimpleNamespace(name=n, columns=c, slot=slots[n], effect=SimpleNamespace(family=FAMILIES[n], why_unnamed=""))
         for n, c in zip(NAMES, COLUMNS, strict=True)
     )
     return Linearised(MODEL, tuple(sessions), tuple(rows), np.ones(8), 2, candidates, STANDARD)
@@ -287,3 +288,8 @@ def test_what_is_visible_is_what_own_columns_and_nuisances_leave(given: Linearis
     strengths = {1: np.array([0.3, -0.2])}
     assert evidence.visible_rms((4, 5), strengths[1]) == pytest.approx(twin.visible((1,), strengths), rel=1e-6)
     assert evidence.odds == pytest.approx(ODDS)
+
+
+def test_an_equation_departs_towards_its_familys_others_but_those_that_may_be_beside_it() -> None:
+    columns = [Evidence(_given(slots), SD)._others_of(0) for slots in (FAMILIES, {**FAMILIES, "two": "of its own"})]
+    assert columns == [OTHERS[0], []]

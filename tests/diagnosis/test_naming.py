@@ -150,7 +150,7 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     (block, *_) = blocks()["static_curve"]
     margins = (("contact_area", 3.0), ("gas_compression", 900.0), ("wall_hardening", 40.0))
     name = only(names_of([member(block, laws=margins, fall=47.0)], 0.0, STANDARD))
-    family = {one.name for one in catalogue().values() if one.slot == "static_curve"}
+    family = {one.name for one in catalogue().values() if one.kind == "static_curve"}
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family

@@ -384,3 +384,9 @@ def test_each_thing_that_lacks_has_its_sentence() -> None:
     # Without any rise the rate is said alone.
     (said,) = replace(rich, rates_per_s=(), peaks=()).limits()
     assert "one loading rate only" in said
+
+
+def test_what_single_load_cycles_hold_tells_nothing_that_asks_for_later_ones() -> None:
+    found = replace(_shown(_rising((0.1, 1.0))), present=frozenset({"shuffled_loads", "steps", "repeats"}))
+    assert replace(found, is_cycled=True).tells_apart == found.present
+    assert replace(found, is_cycled=False).tells_apart == {"steps"}

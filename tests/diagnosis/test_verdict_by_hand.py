@@ -39,6 +39,11 @@ from smartshoe.units import MILLIBAR, Unit, unit
 
 MODEL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar")
 SCALE = Scale(800.0, -140.0, MILLIBAR)
+# Of 200 s in the mean; what is held out has no say.
+LONG: Any = [
+    SimpleNamespace(conditions=SimpleNamespace(time_s=np.array([0.0, end_s])), fitted=np.array([fitted]))
+    for end_s, fitted in ((150.0, True), (250.0, True), (900.0, False))
+]
 
 
 # -- what is said -----------------------------------------------------------------------------------------------------
@@ -51,14 +56,24 @@ def test_a_lag_that_a_fit_sees_otherwise_is_said(sign: float, lag_s: float, off_
         for side in (1.0, -1.0):
             fitted = sign * lag_s + side * by * off_s
             model = MODEL.with_part("dead_band").with_part(told, np.array([fitted]))
-            said = parted_clocks(told, value, model, STANDARD)
+            said = parted_clocks([(told, value)], model, LONG, STANDARD)
             assert (said is not None) is is_said
             if said is not None:
                 assert f"is {sign * lag_s:.3g} s late by the edges of load and reading, {fitted:.3g} s beside" in said
-    # One that is no longer in the model is as it was; a rate is no lag.
-    assert parted_clocks(told, value, MODEL, STANDARD) is None
-    drift = effect("clock_drift")
-    assert parted_clocks(drift, np.array([5.0]), MODEL.with_part(drift, np.array([0.0])), STANDARD) is None
+    # One that is no longer in the model is as it was.
+    assert parted_clocks([(told, value)], MODEL, LONG, STANDARD) is None
+
+
+def test_a_lag_is_that_of_all_that_is_late_in_the_middle_of_a_recording() -> None:
+    delay, drift, lag = (effect(name) for name in ("delay", "clock_drift", "sensor_lag"))
+    told = [(delay, np.array([0.2])), (drift, np.array([0.004]))]
+    both = MODEL.with_part(delay, np.array([0.1])).with_part(drift, np.array([0.005]))
+    assert parted_clocks(told, both, LONG, STANDARD) is None
+    early = MODEL.with_part(delay, np.array([0.1])).with_part(drift, np.array([0.002]))
+    assert "is 0.6 s late by the edges of load and reading, 0.3 s" in str(parted_clocks(told, early, LONG, STANDARD))
+    beside = MODEL.with_part(delay, np.array([0.1])).with_part(lag, np.array([0.5, 0.1]))
+    assert parted_clocks(told, beside, LONG, STANDARD) is None
+    assert parted_clocks([(delay, np.array([0.2]))], beside, LONG, STANDARD) is not None
 
 
 @pytest.mark.parametrize(

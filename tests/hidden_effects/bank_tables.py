@@ -118,6 +118,7 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
     two = [(r, j) for r, j in cases if r["kind"] == "two"]
     three = [(r, j) for r, j in cases if r["kind"] == "three"]
     alike = [(r, j) for r, j in cases if r["kind"] == "alike"]
+    family = [(r, j) for r, j in cases if r["kind"] == "family"]
     hidden = [(r, j) for r, j in cases if r["kind"] in {*ONE_KINDS, "two", "three"} and is_clear(r)]
     none = [(r, j) for r, j in cases if r["kind"] in NONE_KINDS]
     outside = [(r, j) for r, j in cases if r["kind"] in OUTSIDE_KINDS]
@@ -148,7 +149,9 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
         share("three effects: exact set", "", three, lambda j: j.exact),
         share("two that imitate each other: both families", "", alike, lambda j: j.family),
         share("two that imitate each other: exact set", "", alike, lambda j: j.exact),
-        share("verdict right", "verdict", [*one, *two, *three, *alike, *none, *outside], lambda j: j.verdict),
+        share("two of one family: both named", "", family, lambda j: j.all_named),
+        share("two of one family: exact set", "", family, lambda j: j.exact),
+        share("verdict right", "verdict", [*one, *two, *three, *alike, *family, *none, *outside], lambda j: j.verdict),
         share("a name on data without an effect", "none", none, lambda j: bool(j.false), down=True),
         share("outside: flagged, and no name above 0.5", "outside", outside, lambda j: j.exact),
         share("cases with a false name", "", [*one, *two, *three], lambda j: bool(j.false), down=True),

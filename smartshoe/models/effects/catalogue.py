@@ -95,3 +95,11 @@ def effect(name: str) -> Effect:
 def told_apart_by(one: Effect, other: Effect) -> frozenset[Exposure]:
     """What tells the two apart, any of these; either may say it of the other."""
     return one.separated_by.get(other.name, frozenset()) | other.separated_by.get(one.name, frozenset())
+
+
+@cache
+def is_told_from_its_family(one: Effect, present: frozenset[str]) -> bool:
+    """Whether data that holds what is ``present`` tells the cause of an effect from the others of its family."""
+    family = [law for law in catalogue().values() if law.kind == one.kind]
+    own, others = ([law for law in family if (law.cause == one.cause) is alike] for alike in (True, False))
+    return any(told_apart_by(law, other) & present for law in own for other in others)

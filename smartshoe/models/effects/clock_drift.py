@@ -35,7 +35,12 @@ class ClockDrift(Effect):
         "sensor_lag": by("repeats", "steps"),
     }
     is_latency = True
+    cause = "rates of two clocks"
     why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
+
+    def late_s(self, values: Array, time_s: float) -> float:
+        """What was lost by then."""
+        return float(values[0]) * time_s
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal against the other clock."""

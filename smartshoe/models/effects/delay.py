@@ -25,10 +25,15 @@ class Delay(Effect):
         "sensor_lag": by("steps", "multisine"),
     }
     is_latency = True
+    cause = "delay"
     why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
 
-    def delay_s(self, values: Array) -> float:
+    def late_s(self, values: Array, time_s: float) -> float:
         """Its one value."""
+        return float(values[0])
+
+    def delay_s(self, values: Array) -> float:
+        """The same."""
         return float(values[0])
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:

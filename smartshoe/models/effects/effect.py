@@ -183,7 +183,8 @@ class Effect(ABC):
     ``is_memoryless``: True where the reading is a function of the present load alone.
     ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
-    ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
+    ``cause``: what of its family it is, where there are several that may be there together; they are still told for one
+    another. ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
     """
 
     name: ClassVar[str]
@@ -207,6 +208,7 @@ class Effect(ABC):
     is_memoryless: ClassVar[bool] = False
     bends_beside_arm: ClassVar[bool] = False
     imitates: ClassVar[str] = ""
+    cause: ClassVar[str] = ""
     mechanism: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
     is_steep_undone: ClassVar[bool] = False
@@ -224,8 +226,8 @@ class Effect(ABC):
         return self.inverse(values, step_s)
 
     @property
-    def slot(self) -> str:
-        """Of what there is one in a set: a law, or a flexible block in its place, of each family."""
+    def kind(self) -> str:
+        """The family that it is a law of, or counts as one of."""
         return self.imitates or self.family
 
     @property
@@ -241,6 +243,10 @@ class Effect(ABC):
     def departs_by(self, values: Array) -> float:
         """Of a block that follows what no law does: by what share of itself it differs from a law."""
         return 1.0
+
+    def late_s(self, values: Array, time_s: float) -> float:
+        """By how much a reading of a steady ramp is late ``time_s`` into a recording, of one that ``is_latency``."""
+        return 0.0
 
     def delay_s(self, values: Array) -> float:
         """The constant time by which it makes a reading late, and which a whole recording can be shifted back by."""

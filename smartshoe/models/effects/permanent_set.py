@@ -31,10 +31,11 @@ class PermanentSet(Effect):
     separated_by = {
         "linear_leak": by("rests"),
         "orifice_leak": by("rests"),
-        "warm_up": by("pauses"),
-        "zero_drift": by("pauses"),
+        "warm_up": by("pauses", "shuffled_loads"),
+        "zero_drift": by("pauses", "shuffled_loads"),
     }
     is_seen_at_rest = True
+    cause = "set"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure with the set so far; ``before["dose"]`` (full scales times s) counts along."""

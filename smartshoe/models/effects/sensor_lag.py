@@ -34,6 +34,11 @@ class SensorLag(Effect):
         "second_relaxation": by("steps"),
     }
     is_latency = True
+    cause = "lag"
+
+    def late_s(self, values: Array, time_s: float) -> float:
+        """Both poles' time constants."""
+        return float(values[0])
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The lagged signal."""

@@ -28,7 +28,7 @@ class WarmUp(Effect):
     separated_by = {
         "cycle_conditioning": by("pauses"),
         "linear_leak": by("idle"),
-        "permanent_set": by("pauses"),
+        "permanent_set": by("pauses", "shuffled_loads"),
         "zero_drift": by("idle"),
         "zero_offset": by("idle"),
     }

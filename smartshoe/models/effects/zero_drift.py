@@ -43,7 +43,7 @@ class ZeroDrift(Effect):
         "gain_drift": by("rests", "peaks"),
         "linear_leak": by("idle", "long_hold", "temperature"),
         "orifice_leak": by("idle", "long_hold", "temperature"),
-        "permanent_set": by("pauses"),
+        "permanent_set": by("pauses", "shuffled_loads"),
         "warm_up": by("idle"),
     }
     is_seen_at_rest = True

@@ -1,0 +1,33 @@
+"""Two effects of one family that are there by causes of their own: a set beside a warm-up, a delay beside a drift."""
+
+from __future__ import annotations
+
+import pytest
+
+from simulators.hidden.plans import ONE_FAMILY
+from simulators.hidden.recordings import hide
+from smartshoe.diagnosis import diagnose
+
+PROTOCOLS = ("mixed", "shuffled")
+IMITATE = frozenset({"delay", "sensor_lag"})  # a lag of a tenth of a second is late by as much as a delay, edges aside
+
+
+@pytest.mark.parametrize("pair", [pair for pair in ONE_FAMILY if {*pair} != IMITATE], ids="-".join)
+def test_both_are_named_and_the_model_follows_both(pair: tuple[str, str]) -> None:
+    for seed in (11, 12):
+        case = hide(pair, protocol=PROTOCOLS[seed % 2], seed=seed, recordings=3)
+        found = diagnose(case.recordings, case.hold_out)
+        assert found.verdict == "explained"
+        assert {*pair} <= {cause.name for cause in found.causes}
+        assert found.explainable_percent is not None
+        assert found.explained_percent is not None
+        assert found.explained_percent > 0.9 * found.explainable_percent
+
+
+def test_a_delay_and_a_lag_leave_nothing_where_one_stands_for_both() -> None:
+    case = hide(sorted(IMITATE), protocol="multisine", seed=11, recordings=3)
+    found = diagnose(case.recordings, case.hold_out)
+    assert {cause.name for cause in found.causes} & IMITATE
+    assert found.explainable_percent is not None
+    assert found.explained_percent is not None
+    assert found.explained_percent > 0.9 * found.explainable_percent
