@@ -5,7 +5,7 @@ single   one effect of the catalogue, each once in 35 cases, log-uniform from 0.
 two      two physical effects of families that do not imitate each other, 0.3 to 3 % each
 three    three of them
 alike    two physical effects of families that imitate each other, 0.3 to 3 % each
-family   two physical effects of one family, by causes of their own, 0.3 to 3 % each
+family   two physical effects of one family, of branches that may be there together, 0.3 to 3 % each
 none     nothing but nuisances and conditions
 outside  one effect that the catalogue does not have, 0.3 to 3 %
 worlds   one physical effect: unit, machine, protocols, strength, nuisances and noise are the same in the cases 3k,
@@ -39,7 +39,7 @@ IMITATE = {
     "hysteresis": {"asymmetry", "relaxation"}, "rate": {"gas_heat"}, "dead_band": {"static_curve", "zero", "tare"},
     "static_curve": {"dead_band", "saturation"}, "saturation": {"static_curve"}, "timing": {"gas_heat"},
 }  # fmt: skip
-# Of one family, and yet by causes of their own: both may be there.
+# Of one family, and yet no laws of one thing: both may be there.
 ONE_FAMILY = (
     ("delay", "clock_drift"), ("delay", "sensor_lag"), ("clock_drift", "sensor_lag"), ("permanent_set", "warm_up"),
     ("permanent_set", "zero_drift"), ("mullins_softening", "cycle_conditioning"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
-from smartshoe.integrity import Integrity
+from smartshoe.integrity import Integrity, OneClock
 from smartshoe.models.effects import Effect, effect
 from smartshoe.recording import Recording
 
@@ -59,6 +59,17 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
         made.append(recording)
         usable.append(mask)
     return Aligned(made, usable, (), tuple(says), places, frozenset(moved))
+
+
+def as_they_follow(recordings: Sequence[Recording], shared: OneClock | None) -> list[Recording]:
+    """``recordings`` with each reading at the moment whose load it follows, by the lag that all of them ``shared``."""
+    if shared is None:
+        return [*recordings]
+    offsets_s = (shared.before_s + 0.5 * shared.rate * one.duration_s for one in recordings)
+    return [
+        _on_one_clock(one, one.sensor.present, offset_s, shared.rate)[0]
+        for one, offset_s in zip(recordings, offsets_s, strict=True)
+    ]
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._aligned import aligned
+from smartshoe.diagnosis._aligned import aligned, as_they_follow
 from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import characteristic_of, conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
@@ -203,7 +203,8 @@ def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity,
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
-    friction = [friction_of(recording, thresholds) for recording in clocks.recordings[:count]]
+    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
+    friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
     limits = [*clocks.says, *ranges.says, *(said for said in said_of_curve if said is not None), *excitation.limits()]
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)

@@ -30,7 +30,7 @@ from smartshoe.models.extended import ExtendedModel
 class Candidate:
     """An effect, or a flexible block, at one point of its shapes, and where its strengths' columns stand.
 
-    ``is_apart``: the data tells its cause from others of its family.
+    ``is_apart``: the data tells its branch from the others of its family.
     """
 
     effect: Effect
@@ -45,8 +45,8 @@ class Candidate:
 
     @property
     def slot(self) -> str:
-        """Of what there is one in a set: a law, or a flexible block in its place, of each cause of a family."""
-        return (self.is_apart and self.effect.cause) or self.effect.kind
+        """Of what there is one in a set: a law, or a flexible block in its place, of each branch of a family."""
+        return (self.is_apart and self.effect.branch) or self.effect.kind
 
     def start(self, strengths: Array) -> Array:
         """Parameter values (p,) with these changes of the strengths from null, within their bounds."""

@@ -1,7 +1,7 @@
 """Integrity of the data: faults of clocks, loggers and converters, found before any model is asked."""
 
 from smartshoe.integrity._examination import examine
-from smartshoe.integrity._fault import DataFault, Integrity
+from smartshoe.integrity._fault import DataFault, Integrity, OneClock
 from smartshoe.integrity._twins import twins
 
-__all__ = ["DataFault", "Integrity", "examine", "twins"]
+__all__ = ["DataFault", "Integrity", "OneClock", "examine", "twins"]

@@ -106,7 +106,7 @@ def test_a_strength_has_the_sign_that_its_bounds_allow() -> None:
     assert not both.has_sign_of(np.array([-1.0, -1.0]))
 
 
-def test_of_a_family_or_the_one_that_is_imitated_there_is_one_but_for_causes_that_the_data_tells() -> None:
+def test_of_a_family_or_the_one_that_is_imitated_there_is_one_but_for_branches_that_the_data_tells() -> None:
     def slot(name: str, is_apart: bool = True) -> str:
         return Candidate(effect(name), {}, (), is_apart).slot
 
@@ -119,7 +119,7 @@ def test_of_a_family_or_the_one_that_is_imitated_there_is_one_but_for_causes_tha
     assert slot("warm_up") == slot("zero_drift")
 
 
-def test_what_tells_a_cause_from_its_family_is_what_separates_any_of_its_laws_from_others() -> None:
+def test_what_tells_a_branch_from_its_family_is_what_separates_any_of_its_laws_from_others() -> None:
     for name, words in (
         ("permanent_set", {"pauses", "shuffled_loads"}),
         ("flexible_set", {"pauses", "shuffled_loads"}),
@@ -129,7 +129,7 @@ def test_what_tells_a_cause_from_its_family_is_what_separates_any_of_its_laws_fr
         told = {word for word in WORDS if is_told_from_its_family(effect(name), frozenset({word}))}
         assert told == words
         assert not is_told_from_its_family(effect(name), frozenset())
-    assert not is_told_from_its_family(effect("linear_leak"), WORDS)  # none of its family has another cause
+    assert not is_told_from_its_family(effect("linear_leak"), WORDS)  # its family has no branches
 
 
 def test_an_effect_needs_its_channel_in_every_session() -> None:

@@ -1,4 +1,4 @@
-"""Two effects of one family that are there by causes of their own: a set beside a warm-up, a delay beside a drift."""
+"""Two effects of one family that may be there together: a set beside a warm-up, a delay beside a drift."""
 
 from __future__ import annotations
 

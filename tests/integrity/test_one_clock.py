@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, diagnose
-from smartshoe.diagnosis._aligned import aligned
+from smartshoe.diagnosis._aligned import aligned, as_they_follow
+from smartshoe.diagnosis._characteristic import friction_of
 from smartshoe.integrity import examine
 from smartshoe.integrity._clocks import UNSEEN, Lags, one_clock
 from smartshoe.integrity._fault import OneClock
@@ -146,6 +147,25 @@ def test_a_walk_whose_reading_is_reversed_is_told_so_however_late(late_s: float)
     walked = _walked(late_s)
     turned = walked.with_channel(replace(walked.sensor, values=-walked.sensor.values))
     assert "wrong_sign" in {fault.kind for fault in examine([turned], STANDARD).faults}
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.0005])
+def test_what_is_late_by_a_quarter_of_its_period_is_no_friction(drift: float) -> None:
+    """The reading then goes with the direction of the load rather than with it."""
+    time_s = np.arange(0.0, 60.0, 1.0 / RATE_HZ)
+    late_s = 0.25 + drift * time_s
+
+    def load(at_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 0.5 * (1.0 - np.cos(2.0 * np.pi * at_s)) * (1.0 + 0.1 * np.sin(0.7 * at_s))
+
+    swayed = Recording.from_arrays(
+        time_s=time_s, force_n=800.0 * load(time_s), pressure_mbar=100.0 * load(time_s - late_s), name="swayed"
+    )
+    assert "its direction" in str(friction_of(swayed, STANDARD))
+    assert as_they_follow([swayed], None) == [swayed]
+    (moved,) = as_they_follow([swayed], OneClock(0.25, drift))
+    assert friction_of(moved, STANDARD) is None
+    assert np.max(np.abs(moved.sensor.values - 100.0 * load(time_s))[100:-100]) < 1.0
 
 
 def test_a_walk_shares_the_delay_that_ramps_show() -> None:

@@ -99,7 +99,7 @@ def told_apart_by(one: Effect, other: Effect) -> frozenset[Exposure]:
 
 @cache
 def is_told_from_its_family(one: Effect, present: frozenset[str]) -> bool:
-    """Whether data that holds what is ``present`` tells the cause of an effect from the others of its family."""
+    """Whether data that holds what is ``present`` tells the branch of an effect from the others of its family."""
     family = [law for law in catalogue().values() if law.kind == one.kind]
-    own, others = ([law for law in family if (law.cause == one.cause) is alike] for alike in (True, False))
+    own, others = ([law for law in family if (law.branch == one.branch) is alike] for alike in (True, False))
     return any(told_apart_by(law, other) & present for law in own for other in others)

@@ -35,7 +35,7 @@ class ClockDrift(Effect):
         "sensor_lag": by("repeats", "steps"),
     }
     is_latency = True
-    cause = "rates of two clocks"
+    branch = "rates of two clocks"
     why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
 
     def late_s(self, values: Array, time_s: float) -> float:

@@ -25,7 +25,7 @@ class Delay(Effect):
         "sensor_lag": by("steps", "multisine"),
     }
     is_latency = True
-    cause = "delay"
+    branch = "delay"
     why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
 
     def late_s(self, values: Array, time_s: float) -> float:

@@ -183,7 +183,7 @@ class Effect(ABC):
     ``is_memoryless``: True where the reading is a function of the present load alone.
     ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
-    ``cause``: what of its family it is, where there are several that may be there together; they are still told for one
+    ``branch`` of its family, where it has several that may be there together; they are still told for one
     another. ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
     """
 
@@ -208,7 +208,7 @@ class Effect(ABC):
     is_memoryless: ClassVar[bool] = False
     bends_beside_arm: ClassVar[bool] = False
     imitates: ClassVar[str] = ""
-    cause: ClassVar[str] = ""
+    branch: ClassVar[str] = ""
     mechanism: ClassVar[str] = ""
     is_refinement: ClassVar[bool] = False
     is_steep_undone: ClassVar[bool] = False

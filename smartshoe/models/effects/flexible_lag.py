@@ -27,7 +27,7 @@ class FlexibleLag(Effect):
     shapes = ({"direction": -0.8}, {"direction": 0.8})
     exposed_by = by("repeats")
     is_flexible = True
-    cause = "lag"
+    branch = "lag"
     is_steep_undone = True
     why_unnamed = "comes later one way than the other, as through a passage that opens one way"
 

@@ -30,7 +30,7 @@ class FlexibleSet(Effect):
     is_seen_at_rest = True
     is_steep_undone = True
     is_flexible = True
-    cause = "set"
+    branch = "set"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure with the set so far."""

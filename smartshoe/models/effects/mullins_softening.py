@@ -54,7 +54,7 @@ class MullinsSoftening(Effect):
         "gain_drift": by("pauses", "shuffled_loads"),
         "play_hysteresis": by("repeats"),
     }
-    cause = "largest load"
+    branch = "largest load"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without softening would need; ``before["largest_load"]`` counts."""

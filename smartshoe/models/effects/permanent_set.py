@@ -35,7 +35,7 @@ class PermanentSet(Effect):
         "zero_drift": by("pauses", "shuffled_loads"),
     }
     is_seen_at_rest = True
-    cause = "set"
+    branch = "set"
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure with the set so far; ``before["dose"]`` (full scales times s) counts along."""

@@ -34,7 +34,7 @@ class SensorLag(Effect):
         "second_relaxation": by("steps"),
     }
     is_latency = True
-    cause = "lag"
+    branch = "lag"
 
     def late_s(self, values: Array, time_s: float) -> float:
         """Both poles' time constants."""
