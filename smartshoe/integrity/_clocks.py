@@ -55,9 +55,10 @@ def align(view: View) -> tuple[View, Lags]:
     """
     followed = _followed(view)
     if not _follows(followed, view.thresholds):
-        over = _followed(view.turned())
+        turned = view.turned()
+        over = _followed(turned)
         if _follows(over, view.thresholds):
-            view, followed = view.turned(), over
+            view, followed = turned, over
     if followed is None:
         return view, UNSEEN
     seen = Lags(followed.places - view.time_s[0], followed.best)

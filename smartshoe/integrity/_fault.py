@@ -61,7 +61,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class OneClock:
-    """One pair of clocks for all recordings: the lag ``before_s`` at the beginning of each, its growth ``rate``."""
+    """One pair of clocks for all recordings: the lag ``before_s`` at the beginning of each, its growth in s per s."""
 
     before_s: float
     rate: float

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._force import ForceError
 from smartshoe.diagnosis._gains_and_zeros import ZeroChange
 from smartshoe.diagnosis._procedure import _diagnosed, _prepared
 from smartshoe.diagnosis._zero import Zero, shift_of
-from smartshoe.integrity._fault import OneClock
+from smartshoe.integrity import OneClock
 from smartshoe.models.effects import effect
 
 Array = NDArray[np.float64]

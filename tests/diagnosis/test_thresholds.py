@@ -15,8 +15,8 @@ from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.diagnosis._zero import first_rests
 from smartshoe.diagnosis.decay import decay_of
+from smartshoe.integrity import OneClock
 from smartshoe.integrity._clocks import Lags, one_clock
-from smartshoe.integrity._fault import OneClock
 from smartshoe.integrity.thresholds import largest_of_noise
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording

@@ -18,7 +18,7 @@ from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
 from smartshoe.errors import InputError
-from smartshoe.integrity._fault import OneClock
+from smartshoe.integrity import OneClock
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel

@@ -33,20 +33,26 @@ def _told(found: Diagnosis) -> list[str]:
     return [said for said in found.limits if "a gain of its own" in said]
 
 
-@TWO_OR_THREE
-def test_gains_are_told_and_nothing_is_named_for_them(recordings: int) -> None:
-    told = []
-    for seed in (10, 11, 12, 13):
-        found = _diagnosed({}, seed, recordings)
-        told += _told(found)
-        assert not [cause.name for cause in found.causes if cause.confidence > 0.5 and cause.size > 1.5e-3]
-    assert len(told) >= 3  # two recordings in which a gain drifts, settles and softens differ by as much
-    for said in told:
-        low, high = (float(one) for one in re.findall(r"([+-][0-9.]+) % in", said))
-        # Two recordings' gains lie 1.25 % on either side of their mean, three's from -1.3 to 1.2 %; small imperfections
-        # of the unit move that.
-        assert low == pytest.approx(-1.27, abs=0.35)
-        assert high == pytest.approx(1.22, abs=0.35)
+MISSED = pytest.mark.xfail(strict=True, reason="a drift and two softenings follow two recordings' gains")
+
+
+@pytest.mark.parametrize(
+    ("seed", "recordings"),
+    [
+        pytest.param(seed, count, marks=[MISSED] if (seed, count) == (11, 2) else [])
+        for seed in (10, 11, 12, 13)
+        for count in (2, 3)
+    ],
+)
+def test_gains_are_told_and_nothing_is_named_for_them(seed: int, recordings: int) -> None:
+    found = _diagnosed({}, seed, recordings)
+    (said,) = _told(found)
+    low, high = (float(one) for one in re.findall(r"([+-][0-9.]+) % in", said))
+    # Two recordings' gains lie 1.25 % on either side of their mean, three's from -1.3 to 1.2 %; small imperfections
+    # of the unit move that.
+    assert low == pytest.approx(-1.27, abs=0.35)
+    assert high == pytest.approx(1.22, abs=0.35)
+    assert not [cause.name for cause in found.causes if cause.confidence > 0.5 and cause.size > 1.5e-3]
 
 
 @TWO_OR_THREE

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Thresholds, diagnose
 from smartshoe.diagnosis._aligned import aligned, as_they_follow
 from smartshoe.diagnosis._characteristic import friction_of
-from smartshoe.integrity import examine
+from smartshoe.integrity import OneClock, examine
 from smartshoe.integrity._clocks import UNSEEN, Lags, one_clock
-from smartshoe.integrity._fault import OneClock
 from smartshoe.recording import Recording
 
 STANDARD = Thresholds()
@@ -88,7 +88,7 @@ def test_recordings_of_two_pairs_of_clocks_share_none() -> None:
 
 
 # -- readings ---------------------------------------------------------------------------------------------------------
-def _walked(late_s: float, seed: int = 1, unit: str = "mbar") -> Recording:
+def _walked(late_s: float, seed: int = 1) -> Recording:
     """A few holds among steps of about a second, read ``late_s`` late."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(0.0, 90.0, 1.0 / RATE_HZ)
@@ -105,16 +105,12 @@ def _walked(late_s: float, seed: int = 1, unit: str = "mbar") -> Recording:
     )
     read = np.interp(time_s - late_s, time_s, load)
     keep = float(np.exp(-1.0 / RATE_HZ / 3.0))
-    slow = np.empty(read.size)
-    state = 0.0
-    for k, value in enumerate(read):
-        state = keep * state + (1.0 - keep) * value
-        slow[k] = state
+    slow = lfilter([1.0 - keep], [1.0, -keep], read)
     return Recording.from_arrays(
         time_s=time_s,
         force_n=800.0 * load + rng.normal(0.0, 0.5, time_s.size),
+        pressure_mbar=100.0 * (read + 0.05 * slow) + rng.normal(0.0, 0.1, time_s.size),
         name=f"walked_{seed}",
-        **{f"pressure_{unit}": 100.0 * (read + 0.05 * slow) + rng.normal(0.0, 0.1, time_s.size)},
     )
 
 

@@ -33,8 +33,8 @@ class Delay(Effect):
         return float(values[0])
 
     def delay_s(self, values: Array) -> float:
-        """The same."""
-        return float(values[0])
+        """The same, whatever the time."""
+        return self.late_s(values, 0.0)
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The delayed signal."""

@@ -183,8 +183,8 @@ class Effect(ABC):
     ``is_memoryless``: True where the reading is a function of the present load alone.
     ``bends_beside_arm``: True where it looks at ``conditions.relaxing``, which a model tells such effects only.
     ``imitates``: another family, of which this effect counts as a member where no fault of the data speaks for it.
-    ``branch`` of its family, where it has several that may be there together; they are still told for one
-    another. ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
+    ``branch``: which of its family's, where that has several that may be there together and be told for one another.
+    ``mechanism``: what effects of several families are limits of, so that one's departure looks like another.
     """
 
     name: ClassVar[str]
