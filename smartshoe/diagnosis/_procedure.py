@@ -4,69 +4,40 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._aligned import aligned, as_they_follow
-from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
-from smartshoe.diagnosis._characteristic import characteristic_of, conductance_of, friction_of
-from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._causes import cause_of, zero_cause_of
+from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._force import force_error, force_of, undoes
-from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
+from smartshoe.diagnosis._gauss_markov import GaussMarkov
+from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
-from smartshoe.diagnosis._naming import Name, confidence_of, names_of
+from smartshoe.diagnosis._limits import elsewhere_of, own_gains_of, refusals_of, worse_of, zero_changes_said
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
-from smartshoe.diagnosis._parameters import in_unit, joint_parameters, parameters_of
-from smartshoe.diagnosis._ranges import beyond, ranges_of
+from smartshoe.diagnosis._parameters import joint_parameters
+from smartshoe.diagnosis._prepared import Prepared, prepared
+from smartshoe.diagnosis._ranges import beyond
 from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
-from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Statement, Trace, Verdict
-from smartshoe.diagnosis._session import (
-    Scale,
-    Session,
-    at_full_rate,
-    full_scale,
-    load_cycles,
-    pastless,
-    prepare,
-    thinning,
-)
+from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
+from smartshoe.diagnosis._session import Scale, Session, pastless
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
-from smartshoe.diagnosis._verdict import (
-    crept_of,
-    departure_of,
-    elsewhere_of,
-    few_cycles_of,
-    known_error,
-    moved_of,
-    not_shown_of,
-    off_elsewhere,
-    other_kind_of,
-    own_gains_of,
-    parted_clocks,
-    past_of,
-    refusals_of,
-    sentence_of,
-    unexplained_of,
-    verdict_of,
-    worse_of,
-    zero_changes_said,
-)
-from smartshoe.diagnosis._zero import Zero, creeping, offsets, shift_of, zeros_of
+from smartshoe.diagnosis._verdict import known_error, off_elsewhere, sentence_of, unexplained_of, verdict_of
+from smartshoe.diagnosis._withheld import causes_among
+from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine, twins
-from smartshoe.integrity.thresholds import Thresholds, decided_by, largest_of_noise
+from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.models.effects import Effect
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
-from smartshoe.signals.noise import NORMAL_95
 
 
 def _silent(_: str) -> None:
@@ -173,51 +144,11 @@ def _seen(recording: Recording, thresholds: Thresholds) -> str | None:
     return decay.says if decay is not None else characteristic_of(recording, thresholds)
 
 
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    sessions: list[Session]
-    fine: list[Session]
-    scale: Scale
-    limits: list[str]
-    start: ExtendedModel
-    excitation: Excitation
-    is_no_unit: bool
-    clocks: Sequence[tuple[Effect, Array]]
-    is_moved: bool
-
-
-def _prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> _Prepared:
-    clocks = aligned(recordings, integrity)
-    held_out = [place >= count for place in clocks.places]
-    count = held_out.count(False)
-    scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
-    held = held_out if any(held_out) else None
-    factor = thinning(clocks.recordings[:count], scale, thresholds)
-    sessions = [
-        replace(one, index=clocks.places[one.index])
-        for one in prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
-    ]
-    start = baseline_of(sessions, scale)
-    if clocks.parts:  # against a load of another clock no relaxation is found
-        start = with_usual_arm(start)
-    for added, values in clocks.parts:
-        start = start.with_part(added, values)
-    excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
-    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
-    friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
-    said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
-    limits = [*clocks.says, *ranges.says, *(said for said in said_of_curve if said is not None), *excitation.limits()]
-    fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
-    is_no_unit = ranges.is_trap or all(said is not None for said in friction)
-    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
-    return _Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved)
-
-
 @on_one_thread
 def _diagnosed(
     recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds, progress: Progress
 ) -> Diagnosis:
-    given = _prepared(recordings, count, integrity, thresholds)
+    given = prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
@@ -225,65 +156,29 @@ def _diagnosed(
     plain, residuals = ([residual_of(one, model) for one in sessions] for model in (found.baseline.model, extended))
     before = residual_structure(sessions, plain, thresholds)
     after = residual_structure(sessions, residuals, thresholds)
-    # What is held out decides over no name; it may be of loads that nothing was learnt of.
-    learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
-    learnt = [(one, left) for one, left in learnt if one.usable.any()]
-    within = residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
-    everything = max(within.rms, within.size)
-    silent = given.is_no_unit or not found.can_validate
+    within = _left_of_what_was_fitted(sessions, residuals, thresholds)
+    left = max(within.rms, within.size)
+    zeros = _zeros(found, given, left, thresholds, within.memory)
     is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
-    members = [one for one in found.members if one.name not in found.undone]
-    names = names_of(
-        members,
-        everything,
-        thresholds,
-        is_followed=is_followed,
-        is_clocked=given.excitation.goes_with_the_clock,
-        is_unsteady=bool(found.zero_changes),
-        alone=found.alone,
-    )
-    kinds = ((one, other_kind_of(one, extended, thresholds) or not_shown_of(one, given.excitation)) for one in names)
-    unclear = [(one, said) for one, said in kinds if said is not None]
-    unnamed = max((one.member.size for one, _ in unclear), default=0.0)
-    unclear += [(one, moved_of(one)) for one in names if given.is_moved and one.effect.is_latency]
-    names = _less(names, unclear)
-    unclear += [(one, said) for one in names if (said := departure_of(one, names, thresholds))]
-    names = _less(names, unclear)
-    cycles = load_cycles(sessions, thresholds)
-    surest = sorted(names, key=lambda one: -one.kind)[:cycles]
-    unclear += [(one, few_cycles_of(one, cycles)) for one in names if one not in surest]
-    names = _less(names, unclear)
-    parted = parted_clocks(given.clocks, extended, sessions, thresholds)
-    names = tuple(one for one in names if parted is None or one.effect not in [clock for clock, _ in given.clocks])
-    remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
-    zeros = () if silent else zeros_of(sessions, extended, scale, everything, remembered, thresholds, within.memory)
-    zeros = tuple(one for one in zeros if one.size >= thresholds.material)
-    past = [past_of(one, scale) for one in zeros if one.is_past]
-    # A zero that jumps within recordings is no offset.
-    zeros = tuple(
-        one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
-    )
-    crept = [(one, tare) for one in names if (tare := creeping(zeros, one.effect, one.member.size, thresholds))]
-    names = _less(names, crept)
+    named = causes_among(found, given, zeros, left, thresholds, is_followed=is_followed)
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
-    causes = [_cause(name, found, fine, best, given, thresholds) for name in names]
-    causes += [_zero_cause(zero, found, fine, best, given, thresholds) for zero in zeros]
+    causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
+    causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
-    # What follows something else than the load is simulated by no unit, however well it fits.
-    follows = all(name.is_sure and not name.kind_only for name in names)
-    known = known_error(integrity.faults, sessions, scale)
     won = gain(baseline, best, scale, thresholds)
     elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
     verdict: Verdict = "unexplained"
-    if not given.is_no_unit:
-        besides = elsewhere or (unnamed if unnamed > thresholds.tolerable else 0.0)
+    if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
+        follows = all(name.is_sure and not name.kind_only for name in named.names)
+        known = known_error(integrity.faults, sessions, scale)
+        besides = elsewhere or (named.nameless if named.nameless > thresholds.tolerable else 0.0)
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
-    with_zero = _with_offset(extended, zeros, sessions, scale)
+    with_zero = _with_offset(extended, named.zeros, sessions, scale)
     noise_variance = max(best.rmse**2 - max(after.rms, elsewhere) ** 2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
-    named = {cause.name for cause in causes} | {name.member.name for name in names}
+    parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     parameters, covariance = joint_parameters(found.fit, scale)
     plain_force, force = (force_error(fine, model) for model in (found.baseline.model, extended))
     by_extended = undoes(force, plain_force)
@@ -296,7 +191,7 @@ def _diagnosed(
         scale.load_n,
         abs(scale.reading),
         causes=tuple(causes),
-        minor=tuple(part.name for part in extended.parts if part.name not in named),
+        minor=tuple(part.name for part in extended.parts if part.name not in parts),
         data_faults=(*integrity.faults, *noise),
         baseline=_goodness(baseline, plain_force.held_out_n, before, scale),
         extended=_goodness(best, (force if by_extended else plain_force).held_out_n, after, scale),
@@ -312,10 +207,7 @@ def _diagnosed(
             *([worse_of(won, ways)] if won.is_loss else []),
             *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
             *([told_force] if told_force else []),
-            *([] if parted is None else [parted]),
-            *(said for _, said in unclear),
-            *past,
-            *(crept_of(*one) for one in crept),
+            *named.limits,
             *own_gains_of(found.own_gains),
             *zero_changes_said(found.zero_changes),
             *refusals_of(found),
@@ -325,7 +217,7 @@ def _diagnosed(
         likeness=found.likeness,
         model=with_zero,
         baseline_model=found.baseline.model,
-        force_model=None if by_extended else _with_offset(found.baseline.model, zeros, sessions, scale),
+        force_model=None if by_extended else _with_offset(found.baseline.model, named.zeros, sessions, scale),
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),
@@ -333,9 +225,24 @@ def _diagnosed(
     )
 
 
-def _less(names: Sequence[Name], left_open: Sequence[tuple[Name, object]]) -> tuple[Name, ...]:
-    """``names`` without those that are left open, for reasons that stand beside them."""
-    return tuple(one for one in names if one not in [name for name, _ in left_open])
+def _left_of_what_was_fitted(
+    sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds
+) -> ResidualStructure:
+    """What is left where a model was fitted: what is held out decides over no name, and may be of other loads."""
+    learnt = [(replace(one, usable=one.fitted), left) for one, left in zip(sessions, residuals, strict=True)]
+    learnt = [(one, left) for one, left in learnt if one.usable.any()]
+    return residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
+
+
+def _zeros(
+    found: Inference, given: Prepared, left: float, thresholds: Thresholds, noise: GaussMarkov | None
+) -> list[Zero]:
+    """The offsets and tares that are seen beside what was ``found``, and are material."""
+    if given.is_no_unit or not found.can_validate:
+        return []
+    remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
+    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, thresholds, noise)
+    return [one for one in zeros if one.size >= thresholds.material]
 
 
 def _percent_less(after: float, before: float) -> float:
@@ -343,134 +250,6 @@ def _percent_less(after: float, before: float) -> float:
     if math.isnan(before):
         return before
     return 100.0 * max(0.0, 1.0 - after / before) if before > 0 else 0.0
-
-
-def _cause(
-    name: Name, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared, thresholds: Thresholds
-) -> Cause:
-    member = name.member
-    won = gain(errors(fine, member.without.model), best, given.scale, thresholds)
-    near = {a.effect: a.margin for a in member.alternatives}
-    # Laws are weighed against the one that is named, which is not the best fit where a block stands for it.
-    near |= {a.effect: a.margin - (name.by.margin if name.by is not None else 0.0) for a in member.laws}
-    rivals = tuple(
-        Rival(effect, margin)
-        for effect, margin in sorted(near.items(), key=lambda one: one[1])
-        if effect not in (None, name.effect.name)
-    )
-    nothing = next((a.margin for a in member.alternatives if a.effect is None), 0.0)
-    evidence = [
-        Statement(
-            "fall of -2 log evidence",
-            nothing,
-            0.0,
-            f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log, also where the"
-            " others may depart towards any law of their kinds",
-        ),
-        *_held_out_evidence(member.size, won, thresholds.material),
-    ]
-    if rivals:
-        evidence.append(
-            Statement(
-                "margin to the nearest rival",
-                rivals[0].margin,
-                0.0,
-                f"{rivals[0].effect.replace('_', ' ')} in its place is worse by {rivals[0].margin:,.0f}",
-            )
-        )
-    if not name.is_sure:
-        does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
-        why = (
-            "by itself it foresees best what is left out"
-            if does_most_alone
-            else "it is named for its size, which is more than all that is left, or than small imperfections add up to"
-        )
-        evidence.append(
-            Statement(
-                "confidence of its kind",
-                name.kind,
-                thresholds.least_confidence,
-                f"it is not sure, since others may do what it does: {why}",
-            )
-        )
-    elif name.kind_only:
-        is_certain = name.kind >= thresholds.least_confidence
-        why = (
-            "the kind is sure, the law is not: no equation of it follows better than others"
-            if is_certain
-            else "no equation of its kind follows it: it may be of a kind that the catalogue does not have"
-        )
-        evidence.append(Statement("kind", float(is_certain), 1.0, why))
-    if name.by is not None:
-        missed = max(name.by.margin, 0.0) / max(member.fall, 1.0)  # of -2 log likelihood
-        evidence.append(
-            Statement(
-                "share of its kind that the law misses in percent",
-                100 * missed,
-                100 * thresholds.departure**2,
-                f"the law misses {100 * missed:.2g} % of what {member.name.replace('_', ' ')} explains, no more than"
-                " laws do: that stays in the extended model, the parameters are the law's in its place",
-            )
-        )
-    lacking = name.effect.exposed_by - given.excitation.present
-    if lacking:
-        said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
-        evidence.append(
-            Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")
-        )
-    by = None if name.by is None else name.by.fit
-    values = parameters_of(by or found.fit, name.effect.name if by else member.name, given.scale)
-    sure = confidence_of(name, thresholds), name.law
-    return Cause(name.effect, *sure, name.equivalents, values, tuple(evidence), won, member.size, rivals, member.name)
-
-
-def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:
-    moves = Statement(
-        "size in percent of full scale",
-        100 * size,
-        100 * material,
-        f"it moves the reading by {100 * size:.3g} % of full scale",
-    )
-    if math.isnan(won.gain_percent):
-        return [moves]
-    way = "falls" if won.rmse_after <= won.rmse_before else "rises"
-    return [
-        moves,
-        Statement(
-            "gain on held-out data in percent",
-            won.gain_percent,
-            0.0,
-            f"on data not fitted the error {way} from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
-        ),
-    ]
-
-
-def _zero_cause(
-    zero: Zero, found: Inference, fine: Sequence[Session], best: Errors, given: _Prepared, thresholds: Thresholds
-) -> Cause:
-    """An offset or tare: removed, every reading is off by it."""
-    scale = given.scale
-    worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
-    won = gain(worse, best, scale, thresholds)
-    parameter = zero.effect.parameters[0]
-    factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
-    interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
-    values = {parameter.name: in_unit(zero.value, zero.sd, interval, factor, unit)}
-    deviations = abs(zero.value) / zero.sd
-    seen = Statement(
-        "deviations from nothing",
-        deviations,
-        largest_of_noise(1, thresholds),
-        f"it is {deviations:.3g} standard deviations from nothing",
-    )
-    sure = (
-        thresholds.least_confidence
-        if zero.alternatives
-        else 1.0 - thresholds.false_name,  # by its model alone, or seen
-        1.0 / (1.0 + len(zero.alternatives)),
-    )
-    evidence = (seen, *_held_out_evidence(zero.size, won, thresholds.material))
-    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)
 
 
 def _with_offset(

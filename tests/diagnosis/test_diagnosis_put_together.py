@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, TIME_S, _left
 
 from smartshoe import Recording
-from smartshoe.diagnosis import _procedure
+from smartshoe.diagnosis import _procedure, _withheld
 from smartshoe.diagnosis._force import ForceError
 from smartshoe.diagnosis._gains_and_zeros import ZeroChange
-from smartshoe.diagnosis._procedure import _diagnosed, _prepared
+from smartshoe.diagnosis._prepared import prepared
+from smartshoe.diagnosis._procedure import _diagnosed
 from smartshoe.diagnosis._zero import Zero, shift_of
 from smartshoe.integrity import OneClock
 from smartshoe.models.effects import effect
@@ -39,14 +40,14 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
         lags_s, shared = (lag_s,) * 3, OneClock(lag_s, 0.0)
         return SimpleNamespace(clock_offset_s=lags_s, clock_rate=(0.0,) * 3, one_clock=shared, usable=usable)
 
-    found = _prepared(runs, 2, integrity(0.0), STANDARD)
+    found = prepared(runs, 2, integrity(0.0), STANDARD)
     assert [bool(one.held_out.all()) for one in found.sessions] == [False, False, True]
     assert [one.thinned for one in found.fine] == [1, 1, 1]
     assert not found.is_no_unit
     assert found.start.parts == ()
-    within = _prepared(runs, 3, integrity(0.0), STANDARD)
+    within = prepared(runs, 3, integrity(0.0), STANDARD)
     assert all(0.1 < float(one.held_out.mean()) < 0.6 for one in within.sessions)
-    late = _prepared(runs, 3, integrity(0.3), STANDARD)
+    late = prepared(runs, 3, integrity(0.3), STANDARD)
     ((name, value),) = [(one.name, one.values) for one in late.start.parts]
     assert (name, value) == ("delay", pytest.approx([0.3]))
     assert (late.start.relaxing_share, late.start.relaxation_rate_per_s) == (0.08, 0.22)
@@ -54,14 +55,14 @@ def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforeha
     # A reading that is moved by itself matters where it is fitted.
     for lags, count, is_moved in (((0.3, 0.0, 0.0), 2, True), ((0.0, 0.0, 0.3), 2, False), ((0.0, 0.0, 0.3), 3, True)):
         apart = SimpleNamespace(clock_offset_s=lags, clock_rate=(0.0,) * 3, one_clock=None, usable=usable)
-        assert _prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
+        assert prepared(runs, count, apart, STANDARD).is_moved is is_moved  # type: ignore[arg-type]
     # Friction in each recording is no unit's; in one of them it is said.
     rubbed = [replace_reading(one, 5.0 * np.sign(np.gradient(LOAD))) for one in runs]
-    assert _prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
-    mixed = _prepared([runs[0], rubbed[1], runs[2]], 3, integrity(0.0), STANDARD)
+    assert prepared(rubbed, 3, integrity(0.0), STANDARD).is_no_unit
+    mixed = prepared([runs[0], rubbed[1], runs[2]], 3, integrity(0.0), STANDARD)
     assert not mixed.is_no_unit
     assert sum("friction; Coulomb" in said for said in mixed.limits) == 1
-    assert sum("friction; Coulomb" in said for said in _prepared(runs, 3, integrity(0.0), STANDARD).limits) == 0
+    assert sum("friction; Coulomb" in said for said in prepared(runs, 3, integrity(0.0), STANDARD).limits) == 0
 
 
 def replace_reading(one: Recording, reading: Array) -> Recording:
@@ -114,12 +115,12 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
             made.seen[name] = (args, named)
             return value(*args) if callable(value) else value
 
-        monkeypatch.setattr(_procedure, name, called)
+        monkeypatch.setattr(_withheld if hasattr(_withheld, name) else _procedure, name, called)
 
     def cause(name: Any, *_: Any) -> Any:
         return SimpleNamespace(name=name.name, size=made.sizes[name.name], rivals=(f"rival of {name.name}",))
 
-    answer("_prepared", given)
+    answer("prepared", given)
     answer("infer", found)
     answer("residual_of", lambda session, model: f"{session.name} {len(model.parts)}")
     monkeypatch.setattr(_procedure, "residual_structure", structure)
@@ -128,8 +129,8 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("zeros_of", lambda *_: tuple(made.zeros))
     answer("errors", lambda fine, model: AFTER if len(model.parts) else BEFORE)
     answer("fitted_rms", 1.0)
-    answer("_cause", cause)
-    answer("_zero_cause", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
+    answer("cause_of", cause)
+    answer("zero_cause_of", lambda zero, *_: SimpleNamespace(name="zero", size=zero.size, rivals=("of zero",)))
     answer("_with_offset", "with offset")
     answer("noise_kinds", ["noise"])
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
@@ -247,7 +248,7 @@ def test_so_many_load_cycles_show_so_many_causes(parts: Any, monkeypatch: pytest
     for cycles, sure, named in ((1, 0.8, ["linear_leak"]), (2, 0.8, ["delay", "linear_leak"]), (1, 0.95, ["delay"])):
         parts.names = [_name("turned"), _name("linear_leak"), _name("delay", kind=sure)]
         parts.seen.clear()
-        monkeypatch.setattr(_procedure, "load_cycles", lambda sessions, thresholds, cycles=cycles: cycles)
+        monkeypatch.setattr(_withheld, "load_cycles", lambda sessions, thresholds, cycles=cycles: cycles)
         told = _run_diagnosis(parts)
         assert [one.name for one in told.causes] == named
         other = "linear leak" if sure > 0.9 else "delay"

@@ -12,22 +12,21 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
-from smartshoe.diagnosis import Thresholds, _procedure
+from smartshoe.diagnosis import Thresholds, _causes
+from smartshoe.diagnosis._causes import _held_out_evidence, cause_of, zero_cause_of
 from smartshoe.diagnosis._held_out import Errors, Gain, own_of
+from smartshoe.diagnosis._limits import refusals_of
 from smartshoe.diagnosis._naming import confidence_of
 from smartshoe.diagnosis._procedure import (
-    _cause,
     _goodness,
-    _held_out_evidence,
     _outside,
     _percent_less,
     _refused,
     _trace,
     _with_offset,
-    _zero_cause,
 )
 from smartshoe.diagnosis._session import Scale, prepare
-from smartshoe.diagnosis._verdict import refusals_of, sentence_of, verdict_of
+from smartshoe.diagnosis._verdict import sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, effect
@@ -201,8 +200,8 @@ def _told(
         asked.append((fine, model))
         return BEFORE
 
-    monkeypatch.setattr(_procedure, "errors", after)
-    monkeypatch.setattr(_procedure, "parameters_of", lambda fit, name, scale: {"of": (fit, name, scale)})
+    monkeypatch.setattr(_causes, "errors", after)
+    monkeypatch.setattr(_causes, "parameters_of", lambda fit, name, scale: {"of": (fit, name, scale)})
     member = SimpleNamespace(
         name="static_curve_block",
         size=0.0123,
@@ -222,9 +221,9 @@ def _told(
         is_sure=is_sure,
         by=by,
     )
-    given: Any = SimpleNamespace(scale=SCALE, excitation=SimpleNamespace(present=present))
+    excitation: Any = SimpleNamespace(present=present)
     found: Any = SimpleNamespace(fit="fit", alone=alone)
-    cause = _cause(name, found, "fine", AFTER, given, STANDARD)  # type: ignore[arg-type]
+    cause = cause_of(name, found, "fine", AFTER, SCALE, excitation, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]
     fitted = ("fit", "static_curve_block") if by is None else (by.fit, "linear_leak")
     assert cause.parameters == {"of": (*fitted, SCALE)}
@@ -282,8 +281,7 @@ def test_a_zero_is_a_cause_by_which_every_reading_is_off(
     signal: str, factor: float, unit: str, alternatives: tuple[str, ...]
 ) -> None:
     zero = Zero(shift_of(signal), -0.02, 0.004, 0.03, alternatives)
-    given: Any = SimpleNamespace(scale=SCALE)
-    cause = _zero_cause(zero, None, (), AFTER, given, STANDARD)  # type: ignore[arg-type]
+    cause = zero_cause_of(zero, AFTER, SCALE, STANDARD)
     ((name, parameter),) = cause.parameters.items()
     assert name == zero.effect.parameters[0].name
     assert (parameter.value, parameter.sd, parameter.unit) == (-0.02 * factor, 0.004 * abs(factor), unit)

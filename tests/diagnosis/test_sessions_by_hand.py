@@ -16,7 +16,7 @@ from scipy.stats import norm
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
-from smartshoe.diagnosis._procedure import _prepared
+from smartshoe.diagnosis._prepared import prepared
 from smartshoe.diagnosis._session import (
     Scale,
     Session,
@@ -171,7 +171,7 @@ def test_what_is_held_out_thins_nothing() -> None:
     slow, fast = (course(*((n, 1.0), (n, 0.0)) * 8) for n in (100, 8))
     fitted = _run(slow, name="a")
     for held in (_run(slow, name="b"), _run(fast, name="c"), _run(np.tile(slow, 60), name="d")):
-        given = _prepared([fitted, held], 1, examine([fitted, held], STANDARD), STANDARD)
+        given = prepared([fitted, held], 1, examine([fitted, held], STANDARD), STANDARD)
         assert [one.thinned for one in given.sessions] == [3, 3]
 
 

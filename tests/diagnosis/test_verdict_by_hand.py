@@ -17,21 +17,20 @@ from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import _judged
-from smartshoe.diagnosis._residual_structure import ResidualStructure
-from smartshoe.diagnosis._session import Scale
-from smartshoe.diagnosis._validation import cancelling
-from smartshoe.diagnosis._verdict import (
+from smartshoe.diagnosis._limits import (
     crept_of,
-    known_error,
     not_shown_of,
     other_kind_of,
     own_gains_of,
     parted_clocks,
     past_of,
-    verdict_of,
     worse_of,
     zero_changes_said,
 )
+from smartshoe.diagnosis._residual_structure import ResidualStructure
+from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._validation import cancelling
+from smartshoe.diagnosis._verdict import known_error, verdict_of
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel

@@ -1,0 +1,167 @@
+"""From a name to a cause: parameters in units, what its removal costs on held-out data, evidence in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain
+from smartshoe.diagnosis._inference import Inference
+from smartshoe.diagnosis._naming import Name, confidence_of
+from smartshoe.diagnosis._parameters import in_unit, parameters_of
+from smartshoe.diagnosis._result import Cause, Rival, Statement
+from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._zero import Zero
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.signals.noise import NORMAL_95
+
+
+def cause_of(
+    name: Name,
+    found: Inference,
+    fine: Sequence[Session],
+    best: Errors,
+    scale: Scale,
+    excitation: Excitation,
+    thresholds: Thresholds,
+) -> Cause:
+    """The cause of a ``name`` in what was ``found``; ``best``: held-out errors of the extended model, in ``fine``."""
+    member = name.member
+    won = gain(errors(fine, member.without.model), best, scale, thresholds)
+    rivals = _rivals_of(name)
+    evidence = (
+        _without_it(name),
+        *_held_out_evidence(member.size, won, thresholds.material),
+        *_against(rivals),
+        *_how_sure(name, found, thresholds),
+        *_missed_by_its_law(name, thresholds),
+        *_not_shown(name, excitation),
+    )
+    by = None if name.by is None else name.by.fit
+    values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
+    sure = confidence_of(name, thresholds), name.law
+    return Cause(name.effect, *sure, name.equivalents, values, evidence, won, member.size, rivals, member.name)
+
+
+def _rivals_of(name: Name) -> tuple[Rival, ...]:
+    """The nearest first. Laws are weighed against the one named, no best fit where a block stands for it."""
+    member, own = name.member, name.by.margin if name.by is not None else 0.0
+    near = {a.effect: a.margin for a in member.alternatives} | {a.effect: a.margin - own for a in member.laws}
+    return tuple(
+        Rival(effect, margin)
+        for effect, margin in sorted(near.items(), key=lambda one: one[1])
+        if effect not in (None, name.effect.name)
+    )
+
+
+def _without_it(name: Name) -> Statement:
+    nothing = next((a.margin for a in name.member.alternatives if a.effect is None), 0.0)
+    return Statement(
+        "fall of -2 log evidence",
+        nothing,
+        0.0,
+        f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log, also where the"
+        " others may depart towards any law of their kinds",
+    )
+
+
+def _against(rivals: Sequence[Rival]) -> list[Statement]:
+    if not rivals:
+        return []
+    nearest = rivals[0]
+    says = f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:,.0f}"
+    return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
+
+
+def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Statement]:
+    """Why it is named though it is not sure, or though no law of its kind follows it."""
+    if not name.is_sure:
+        does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
+        why = (
+            "by itself it foresees best what is left out"
+            if does_most_alone
+            else "it is named for its size, which is more than all that is left, or than small imperfections add up to"
+        )
+        says = f"it is not sure, since others may do what it does: {why}"
+        return [Statement("confidence of its kind", name.kind, thresholds.least_confidence, says)]
+    if name.kind_only:
+        is_certain = name.kind >= thresholds.least_confidence
+        says = (
+            "the kind is sure, the law is not: no equation of it follows better than others"
+            if is_certain
+            else "no equation of its kind follows it: it may be of a kind that the catalogue does not have"
+        )
+        return [Statement("kind", float(is_certain), 1.0, says)]
+    return []
+
+
+def _missed_by_its_law(name: Name, thresholds: Thresholds) -> list[Statement]:
+    """How much a law misses of the block that it names."""
+    if name.by is None:
+        return []
+    missed = 100 * max(name.by.margin, 0.0) / max(name.member.fall, 1.0)  # of -2 log likelihood
+    return [
+        Statement(
+            "share of its kind that the law misses in percent",
+            missed,
+            100 * thresholds.departure**2,
+            f"the law misses {missed:.2g} % of what {name.member.name.replace('_', ' ')} explains, no more than"
+            " laws do: that stays in the extended model, the parameters are the law's in its place",
+        )
+    ]
+
+
+def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
+    """What the data lacks of that which shows such an effect best."""
+    lacking = name.effect.exposed_by - excitation.present
+    if not lacking:
+        return []
+    said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
+    return [Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")]
+
+
+def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:
+    moves = Statement(
+        "size in percent of full scale",
+        100 * size,
+        100 * material,
+        f"it moves the reading by {100 * size:.3g} % of full scale",
+    )
+    if math.isnan(won.gain_percent):
+        return [moves]
+    way = "falls" if won.rmse_after <= won.rmse_before else "rises"
+    return [
+        moves,
+        Statement(
+            "gain on held-out data in percent",
+            won.gain_percent,
+            0.0,
+            f"on data not fitted the error {way} from {won.rmse_before:.4g} to {won.rmse_after:.4g} {won.unit}",
+        ),
+    ]
+
+
+def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds) -> Cause:
+    """An offset or tare: removed, every reading is off by it."""
+    worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
+    won = gain(worse, best, scale, thresholds)
+    parameter = zero.effect.parameters[0]
+    factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
+    interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd
+    values = {parameter.name: in_unit(zero.value, zero.sd, interval, factor, unit)}
+    deviations = abs(zero.value) / zero.sd
+    seen = Statement(
+        "deviations from nothing",
+        deviations,
+        largest_of_noise(1, thresholds),
+        f"it is {deviations:.3g} standard deviations from nothing",
+    )
+    sure = (
+        thresholds.least_confidence
+        if zero.alternatives
+        else 1.0 - thresholds.false_name,  # by its model alone, or seen
+        1.0 / (1.0 + len(zero.alternatives)),
+    )
+    evidence = (seen, *_held_out_evidence(zero.size, won, thresholds.material))
+    return Cause(zero.effect, *sure, zero.alternatives, values, evidence, won, zero.size)

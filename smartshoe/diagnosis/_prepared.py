@@ -1,0 +1,67 @@
+"""Recordings made ready for a diagnosis: on the load's clock, in shares of full scale, with a model to begin from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from smartshoe.arrays import Array
+from smartshoe.diagnosis._aligned import aligned, as_they_follow
+from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
+from smartshoe.diagnosis._characteristic import conductance_of, friction_of
+from smartshoe.diagnosis._excitation import Excitation, excitation_of
+from smartshoe.diagnosis._ranges import ranges_of
+from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.integrity import Integrity
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import Effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """``sessions``, thinned for fits, and ``fine``, at full rate; ``start``: the model that fits begin from.
+
+    ``limits``: what is said of the data before any fit. ``is_no_unit``: the reading follows something else than a
+    unit's load. ``clocks``: effects, with their values, that put reading and load on one clock; ``is_moved``: readings
+    that are fitted were moved there before, each by itself.
+    """
+
+    sessions: list[Session]
+    fine: list[Session]
+    scale: Scale
+    limits: list[str]
+    start: ExtendedModel
+    excitation: Excitation
+    is_no_unit: bool
+    clocks: Sequence[tuple[Effect, Array]]
+    is_moved: bool
+
+
+def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> Prepared:
+    """Of ``recordings``, of which the first ``count`` are fitted; the others judge."""
+    clocks = aligned(recordings, integrity)
+    held_out = [place >= count for place in clocks.places]
+    count = held_out.count(False)
+    scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
+    held = held_out if any(held_out) else None
+    factor = thinning(clocks.recordings[:count], scale, thresholds)
+    sessions = [
+        replace(one, index=clocks.places[one.index])
+        for one in prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
+    ]
+    start = baseline_of(sessions, scale)
+    if clocks.parts:  # against a load of another clock no relaxation is found
+        start = with_usual_arm(start)
+    for added, values in clocks.parts:
+        start = start.with_part(added, values)
+    excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
+    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
+    friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
+    said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
+    limits = [*clocks.says, *ranges.says, *(said for said in said_of_curve if said is not None), *excitation.limits()]
+    fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
+    is_no_unit = ranges.is_trap or all(said is not None for said in friction)
+    is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
+    return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved)

@@ -1,0 +1,94 @@
+"""Which of the effects that were found are causes, and why the others are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from smartshoe.diagnosis._inference import Inference
+from smartshoe.diagnosis._limits import (
+    crept_of,
+    departure_of,
+    few_cycles_of,
+    moved_of,
+    not_shown_of,
+    other_kind_of,
+    parted_clocks,
+    past_of,
+)
+from smartshoe.diagnosis._naming import Name, names_of
+from smartshoe.diagnosis._prepared import Prepared
+from smartshoe.diagnosis._session import load_cycles
+from smartshoe.diagnosis._zero import Zero, creeping
+from smartshoe.integrity.thresholds import Thresholds
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """``names`` and ``zeros`` that are causes; ``limits``: what is said of those that fit and are none.
+
+    ``nameless``: how far the largest that is of no kind with a name moves the reading, rms, a share of full scale.
+    """
+
+    names: tuple[Name, ...]
+    zeros: tuple[Zero, ...] = ()
+    limits: tuple[str, ...] = ()
+    nameless: float = 0.0
+
+    def without(self, why: Callable[[Name], str | None]) -> Named:
+        """Without the names for which there is a reason why they are none, which is said."""
+        reasons = [why(one) for one in self.names]
+        kept = tuple(one for one, said in zip(self.names, reasons, strict=True) if said is None)
+        return replace(self, names=kept, limits=(*self.limits, *(said for said in reasons if said is not None)))
+
+
+def causes_among(
+    found: Inference,
+    given: Prepared,
+    zeros: Sequence[Zero],
+    left: float,
+    thresholds: Thresholds,
+    *,
+    is_followed: bool,
+) -> Named:
+    """Of what was ``found``, and of ``zeros`` that were seen; ``left``: rms of the structure that no effect explains.
+
+    ``is_followed``: all effects together leave as little of what was fitted as laws do.
+    """
+    model, members = found.fit.model, [one for one in found.members if one.name not in found.undone]
+    likely = names_of(
+        members,
+        left,
+        thresholds,
+        is_followed=is_followed,
+        is_clocked=given.excitation.goes_with_the_clock,
+        is_unsteady=bool(found.zero_changes),
+        alone=found.alone,
+    )
+    seen = Named(likely).without(
+        lambda one: other_kind_of(one, model, thresholds) or not_shown_of(one, given.excitation)
+    )
+    nameless = max((one.member.size for one in likely if one not in seen.names), default=0.0)
+    seen = seen.without(lambda one: moved_of(one) if given.is_moved and one.effect.is_latency else None)
+    rivals = seen.names
+    seen = seen.without(lambda one: departure_of(one, rivals, thresholds))
+    cycles = load_cycles(given.sessions, thresholds)
+    surest = sorted(seen.names, key=lambda one: -one.kind)[:cycles]
+    seen = seen.without(lambda one: None if one in surest else few_cycles_of(one, cycles))
+    parted = parted_clocks(given.clocks, model, given.sessions, thresholds)
+    clocks = [] if parted is None else [effect for effect, _ in given.clocks]
+    names = tuple(one for one in seen.names if one.effect not in clocks)
+    before = () if parted is None else (parted,)
+    past = tuple(past_of(one, given.scale) for one in zeros if one.is_past)
+    # A zero that jumps within recordings is no offset.
+    kept = tuple(
+        one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
+    )
+    seen = Named(names, kept, (*before, *seen.limits, *past), nameless)
+    return seen.without(lambda one: _crept(one, kept, thresholds))
+
+
+def _crept(name: Name, zeros: Sequence[Zero], thresholds: Thresholds) -> str | None:
+    """Why a drift of the zero may be how a tare among ``zeros`` creeps."""
+    tare = creeping(zeros, name.effect, name.member.size, thresholds)
+    return None if tare is None else crept_of(name, tare)
