@@ -143,6 +143,18 @@ def _channel_of(recording: Recording, column: str, unit: str) -> Channel:
     return replace(channel, unit=said)
 
 
+def warn_of_a_past(recordings: Sequence[Recording], calibration: Calibration) -> None:
+    """A warning on stderr for each recording that carries on from another, where the calibration has effects."""
+    for recording in recordings:
+        earlier = recording.metadata.get("continues")
+        if earlier is not None and calibration.extended is not None:
+            click.echo(
+                f"warning: {recording.label} continues {earlier}: the filter begins as after a rest, without what"
+                " drift, set, softening and leak had done by then (join the two files to carry it over)",
+                err=True,
+            )
+
+
 def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibration) -> None:
     """A warning on stderr for each recording that says it is of another unit, or whose load passes what was seen."""
     for recording in recordings:

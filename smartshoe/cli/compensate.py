@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli._inputs import column_options, read_all, warn_of_another_unit, warn_of_forces_beyond
+from smartshoe.cli._inputs import column_options, read_all, warn_of_a_past, warn_of_another_unit, warn_of_forces_beyond
 
 
 @click.command(
@@ -35,6 +35,7 @@ def command(
         calibration = Calibration.load(calibration_path)
         (recording,) = read_all([file], time=time, force=force, sensors=sensors, unit=unit)
         warn_of_another_unit([recording], calibration)
+        warn_of_a_past([recording], calibration)
         step("filtering")
         result = compensated(recording, calibration)
         if out_path is not None:

@@ -71,7 +71,7 @@ def command(
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
     from smartshoe.cli._output import emit_json, note, progress
-    from smartshoe.errors import NotIdentifiableError, UsageError
+    from smartshoe.errors import NotIdentifiableError, SmartShoeError, UsageError
     from smartshoe.files.atomic import make_folder
 
     if design_path is not None:
@@ -91,14 +91,22 @@ def command(
 
         recordings = read_all(files, unit=unit, **columns)
         others = read_all(held_out, unit=unit, **columns) if held_out else []
-        folder = make_folder(out_folder) if out_folder is not None else None
+        folder = None if out_folder is None else Path(out_folder)
+        is_new = folder is not None and not folder.exists()
+        if folder is not None:
+            make_folder(folder)
         step("examining the data")
-        found = diagnose(
-            recordings,
-            hold_out=others,
-            material=material / 100.0,
-            progress=with_what_is_left(step, folder is not None),
-        )
+        try:
+            found = diagnose(
+                recordings,
+                hold_out=others,
+                material=material / 100.0,
+                progress=with_what_is_left(step, folder is not None),
+            )
+        except SmartShoeError:
+            if folder is not None and is_new:
+                folder.rmdir()  # nothing is left behind of what was not done
+            raise
         title = _title(recordings, unit)
         fitted, judges = _used(found, recordings, others)
         written: dict[str, Path] = {}
@@ -106,7 +114,9 @@ def command(
             step("writing the report")
             from smartshoe.report.diagnosis.folder import publish_diagnosis
 
-            written = publish_diagnosis(folder, found, title, _facts(fitted, judges), figures)
+            written = publish_diagnosis(
+                folder, found, title, _facts(fitted, judges, is_refused=found.verdict == "refused"), figures
+            )
     refused = found.verdict == "refused"
     if calibration_path is not None and not refused:
         _save_calibration(calibration_path, found, fitted, unit)
@@ -199,9 +209,11 @@ def _used(
     return kept[:count], kept[count:]
 
 
-def _facts(recordings: list[Recording], others: list[Recording]) -> dict[str, str]:
+def _facts(recordings: list[Recording], others: list[Recording], *, is_refused: bool) -> dict[str, str]:
     from smartshoe.version import __version__
 
+    if is_refused:
+        return {"given": ", ".join(one.name for one in (*recordings, *others)), "smartshoe": __version__}
     facts = {"fitted": ", ".join(recording.name for recording in recordings)}
     facts["judged on"] = ", ".join(recording.name for recording in others) or "every third load cycle, not fitted"
     return {**facts, "smartshoe": __version__}

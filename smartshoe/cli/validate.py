@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from smartshoe.cli._inputs import column_options, read_all, warn_of_another_unit
+from smartshoe.cli._inputs import column_options, read_all, warn_of_a_past, warn_of_another_unit
 
 
 @click.command(
@@ -36,6 +36,7 @@ def command(
         calibration = Calibration.load(calibration_path)
         recordings = read_all(files, time=time, force=force, sensors=sensors, unit=unit)
         warn_of_another_unit(recordings, calibration)
+        warn_of_a_past(recordings, calibration)
         step("judging")
         result = validate(recordings, calibration).to_dict()
     if not emit_json(result, json_path):

@@ -60,8 +60,8 @@ def with_usual_arm(model: ExtendedModel) -> ExtendedModel:
 
 def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float:
     """1 + k1 x0^2/(nRT) where an effective area is declared, from the static gain; else what units usually have."""
-    recording = sessions[0].recording
-    if "effective_area_m2" not in recording.metadata or scale.unit.quantity != "pressure":
+    recording = next((one.recording for one in sessions if "effective_area_m2" in one.recording.metadata), None)
+    if recording is None or scale.unit.quantity != "pressure":
         return USUAL_WALL_RATIO
     area_m2 = recording.positive("effective_area_m2", "m2")
     pascal_per_newton = gain * float(scale.unit.to_si(np.array([scale.reading]))[0]) / scale.load_n

@@ -8,12 +8,15 @@ from collections.abc import Sequence
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain
 from smartshoe.diagnosis._inference import Inference
+from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import Name, confidence_of
 from smartshoe.diagnosis._parameters import in_unit, parameters_of
 from smartshoe.diagnosis._result import Cause, Rival, Statement
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.models.effects import catalogue
+from smartshoe.models.effects.exposure import SAYS
 from smartshoe.signals.noise import NORMAL_95
 
 
@@ -28,6 +31,7 @@ def cause_of(
 ) -> Cause:
     """The cause of a ``name`` in what was ``found``; ``best``: held-out errors of the extended model, in ``fine``."""
     member = name.member
+    law = name.by or next((a for a in member.laws if a.effect == name.effect.name), None)
     won = gain(errors(fine, member.without.model), best, scale, thresholds)
     rivals = _rivals_of(name)
     evidence = (
@@ -35,10 +39,10 @@ def cause_of(
         *_held_out_evidence(member.size, won, thresholds.material),
         *_against(rivals),
         *_how_sure(name, found, thresholds),
-        *_missed_by_its_law(name, thresholds),
+        *_missed_by(law, name, thresholds),
         *_not_shown(name, excitation),
     )
-    by = None if name.by is None else name.by.fit
+    by = None if law is None else law.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
     sure = confidence_of(name, thresholds), name.law
     return Cause(name.effect, *sure, name.equivalents, values, evidence, won, member.size, rivals, member.name)
@@ -47,12 +51,10 @@ def cause_of(
 def _rivals_of(name: Name) -> tuple[Rival, ...]:
     """The nearest first. Laws are weighed against the one named, no best fit where a block stands for it."""
     member, own = name.member, name.by.margin if name.by is not None else 0.0
-    near = {a.effect: a.margin for a in member.alternatives} | {a.effect: a.margin - own for a in member.laws}
-    return tuple(
-        Rival(effect, margin)
-        for effect, margin in sorted(near.items(), key=lambda one: one[1])
-        if effect not in (None, name.effect.name)
-    )
+    near = {a.effect: Rival(a.effect, a.margin, "evidence") for a in member.alternatives if a.effect is not None}
+    near |= {a.effect: Rival(a.effect, a.margin - own, "fit") for a in member.laws if a.effect is not None}
+    near.pop(name.effect.name, None)
+    return tuple(one for one in sorted(near.values(), key=lambda one: one.margin) if one.effect in catalogue())
 
 
 def _without_it(name: Name) -> Statement:
@@ -61,8 +63,8 @@ def _without_it(name: Name) -> Statement:
         "fall of -2 log evidence",
         nothing,
         0.0,
-        f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log, also where the"
-        " others may depart towards any law of their kinds",
+        f"without it, all else fitted anew, the data is less likely by {nothing:,.0f} of -2 log evidence, though the"
+        " other effects may bend to make up for it",
     )
 
 
@@ -70,7 +72,8 @@ def _against(rivals: Sequence[Rival]) -> list[Statement]:
     if not rivals:
         return []
     nearest = rivals[0]
-    says = f"{nearest.effect.replace('_', ' ')} in its place is worse by {nearest.margin:,.0f}"
+    how = f"less likely by {nearest.margin:,.0f}" if nearest.margin > 0.0 else "as likely"
+    says = f"{nearest.effect.replace('_', ' ')}, the nearest other, is {how} ({nearest.by})"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 
@@ -79,37 +82,35 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
     if not name.is_sure:
         does_most_alone = found.alone is not None and found.alone.kind == name.effect.kind
         why = (
-            "by itself it foresees best what is left out"
+            "by itself it predicts best what is left out"
             if does_most_alone
-            else "it is named for its size, which is more than all that is left, or than small imperfections add up to"
+            else "it is larger than all that is left, or than what small imperfections add up to"
         )
-        says = f"it is not sure, since others may do what it does: {why}"
+        says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
         return [Statement("confidence of its kind", name.kind, thresholds.least_confidence, says)]
     if name.kind_only:
         is_certain = name.kind >= thresholds.least_confidence
         says = (
-            "the kind is sure, the law is not: no equation of it follows better than others"
+            "the kind is sure, the law is not: no equation of it fits better than others"
             if is_certain
-            else "no equation of its kind follows it: it may be of a kind that the catalogue does not have"
+            else "no equation of its kind fits: it may be of a kind that the catalogue does not have"
         )
         return [Statement("kind", float(is_certain), 1.0, says)]
     return []
 
 
-def _missed_by_its_law(name: Name, thresholds: Thresholds) -> list[Statement]:
+def _missed_by(law: Alternative | None, name: Name, thresholds: Thresholds) -> list[Statement]:
     """How much a law misses of the block that it names."""
-    if name.by is None:
+    if law is None:
         return []
-    missed = 100 * max(name.by.margin, 0.0) / max(name.member.fall, 1.0)  # of -2 log likelihood
-    return [
-        Statement(
-            "share of its kind that the law misses in percent",
-            missed,
-            100 * thresholds.departure**2,
-            f"the law misses {missed:.2g} % of what {name.member.name.replace('_', ' ')} explains, no more than"
-            " laws do: that stays in the extended model, the parameters are the law's in its place",
-        )
-    ]
+    missed = 100 * max(law.margin, 0.0) / max(name.member.fall, 1.0)  # of -2 log likelihood
+    most = 100 * thresholds.departure**2
+    much = "no more" if missed <= most else "more"
+    says = (
+        f"its equation misses {missed:.2g} % of the effect, {much} than equations do: the extended model keeps that"
+        " as a free form, the parameters are the equation's"
+    )
+    return [Statement("share of its kind that the law misses in percent", missed, most, says)]
 
 
 def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
@@ -117,8 +118,9 @@ def _not_shown(name: Name, excitation: Excitation) -> list[Statement]:
     lacking = name.effect.exposed_by - excitation.present
     if not lacking:
         return []
-    said = ", no ".join(sorted(word.replace("_", " ") for word in lacking))
-    return [Statement("what would show it best is missing", float(len(lacking)), 0.0, f"the data holds no {said}")]
+    said = "; ".join(sorted(SAYS[word] for word in lacking))
+    says = f"what would show it best is missing: {said}"
+    return [Statement("what would show it best is missing", float(len(lacking)), 0.0, says)]
 
 
 def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statement]:

@@ -5,7 +5,7 @@ With the reading's residual y, in standard deviations of what counts as noise, a
     y = X0 b + sum over all candidates x_j s_j + sum over e in S ( x_e a_e + Phi_e w_e ) + noise
 
 * b ~ N(0, 1), the baseline's own changes: anything up to full scale, which is flat;
-* s_j ~ N(0, material^2): what is immaterial may always be there, of any kind, and needs no name;
+* s_j ~ N(0, imperfection^2): what is immaterial may always be there, of any kind, and needs no name;
 * a_e ~ N(0, strength_sd^2): the effects in S (spike and slab: George and McCulloch 1993);
 * w_e ~ N(0, (departure a_e)^2 / columns): the error of e's equation, in proportion to the effect's own size, in the
   directions in which equations of its kind depart (Kennedy and O'Hagan 2001).
@@ -33,7 +33,7 @@ from functools import cached_property
 from itertools import combinations, cycle
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from smartshoe.arrays import Array, Index
@@ -117,7 +117,7 @@ class Evidence:
         count = sum(int(s.fitted.sum()) for s in given.sessions)
         self.raw = visible / count
         # What is there without any effect: the baseline's own changes, and what is immaterial.
-        self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.material)
+        self._sds = np.full(self.gram.shape[0] - 1, self.thresholds.imperfection)
         self._sds[: given.own] = 1.0
         for one in given.candidates:
             if one.effect.why_unnamed:  # what no law does is no small imperfection of a good unit
@@ -399,14 +399,17 @@ class Evidence:
 
 
 def _factor(matrix: Array) -> Array:
-    """The lower Cholesky factor; where rounding has made it indefinite, with a billionth more on the diagonal.
+    """The lower Cholesky factor; where rounding made it indefinite, with as little more on the diagonal as it needs.
 
-    By LAPACK itself: it is asked for thousands of times, of a few dozen rows.
+    By LAPACK itself: it is asked for thousands of times, of a few dozen rows. Rounding is a share of the largest
+    element, where hardly any noise is left of that much signal.
     """
     if not matrix.size:
         return matrix
     factor, failed = dpotrf(matrix, lower=1)
-    if failed:
-        matrix[np.diag_indices_from(matrix)] *= 1.0 + 1e-9
-        factor = cholesky(matrix, lower=True, check_finite=False)
+    more = 1e-15 * float(np.max(np.diag(matrix)))
+    while failed and math.isfinite(more):
+        more *= 10.0
+        matrix.flat[:: matrix.shape[0] + 1] += more
+        factor, failed = dpotrf(matrix, lower=1)
     return np.asarray(factor)

@@ -70,8 +70,8 @@ class Excitation:
             )
         if "holds" not in self.present:
             said.append(
-                f"no hold longer than {self.thresholds.hold_s:g} s under load: little can be said of a leak, and"
-                " nothing of slow creep"
+                f"no hold longer than {self.thresholds.hold_s:g} s under load: the law of a leak is unsure, and slow"
+                " creep is not seen"
             )
         if "rests" not in self.present:
             said.append(
@@ -79,13 +79,13 @@ class Excitation:
             )
         if self.goes_with_the_clock:
             said.append(
-                "peak loads grow, or fall, with the clock, so that a drift, a leak or a set may do what the curve of"
-                " reading against load does, and each what the others do (shuffle the loads)"
+                "peak loads grow, or fall, with time, so that a drift, a leak or a set can look like a curve of reading"
+                " against load, and like one another (shuffle the loads)"
             )
         if "repeats" not in self.present:
-            said.append("no load cycle is repeated: what repeats cannot be told from noise without a model")
+            said.append("no load cycle is repeated: how loud the noise is cannot be told from repeats")
         if len(self.peaks) <= 1 and len(self.rates_per_s) >= 1:
-            said.append("one peak load only: the curve of reading against load and softening are seen along one path")
+            said.append("one peak load only: a curve of reading against load and a softening cannot be told apart well")
         return said
 
 

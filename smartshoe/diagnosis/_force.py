@@ -43,17 +43,23 @@ def force_of(plain: ForceError, extended: ForceError, thresholds: Thresholds) ->
     """What is said of an extended model that gives the load back worse than the plain one does."""
     if not undoes(extended, plain):
         return (
-            "the extended model follows the reading but does not tell the load: run backwards it makes more of what is"
-            f" left, and its force of what was fitted is off by {extended.fitted_n:.3g} N, the plain model's by"
-            f" {plain.fitted_n:.3g} N; the calibration compensates by the plain model, its twin has the effects"
+            "the extended model fits the reading but gives a worse force: on what was fitted it is off by"
+            f" {extended.fitted_n:.3g} N, the baseline by {plain.fitted_n:.3g} N; so the calibration compensates by the"
+            " baseline, and its twin simulates with the effects"
         )
     if extended.held_out_n > (1.0 + thresholds.standing) * plain.held_out_n:
         return (
-            "the force that the extended model gives back is worse than the plain one's"
-            f" ({plain.held_out_n:.3g} to {extended.held_out_n:.3g} N on what was held out), since to undo its effects"
-            " makes more of what is left: compensate by the plain model"
+            "the force that the extended model gives back is worse than the baseline's on held-out data"
+            f" ({plain.held_out_n:.3g} to {extended.held_out_n:.3g} N), since undoing its effects amplifies what is"
+            " left: compensate by the baseline"
         )
     return None
+
+
+def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
+    """What is said of effects that no compensator can take off a stream of readings."""
+    passed_over = ExtendedCompensator(model, 1.0 / step_s).not_inverted
+    return [f"no compensator takes off the {name.replace('_', ' ')}, since {why}" for name, why in passed_over.items()]
 
 
 def _off_n(session: Session, model: ExtendedModel) -> Array:

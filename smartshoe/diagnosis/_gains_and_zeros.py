@@ -264,7 +264,8 @@ def _own_of_each(sessions: Sequence[Session], model: ExtendedModel) -> Iterator[
     """Each fitted recording with its own gains (k,) and the changes of its zero (l,)."""
     for one in _fitted(sessions):
         own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
-        gains, steps = np.split(own[2:], [len(one.gain_parts)])
+        first, last = 2 + len(one.gain_parts), 2 + len(one.gain_parts) + len(one.zero_changes)
+        gains, steps = own[2:first], own[first:last]
         yield one, gains, steps
 
 

@@ -46,7 +46,7 @@ from smartshoe.diagnosis._settling import (
     simpler,
 )
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
-from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating
+from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect, Effect
 from smartshoe.models.extended import ExtendedModel
@@ -88,7 +88,8 @@ def infer(
     plain = least_squares(start, sessions, thresholds)
     given, evidence, best = searched(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
-    can_validate = independent(sessions, thresholds) > 1  # within one, nothing validates anything
+    # Within one, nothing validates anything.
+    can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, likeness, (), can_validate)
@@ -118,14 +119,14 @@ def infer(
         other = _judged(with_blocks, plain, sessions)
         if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
-    members = found.members()
+    found, members = _without_redundant(found, plain, sessions)
     while laws := likelier_laws(members, state.banned):
         state = with_likelier_laws(state, found.fit.model, laws, sessions)
         other = _judged(state, plain, sessions)
         odds = state.evidence.odds
         if score_of(other.fit.model, other.likelihood, odds) >= score_of(found.fit.model, other.likelihood, odds):
             break  # a law that follows better in its place led to a set that does not
-        found, members = other, other.members()
+        found, members = _without_redundant(other, plain, sessions)
     if found.is_stepped_down:
         first = _first_step(begun, state, sessions)
         again = None if first is None else _judged(first, plain, sessions)
@@ -240,6 +241,33 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = len(extra) < following
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)
+
+
+def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) -> tuple[_Judged, tuple[Member, ...]]:
+    """``found`` without effects that another of their family makes immaterial, and its members, weighed.
+
+    A lag and a delay beside it, of which neither is needed where the other is, are each too small for a name.
+    """
+    members = found.members()
+    while (less := _redundant(members, plain, found.evidence.thresholds)) is not None:
+        refitted = fit(found.likelihood, less.without.model)
+        evidence, best = evidence_about(refitted.model, sessions, found.evidence)
+        found = replace(found, fit=refitted, evidence=evidence, best=best)
+        members = found.members()
+    return found, members
+
+
+def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) -> Member | None:
+    """The smallest effect, where it is immaterial beside another of its family, and none that was there before."""
+    families = [one.effect.kind for one in members]
+    twice = [
+        one
+        for one in members
+        if one.size < thresholds.imperfection
+        and families.count(one.effect.kind) > 1
+        and one.name not in plain.model.names
+    ]
+    return min(twice, key=lambda one: one.size, default=None)
 
 
 def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> State | None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
+from smartshoe.diagnosis._baseline import RATE
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._held_out import Gain
@@ -15,12 +17,14 @@ from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import listed
+from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
+STIFFEST_WALL_RATIO = 1.78  # of the paper's four units (Table 1)
 SAID = 4  # changes of a gain, or a zero, that are said one by one
 
 
@@ -57,13 +61,13 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
         parameter, value = part.kind_ends_at[0]
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         return (
-            f"what follows best as {told} has its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it"
-            " turns into an effect of another kind, so that it is not named"
+            f"{told} fits best with its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it turns into an"
+            " effect of another kind, so that it is not named"
         )
     if is_stretched(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
         return (
-            f"beside {told} the wall's own relaxation has come to the end of its range, where no wall's is: either may"
-            " be the other's, or undo it, so that it is not named"
+            f"{told} fits, but only with the wall's relaxation at the end of its range, where no wall's is: one"
+            " may imitate the other, or undo it, so that it is not named"
         )
     return None
 
@@ -75,10 +79,10 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
     """
     if excitation.shows(name.effect):
         return None
-    ways = " or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
+    ways = "; or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
     return (
-        f"{name.effect.name.replace('_', ' ')} fits, but recordings of one load cycle show it only with {ways}, so that"
-        " it is not named"
+        f"{name.effect.name.replace('_', ' ')} fits, but recordings of one load cycle cannot show it, so that it is"
+        f" not named; it needs {ways}"
     )
 
 
@@ -93,8 +97,8 @@ def moved_of(name: Name) -> str:
 def few_cycles_of(name: Name, cycles: int) -> str:
     """What is said of an effect beside as many surer ones as there are load cycles to tell them by."""
     return (
-        f"{name.effect.name.replace('_', ' ')} fits, but {cycles} load cycles show no more than {cycles} causes, so"
-        " that it is not named (repeat the cycles)"
+        f"{name.effect.name.replace('_', ' ')} fits, but so few load cycles ({cycles}) show no more than as many"
+        " causes, so that it is not named (repeat the cycles)"
     )
 
 
@@ -109,17 +113,41 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
         return None
     said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
     return (
-        f"{said} fits beside {other}, but both are {name.effect.mechanism}, of which no law is exact: it may be how the"
-        " other's law departs, so that it is not named"
+        f"{said} fits, but it may be no more than the error of the equation of {other} (both are"
+        f" {name.effect.mechanism}), so that it is not named"
+    )
+
+
+def end_of_range_of(plain: ExtendedModel, extended: ExtendedModel) -> str | None:
+    """What is said of a unit that relaxes more slowly, or faster, than the baseline can follow."""
+    slow, fast = plain.relaxation_rate_per_s <= RATE.lower, extended.relaxation_rate_per_s >= RATE.upper
+    if not (slow or fast):
+        return None
+    return (
+        f"the baseline's relaxation has come to the end of its range, {1.0 / (RATE.lower if slow else RATE.upper):g} s:"
+        f" a unit that relaxes {'more slowly' if slow else 'faster'} is beyond it, and what is named may be that"
+    )
+
+
+def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
+    """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
+    known = any("effective_area_m2" in one.recording.metadata for one in sessions)
+    stiffer = replace(model, wall_ratio=STIFFEST_WALL_RATIO)
+    if known or apart(sessions, model, stiffer) <= thresholds.material:
+        return None
+    return (
+        f"how stiff the wall is beside the gas is not known (N = {model.wall_ratio:g} is taken, units of the paper have"
+        f" 1.51 to {STIFFEST_WALL_RATIO:g}): rates of leaks and times of heat go with it, beyond their intervals"
+        " (declare effective_area_m2)"
     )
 
 
 def worse_of(won: Gain, beyond: str | None) -> str:
     """What is said of an extension whose gain `is_loss`; ``beyond``: how the loads there go beyond the fitted ones."""
     low, high = won.ci95
-    why = beyond or "its loads are as those that were fitted, so that what is wrong is the session's or the model's"
+    why = beyond or "the held-out loads are like the fitted ones, so that the session or the model is wrong"
     return (
-        f"on what was held out the extended model is worse than the plain one ({won.rmse_before:.3g} to"
+        f"on held-out data the extended model is worse than the baseline ({won.rmse_before:.3g} to"
         f" {won.rmse_after:.3g} {won.unit}, by {-high:.2g} to {-low:.2g} %): {why}; do not correct such recordings by"
         " it before one of them is among those that are fitted"
     )
@@ -127,8 +155,8 @@ def worse_of(won: Gain, beyond: str | None) -> str:
 
 def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
     """What is said where recordings that were not fitted are ``off`` by far more than those that were."""
-    why = beyond or "its loads are as those that were fitted, so that it is of another unit, or the unit was changed"
-    return f"what is held out is off by {100 * off:.2g} % of full scale, what was fitted by {100 * within:.2g} %: {why}"
+    why = beyond or "their loads are like the fitted ones: another unit, or a unit that was changed?"
+    return f"held-out recordings are off by {100 * off:.2g} % of full scale, fitted ones by {100 * within:.2g} %: {why}"
 
 
 def past_of(zero: Zero, scale: Scale) -> str:
@@ -153,9 +181,9 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
     """What is said of recordings of which each has a gain of its own, or several."""
     if not gains:
         return []
-    told = "what is named is told beside these gains, and no model foresees that of another recording"
+    told = "the causes were found with this allowed for, and no model foresees the gain of another recording"
     if changes := changes_of(gains):
-        return [f"the gain changes {_when(changes)}, as where a unit slips or is set anew: {told}"]
+        return [f"the gain changes {_when(changes)}, as where a unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
     return [
         f"each recording has a gain of its own, from {100 * low.share:+.2g} % in {low.recording} to"
@@ -169,9 +197,10 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
     if not changes:
         return []
     return [
-        f"the zero changes, in shares of full scale, {_when(changes)}, as where a unit slips or water moves in a line:"
-        " other such changes may do what any effect does, so that none is more than half sure, and no model foresees"
-        " those of another recording"
+        f"the zero jumps, in shares of full scale, {_when(changes)}, as where a unit slips, water moves in a line or"
+        " the room warms:"
+        " jumps that are not seen may imitate any effect, so that no cause is more than half sure, and no model"
+        " foresees those of another recording"
     ]
 
 
@@ -188,10 +217,10 @@ def refusals_of(found: Inference) -> list[str]:
         ]
     said = []
     if found.undone:
-        said.append(f"undo one another, so that none of them is named: {listed(found.undone)}")
+        said.append(f"these effects largely cancel one another, so that none is named: {listed(found.undone)}")
     if found.refused:
         said.append(
-            "fitted well but made recordings left out worse, and so were taken out again:"
+            "tried and taken out again, since they predict fitted recordings that are left out in turn worse:"
             f" {listed(dict.fromkeys(found.refused))}"
         )
     return said

@@ -79,7 +79,7 @@ def members_of(
     departures = thresholds.departure * np.array(best.departed) * sizes
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
-        is_material = sizes[k] > thresholds.material
+        is_there = sizes[k] > thresholds.imperfection
         is_ended = bool(extended.model.part(one.name).kind_ends_at)
         made.append(
             Member(
@@ -88,7 +88,7 @@ def members_of(
                 best.departed[k],
                 alternatives(evidence, best, member, refused),
                 less[k],
-                _other_laws(one, less[k], likelihood, extended, thresholds, is_ended=is_ended) if is_material else (),
+                _other_laws(one, less[k], likelihood, extended, thresholds, is_ended=is_ended) if is_there else (),
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),

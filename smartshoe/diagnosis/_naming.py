@@ -150,7 +150,8 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, law
     better than another, which speaks for a law, or a kind, that the catalogue does not have.
     """
     intercept, per_left, per_departed, without_law, per_likeness = thresholds.kind_odds
-    ratio = (math.hypot(left, one.others_depart) + thresholds.material) / (one.size + thresholds.material)
+    left = math.hypot(left, one.others_depart)
+    ratio = (left + thresholds.imperfection) / (one.size + thresholds.imperfection)
     score = intercept + per_left * math.log(ratio) + per_departed * one.departed
     score += without_law * lawless + per_likeness * one.likeness
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)

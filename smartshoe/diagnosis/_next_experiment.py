@@ -15,9 +15,10 @@ from smartshoe.diagnosis._likelihood import Fit, fit
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
+from smartshoe.models.effects.exposure import SAYS, Exposure
 from smartshoe.protocol import Protocol
 
-SHOWN_BY = {
+SHOWN_BY: dict[Exposure, str] = {
     "rates": "rates",
     "holds": "long_hold",
     "rests": "idle",
@@ -73,8 +74,9 @@ def next_experiment(
     names = (cause.name, *cause.equivalents)
     pair = f"{cause.name} and {rival}".replace("_", " ")
     channel = _channel(cause.name, rival, sessions)
-    if expected[best] < -2.0 * math.log(excitation.thresholds.false_name):
-        instead = f"log the {channel} too" if channel else "take either, they predict the same"
+    no_name = -2.0 * math.log(excitation.thresholds.false_name)  # less tells nothing apart
+    if expected[best] < no_name:
+        instead = f"log the {channel} too" if channel else "use either, both predict the same reading"
         says = f"no load history that a machine can run tells {pair} apart: {instead}"
         return NextExperiment(names, None, channel, says, expected[best])
     telling = {
@@ -85,16 +87,18 @@ def next_experiment(
     if not telling:
         instead = f"log the {channel} too" if channel else f"{cause.name.replace('_', ' ')} follows better"
         says = (
-            f"none of the {len(expected)} protocols is expected to tell {pair} apart better than this data does,"
-            f" {best.replace('_', ' ')} by {expected[best]:,.0f} of -2 log likelihood and this data by {margin:,.0f}:"
-            f" {instead}"
+            f"none of the {len(expected)} protocols is expected to tell {pair} apart better than this data already"
+            f" does: {instead}"
         )
         return NextExperiment(names, None, channel, says, expected[best])
     chosen = min(telling, key=lambda name: telling[name].duration_s)
-    says = (
-        f"run {chosen.replace('_', ' ')}: it should tell {pair} apart by {expected[chosen]:,.0f} of -2 log likelihood,"
-        f" where this data does by {max(margin, 0.0):,.0f}"
-    )
+    better = ", which this data does not"
+    if margin > no_name:
+        times = expected[chosen] / margin
+        better = f", {float(f'{times:.2g}'):,g} times as well as this data does"
+        if times < 1.0 + excitation.thresholds.same:
+            better = ", little better than this data does"
+    says = f"run the protocol {chosen.replace('_', ' ')}: it should tell {pair} apart{better}"
     return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
 
 
@@ -131,7 +135,7 @@ def _unseen(found: Inference, causes: Sequence[Cause], excitation: Excitation) -
     names = tuple(cause.name for cause in causes)
     for word, protocol in SHOWN_BY.items():
         if word not in excitation.present:
-            says = f"run {protocol.replace('_', ' ')}: this data holds no {word.replace('_', ' ')}, where kinds differ"
+            says = f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
             return NextExperiment(names, protocol, None, says, None, EXPERIMENTS[protocol](peak_n))
     says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"
     return NextExperiment(names, "repeat", None, says)

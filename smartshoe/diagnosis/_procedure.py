@@ -11,11 +11,19 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
 from smartshoe.diagnosis._characteristic import characteristic_of
-from smartshoe.diagnosis._force import force_error, force_of, undoes
+from smartshoe.diagnosis._force import force_error, force_of, not_undone_of, undoes
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
-from smartshoe.diagnosis._limits import elsewhere_of, own_gains_of, refusals_of, worse_of, zero_changes_said
+from smartshoe.diagnosis._limits import (
+    elsewhere_of,
+    end_of_range_of,
+    own_gains_of,
+    refusals_of,
+    wall_ratio_of,
+    worse_of,
+    zero_changes_said,
+)
 from smartshoe.diagnosis._next_experiment import next_experiment
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import joint_parameters
@@ -26,7 +34,17 @@ from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit, Rival, Trace, 
 from smartshoe.diagnosis._session import Scale, Session, pastless
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
-from smartshoe.diagnosis._verdict import known_error, off_elsewhere, sentence_of, unexplained_of, verdict_of
+from smartshoe.diagnosis._verdict import (
+    known_error,
+    left_where_judged,
+    names_in,
+    not_explained_of,
+    not_shown_to_be_noise,
+    off_elsewhere,
+    sentence_of,
+    unexplained_of,
+    verdict_of,
+)
 from smartshoe.diagnosis._withheld import causes_among
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
 from smartshoe.diagnosis.decay import decay_of
@@ -35,9 +53,12 @@ from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine, twins
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.kernels.blas import on_one_thread
+from smartshoe.models.effects import catalogue
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
+
+NEAREST = 4  # effects that are told where none is named
 
 
 def _silent(_: str) -> None:
@@ -46,7 +67,7 @@ def _silent(_: str) -> None:
 
 def diagnose(
     recordings: RecordingLike | Sequence[RecordingLike],
-    hold_out: RecordingLike | Sequence[RecordingLike] = (),
+    hold_out: RecordingLike | Sequence[RecordingLike] | None = None,
     *,
     material: float | None = None,
     thresholds: Thresholds | None = None,
@@ -71,17 +92,20 @@ def diagnose(
     Raises
     ------
     UsageError
-        Where no recording is given, and of numbers to decide by that are none. A diagnosis that the data cannot
-        support comes back with the verdict "refused" and the reason in ``limits``.
+        Where no recording is given, of recordings of several units, and of numbers to decide by that are none. A
+        diagnosis that the data cannot support comes back with the verdict "refused" and the reason in ``limits``.
     """
-    fitted, kept_out = recordings_of(recordings), recordings_of(hold_out, "hold_out")
+    fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
+    if len(units := sorted({one.unit for one in (*fitted, *kept_out) if one.unit})) > 1:
+        raise UsageError(f"recordings of different units ({', '.join(units)}): diagnose one unit at a time")
     decided = decided_by(thresholds, material)
     everything, count = [*fitted, *kept_out], len(fitted)
     integrity = examine(everything, decided)
+    everything = [*integrity.recordings]
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
-    left_out = dict(zip(useless, integrity.refusals, strict=True))
+    left_out = twins(everything) | dict(zip(useless, integrity.refusals, strict=True))
     pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
     if any(k < count for k in pulled):
         return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
@@ -90,7 +114,7 @@ def diagnose(
         return _refused(everything, integrity, list(left_out.values()), decided)
     usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
     found = _diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
-    return replace(found, limits=(*_without(everything, count, left_out), *twins(everything), *found.limits))
+    return replace(found, limits=(*_without(everything, count, left_out), *found.limits))
 
 
 def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
@@ -110,12 +134,12 @@ def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int,
     names = {recordings[k].name for k in left_out}
     for one in pastless([one for k, one in enumerate(recordings) if k not in left_out]):
         earlier = one.metadata["continues"]
-        said.append(
-            f"{one.label} continues {earlier}, which is left out: it is taken as a session of its own"
-            if earlier in names
-            else f"{one.name} continues {earlier}, which is not among the recordings: it is taken as the unit's first"
-            f" after a rest (give {earlier} too)"
-        )
+        why = f"which is not among the recordings: it is taken as the unit's first after a rest (give {earlier} too)"
+        if earlier in names:
+            why = "which is left out: it is taken as a session of its own"
+        elif earlier == one.name:
+            why = "which is itself: it is taken as the unit's first after a rest (name the recording before it)"
+        said.append(f"{one.label} continues {earlier}, {why}")
     if count < len(recordings) and all(k in left_out for k in range(count, len(recordings))):
         said.append("no recording to judge on is left: load cycles of those that are fitted are held out instead")
     return said
@@ -158,7 +182,8 @@ def _diagnosed(
     after = residual_structure(sessions, residuals, thresholds)
     within = _left_of_what_was_fitted(sessions, residuals, thresholds)
     left = max(within.rms, within.size)
-    zeros = _zeros(found, given, left, thresholds, within.memory)
+    silent = given.is_no_unit or not found.can_validate
+    zeros = [] if silent else _zeros(found, given, left, thresholds, within.memory)
     is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
     named = causes_among(found, given, zeros, left, thresholds, is_followed=is_followed)
     baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
@@ -167,18 +192,21 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
+    unproven = 0.0 if found.can_validate else not_shown_to_be_noise(sessions, residuals, after, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         follows = all(name.is_sure and not name.kind_only for name in named.names)
         known = known_error(integrity.faults, sessions, scale)
-        besides = elsewhere or (named.nameless if named.nameless > thresholds.tolerable else 0.0)
+        besides = max(elsewhere, unproven, named.nameless if named.nameless > thresholds.tolerable else 0.0)
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, named.zeros, sessions, scale)
-    noise_variance = max(best.rmse**2 - max(after.rms, elsewhere) ** 2, 0.0)
+    structure = min(max(after.rms, elsewhere, unproven), left_where_judged(sessions, residuals, thresholds))
+    noise_variance = max(best.rmse**2 - structure**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
+    minor = tuple(part.name for part in extended.parts if part.name not in parts)
     parameters, covariance = joint_parameters(found.fit, scale)
     plain_force, force = (force_error(fine, model) for model in (found.baseline.model, extended))
     by_extended = undoes(force, plain_force)
@@ -186,19 +214,28 @@ def _diagnosed(
     ways = beyond(fine, scale, thresholds) if won.is_loss or elsewhere else None
     return Diagnosis(
         verdict,
-        sentence_of(verdict, causes, baseline, best, rest, thresholds, worse=won.is_loss, elsewhere=elsewhere),
+        sentence_of(
+            verdict,
+            names_in(causes, len(minor)),
+            baseline,
+            best,
+            not_explained_of(rest, elsewhere, unproven, thresholds),
+            thresholds,
+            worse=won.is_loss,
+            withheld=silent or bool(named.limits or found.zero_changes or found.own_gains),
+        ),
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
         causes=tuple(causes),
-        minor=tuple(part.name for part in extended.parts if part.name not in parts),
+        minor=minor,
         data_faults=(*integrity.faults, *noise),
         baseline=_goodness(baseline, plain_force.held_out_n, before, scale),
         extended=_goodness(best, (force if by_extended else plain_force).held_out_n, after, scale),
         gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
-        rivals=causes[0].rivals if causes else tuple(Rival(name, fall) for name, fall in found.screening[:4]),
+        rivals=causes[0].rivals if causes else _nearest(found),
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material), worse=won.is_loss
         ),
@@ -206,8 +243,16 @@ def _diagnosed(
             *given.limits,
             *([worse_of(won, ways)] if won.is_loss else []),
             *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
-            *([told_force] if told_force else []),
+            *([told_force] if told_force else not_undone_of(extended, fine[0].conditions.step_s)),
             *named.limits,
+            *(
+                said
+                for said in (
+                    end_of_range_of(found.baseline.model, extended),
+                    wall_ratio_of(extended, sessions, thresholds),
+                )
+                if said is not None
+            ),
             *own_gains_of(found.own_gains),
             *zero_changes_said(found.zero_changes),
             *refusals_of(found),
@@ -234,12 +279,15 @@ def _left_of_what_was_fitted(
     return residual_structure([one for one, _ in learnt], [left for _, left in learnt], thresholds)
 
 
+def _nearest(found: Inference) -> tuple[Rival, ...]:
+    """The few effects that take most off by themselves; flexible blocks are none."""
+    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:NEAREST])
+
+
 def _zeros(
     found: Inference, given: Prepared, left: float, thresholds: Thresholds, noise: GaussMarkov | None
 ) -> list[Zero]:
     """The offsets and tares that are seen beside what was ``found``, and are material."""
-    if given.is_no_unit or not found.can_validate:
-        return []
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
     zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, thresholds, noise)
     return [one for one in zeros if one.size >= thresholds.material]

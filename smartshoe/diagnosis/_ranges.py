@@ -51,6 +51,7 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
                 else ": what lies below is extrapolated"
             )
         )
+    said += _foreign([(one.recording.name, gain) for one, gain in zip(fitted, within, strict=True)], thresholds)
     between = _between(kept, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
         gain = float(np.median([gain for gain in within if gain is not None]))
@@ -58,10 +59,25 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             trap = trap or is_narrow
             said.append(
                 f"within a file the reading moves by {gain * to_physical:.3g} {unit}/N, between the files by"
-                f" {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, or the"
-                " files are not of one unit"
+                f" {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, the"
+                " load cell was zeroed anew, or the files are not of one unit"
             )
     return Ranges(tuple(said), trap)
+
+
+def _foreign(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) -> list[str]:
+    """What is said of files that read many times what the first one does, or the other way, under the same load."""
+    known = [(name, gain) for name, gain in gains if gain]
+    most = thresholds.clear**2  # twice over what differs for certain
+    if not known:
+        return []
+    first, usual = known[0]
+    far = [(name, gain / usual) for name, gain in known if not 1.0 / most < gain / usual < most]
+    return [
+        f"{name} reads {ratio:.3g} times what {first} does under the same load: is it in another unit, of the other"
+        " sign, or of another sensor?"
+        for name, ratio in far
+    ]
 
 
 def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> str | None:
@@ -86,7 +102,7 @@ def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) ->
         known, asked = (max((of(*one) for one in some), default=0.0) for some in (fitted, judged))
         if asked > (1.0 + thresholds.same) * known:
             said.append(f"{does} {_told(asked * factor)} {unit} ({_told(known * factor)} in what was fitted)")
-    return "its loads " + ", ".join(said) if said else None
+    return "the held-out loads " + " and ".join(said) if said else None
 
 
 def _told(value: float) -> str:

@@ -41,8 +41,8 @@ class ResidualStructure:
 
     @property
     def how(self) -> str:
-        """What the largest part does: it repeats with the load's cycles, or it wanders."""
-        return "repeats" if self.repeating.significant and self.repeating.rms >= self.rms else "wanders"
+        """What the largest part does: it repeats with the load's cycles, or it changes slowly, whatever these do."""
+        return "repeats" if self.repeating.significant and self.repeating.rms >= self.rms else "changes slowly"
 
     @property
     def is_noise(self) -> bool:
@@ -116,7 +116,7 @@ def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: T
     at = int(np.argmax([float(part.mean()) for part in np.array_split(own, parts)]))
     begin_s, duration_s = sessions[worst].recording.time_s[0], sessions[worst].conditions.time_s[-1]
     return (
-        f"{100 * table[d, k] / total:.0f} % of it sits at {25 * k}-{25 * (k + 1)} % of the load {doing}"
-        f" ({100 * share[d, k]:.0f} % of the samples); it is largest in {sessions[worst].recording.name},"
+        f"{100 * table[d, k] / total:.0f} % of the power that is left lies at {25 * k}-{25 * (k + 1)} % of full load"
+        f" {doing} ({100 * share[d, k]:.0f} % of the samples); the worst stretch is {sessions[worst].recording.name},"
         f" {begin_s + at * duration_s / parts:.0f}-{begin_s + (at + 1) * duration_s / parts:.0f} s"
     )

@@ -48,10 +48,15 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another effect that came near: ``margin`` is by how much -2 log likelihood is worse with it."""
+    """Another effect that came near: ``margin`` is by how much less likely it is, in -2 log.
+
+    ``by``: of a law of the same kind in its place, the likelihood of a ``fit``; of another kind, the ``evidence``, in
+    which equations may be inexact. The two are not on one scale.
+    """
 
     effect: str
     margin: float
+    by: Literal["fit", "evidence"] = "evidence"
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,7 +69,8 @@ class Session:
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
     ``quiet`` is the load at the full rate. ``own_gain_sd``: standard deviation, as a share, by which the gain of one
     recording lies beside that of all; 0 where they share one. ``gain_changes``: the samples from which on it is
-    another, in order; ``zero_changes`` those from which on its reading without load is.
+    another, in order; ``zero_changes`` those from which on its reading without load is. ``gap_ends``: the first samples
+    after gaps in which the load is not known for so long that the wall may have crept.
     """
 
     recording: Recording
@@ -85,6 +86,7 @@ class Session:
     own_gain_sd: float = 0.0
     gain_changes: tuple[int, ...] = ()
     zero_changes: tuple[int, ...] = ()
+    gap_ends: tuple[int, ...] = ()
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:
@@ -266,6 +268,7 @@ def _session(
     good = usable & recording.sensor.present & load_present
     reading = bridged(time_s, reading, good)
     load_n = bridged(time_s, load_n, load_present)
+    known = load_present
     extra = {}
     temperature = _named(recording, "temperature")
     if temperature is not None:
@@ -276,7 +279,8 @@ def _session(
     if not recording.is_uniform:
         even = step_s * np.arange(int(time_s[-1] / step_s) + 1)
         nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
-        good = good[nearest] & (np.abs(time_s[nearest] - even) < step_s)
+        is_near = np.abs(time_s[nearest] - even) < step_s
+        good, known = good[nearest] & is_near, known[nearest] & is_near
         load_n, reading = np.interp(even, time_s, load_n), np.interp(even, time_s, reading)
         extra = {name: np.interp(even, time_s, values) for name, values in extra.items()}
         time_s = even
@@ -321,6 +325,11 @@ def _session(
         np.abs(load - base) < thresholds.standing,
         factor,
         quiet,
+        gap_ends=tuple(
+            int(end) // factor
+            for begin, end in zip(*runs_of(~known), strict=True)
+            if begin > 0 and end < known.size and (end - begin) * step_s > thresholds.hold_s
+        ),
     )
 
 

@@ -115,7 +115,7 @@ def score_of(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float
 
 
 def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
-    return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.material
+    return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.imperfection
 
 
 def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
@@ -124,8 +124,11 @@ def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood,
 
 
 def listed(names: Iterable[str]) -> str:
-    """Identifiers as words, one after the other."""
-    return ", ".join(name.replace("_", " ") for name in names)
+    """Identifiers as words, one after the other; a flexible block as the free form that it is."""
+    free = (
+        f"{name.removeprefix('flexible_')} of free form" if name.startswith("flexible_") else name for name in names
+    )
+    return ", ".join(name.replace("_", " ") for name in free)
 
 
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -31,7 +31,7 @@ class LeftOut:
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
         self.sessions, self.thresholds = sessions, thresholds
-        self._folds = _folds(sessions)
+        self._folds = folds_of(sessions)
         self._rest = [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in self._folds]
         self._errors: dict[ExtendedModel, Array] = {}
 
@@ -105,8 +105,10 @@ class _Fold:
     left_out: list[tuple[Session, Mask]]
 
 
-def _folds(sessions: Sequence[Session]) -> list[_Fold]:
-    """Many recordings are dealt out to groups, there and back.
+def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
+    """What is left out in turn: recordings, or cycles of a single one where they are fitted.
+
+    Many recordings are dealt out to groups, there and back.
 
     Neighbours, which a loading rate or a day often has in common, come into different groups, and so do those of a
     protocol that comes round with every sixth: no group takes all of a kind away.

@@ -16,6 +16,8 @@ from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 
+NO_CAUSE = "no cause can be named from this data (see its limits)"
+
 
 def known_error(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
     """Rms, shares of full scale, that faults of all samples add to a recording that is fitted, the most of all."""
@@ -66,8 +68,7 @@ def off_elsewhere(
     of loads of which nothing was learnt.
     """
     apart = [(one, left) for one, left in zip(sessions, residuals, strict=True) if one.held_out.all()]
-    alone = [replace(one, held_out=np.zeros_like(one.held_out)) for one, _ in apart]
-    off = beyond_noise(alone, [left for _, left in apart], thresholds)
+    off = beyond_noise(_all_fitted([one for one, _ in apart]), [left for _, left in apart], thresholds)
     seen = np.concatenate([left[one.usable] for one, left in apart]) if apart else np.zeros(1)
     white = float(seen @ seen) / max(seen.size, 1) - off**2
     chance = largest_of_noise(1, thresholds) * math.sqrt(2.0 / max(seen.size, 1)) * white
@@ -75,35 +76,76 @@ def off_elsewhere(
     return off if is_off else 0.0
 
 
+def names_in(causes: Sequence[Cause], unnamed: int) -> str:
+    """The causes as "a, b and c", and how many effects of the extended model are none."""
+    names = [cause.name.replace("_", " ") for cause in causes]
+    names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def not_shown_to_be_noise(
+    sessions: Sequence[Session], residuals: Sequence[Array], left: ResidualStructure, thresholds: Thresholds
+) -> float:
+    """Rms beyond white noise of all that can be used, where too little is there to test it; 0 where it is tolerable."""
+    size = beyond_noise(_all_fitted(sessions), residuals, thresholds)
+    return 0.0 if left.is_noise or size <= thresholds.tolerable else size
+
+
+def left_where_judged(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:
+    """Rms beyond white noise of what is held out: the most that a better model could do away with there."""
+    judged = [replace(one, usable=one.judged, held_out=np.zeros_like(one.held_out)) for one in sessions]
+    return beyond_noise(judged, residuals, thresholds)
+
+
+def _all_fitted(sessions: Sequence[Session]) -> list[Session]:
+    return [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions]
+
+
+def not_explained_of(rest: ResidualStructure, elsewhere: float, unproven: float, thresholds: Thresholds) -> str | None:
+    """What is said of the ``rest`` that no cause accounts for, or of what is more; None of nothing.
+
+    ``elsewhere`` is that of `off_elsewhere`, ``unproven`` of `not_shown_to_be_noise`.
+    """
+    if unproven > max(rest.rms, elsewhere):
+        return f"{100 * unproven:.2g} % is left, of which nothing shows that it is noise"
+    if elsewhere > rest.rms:
+        return f"of held-out data {100 * elsewhere:.2g} % is not explained"
+    if rest.rms <= thresholds.material:
+        return None
+    return f"over all recordings {100 * rest.rms:.2g} % {rest.how} and is not explained"
+
+
 def sentence_of(
     verdict: Verdict,
-    causes: Sequence[Cause],
+    named: str,
     baseline: Errors,
     best: Errors,
-    rest: ResidualStructure,
+    not_explained: str | None,
     thresholds: Thresholds,
     *,
     worse: bool = False,
-    elsewhere: float = 0.0,
+    withheld: bool = False,
 ) -> str:
-    """The answer in a sentence: size before judgement; ``rest`` is what no cause accounts for."""
-    names = [cause.name.replace("_", " ") for cause in causes]
-    named = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    """The answer in a sentence: size before judgement.
+
+    ``named``: what is in the extended model, as `names_in` says it. ``not_explained``: that of `not_explained_of`.
+    ``withheld``: its limits say why no cause may be named.
+    """
     good = f"the baseline simulation is good to {100 * baseline.rmse:.2g} % of full scale on data it was not fitted to"
     if baseline.is_empty:
         good = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
-    not_explained = f"{100 * rest.rms:.2g} % {rest.how} and is not explained"
-    if elsewhere > rest.rms:
-        not_explained = f"of what is held out {100 * elsewhere:.2g} % is not explained"
+    left = "" if not_explained is None else f"; {not_explained}"
     by_all = f"{100 * best.rmse:.2g} %"
     if verdict == "adequate":
-        return good if rest.rms <= thresholds.material else f"{good}; {not_explained}"
+        return f"{good}{left}"
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:
-        return f"{good}; {not_explained}: the extended model is good to {by_all}, by effects of which none is sure"
+        return f"{good}{left}: the extended model is good to {by_all}, by effects of which none is sure"
     if verdict == "unexplained":
-        return f"{good}; {not_explained}, and no effect of the catalogue accounts for it"
+        return f"{good}{left}, and {NO_CAUSE if withheld else 'no effect of the catalogue accounts for it'}"
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
-        return said if verdict == "explained" else f"{said}; {not_explained}"
-    said = f"{good}; with {named} it is worse there, good to {by_all}" if worse else f"{good}, with {named} to {by_all}"
-    return said if verdict == "explained" else f"{said}; {not_explained}"
+    elif worse:
+        said = f"{good}; with {named} it is worse there, good to {by_all}"
+    else:
+        said = f"{good}, with {named} to {by_all}"
+    return said if verdict == "explained" else f"{said}{left}"

@@ -108,7 +108,7 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
         np.ones(len(view.recording), dtype=bool),
         f"load and reading come from two clocks: the reading is {abs(view.offset_s):.2f} s"
         f" {'late' if view.offset_s >= 0 else 'early'}{course}, at rising and at falling edges alike, more than the"
-        " unit's relaxation explains; align the clocks before any physics is named",
+        " unit's relaxation explains (record both by one clock)",
     )
 
 

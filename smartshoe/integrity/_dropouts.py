@@ -38,7 +38,7 @@ def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     yield Finding(
         "dropouts",
         view.whole(at),
-        f"the reading drops out {starts.size} times, for up to"
+        f"the reading drops out {'once, for' if starts.size == 1 else f'{starts.size} times, for up to'}"
         f" {float(np.max(view.time_s[stops - 1] - view.time_s[starts])) + view.step_s:.3g} s,"
         f" to about {float(np.median(view.sign * view.reading.values[at])):.4g}"
         f" {view.recording.sensor.unit.symbol}, while the load stays: {int(at.sum())} samples are left out",

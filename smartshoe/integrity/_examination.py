@@ -13,12 +13,14 @@ from smartshoe.integrity._dropouts import dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
 from smartshoe.integrity._held import held_samples
+from smartshoe.integrity._held_rate import at_their_rates
 from smartshoe.integrity._lattice import quantisation
 from smartshoe.integrity._lines import hum
 from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
 from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity._wild import with_missing, without_wild
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
 
@@ -59,12 +61,18 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     clocks: list[Clock] = []
     refusals: list[str] = []
     decided = decided_by(thresholds)
-    examined = [_examined(recording, decided) for recording in recordings]
+    slow = at_their_rates(recordings, decided)
+    recordings = [recording for recording, _ in slow]
+    tame = [without_wild(recording, decided) for recording in recordings]
+    tame = [(one, [*held, *wild]) for (one, wild), (_, held) in zip(tame, slow, strict=True)]
+    examined = [_examined(one, *rest, decided) for one, rest in zip(recordings, tame, strict=True)]
     dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
     if dropped_to.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
-        examined = [_examined(recording, decided, dropped_to) for recording in recordings]
-    for number, (recording, (findings, mask, clock)) in enumerate(zip(recordings, examined, strict=True)):
+        examined = [_examined(one, *rest, decided, dropped_to) for one, rest in zip(recordings, tame, strict=True)]
+    kept: list[Recording] = []
+    for number, ((recording, _), (findings, mask, clock)) in enumerate(zip(tame, examined, strict=True)):
+        kept.append(_with_known_load(recording, findings))
         faults += [_fault(number, recording, finding) for finding in findings]
         refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
         if not refused and decided.clear * mask.mean() < 1.0:
@@ -75,20 +83,29 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         usable.append(np.zeros_like(mask) if refused else mask)
         clocks.append(clock)
         refusals += refused[:1]
-    offset_s, rate, seen = zip(*clocks, strict=True)
-    told = [one for one, mask in zip(seen, usable, strict=True) if mask.any()]
-    return Integrity(tuple(faults), tuple(usable), offset_s, rate, one_clock(told, decided), tuple(refusals))
+    offset_s, rate, lags = zip(*clocks, strict=True)
+    shared = one_clock([one for one, mask in zip(lags, usable, strict=True) if mask.any()], decided)
+    return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
+
+
+def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recording:
+    """Without the samples of the load at which it was not the load."""
+    at = [finding.at for finding in findings if finding.of_load]
+    return with_missing(recording, recording.load, np.any(at, axis=0)) if at else recording
 
 
 def _examined(
-    recording: Recording, thresholds: Thresholds, dropped_to: Array = NONE
+    recording: Recording, tame: Recording, wild: Sequence[Finding], thresholds: Thresholds, dropped_to: Array = NONE
 ) -> tuple[list[Finding], Mask, Clock]:
-    """The findings of one recording, its usable samples, its clock; ``dropped_to`` as in `View`."""
+    """The findings of one recording, its usable samples, its clock; ``dropped_to`` as in `View`.
+
+    ``tame`` is the recording without what is ``wild``, as was found before.
+    """
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
     if findings:
         return findings, ~usable, UNTOLD
-    findings = [finding for detect in OF_RECORDING for finding in detect(recording, thresholds)]
+    findings = [*wild, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
@@ -97,7 +114,7 @@ def _examined(
     if lacking is not None:
         findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
     else:
-        view = _view(recording, thresholds, dropped_to)
+        view = _view(tame, thresholds, dropped_to)
         if view is None:
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))

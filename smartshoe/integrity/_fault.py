@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.recording import Recording
 
 Severity = Literal["minor", "material", "fatal"]
 
@@ -46,7 +47,7 @@ class Finding:
 
     Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
     ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded; ``error`` that of
-    `DataFault`.
+    `DataFault`. ``of_load``: it is the load's, of which these samples tell nothing.
     """
 
     kind: str
@@ -57,6 +58,7 @@ class Finding:
     refuses: str | None = None
     values: Array = field(default_factory=lambda: np.zeros(0))
     error: float = 0.0
+    of_load: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,10 @@ class OneClock:
 
 @dataclass(frozen=True, eq=False)
 class Integrity:
-    """What `examine` found: one entry a recording in ``usable``, ``clock_offset_s``, ``clock_rate``.
+    """What `examine` found: one entry a recording in ``recordings``, ``usable``, ``clock_offset_s``, ``clock_rate``.
 
+    ``recordings`` are those that were given, but for samples of load or reading that tell nothing: these are missing,
+    or are left out of a channel that is held between its samples.
     ``usable`` holds (n,) masks of samples that a fit may use: load and reading present, neither spike nor dropout nor
     held nor at a rail. ``clock_offset_s`` is how much later the reading is than the load in the middle of the
     recording, 0 where the clocks agree; ``clock_rate`` how that lag grows in s per s. ``one_clock`` is what all of
@@ -78,6 +82,7 @@ class Integrity:
     each, in their order, why the recordings without a usable sample are of no use.
     """
 
+    recordings: tuple[Recording, ...]
     faults: tuple[DataFault, ...]
     usable: tuple[Mask, ...]
     clock_offset_s: tuple[float, ...]

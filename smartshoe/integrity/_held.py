@@ -21,13 +21,13 @@ def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
     if not at.any():
         return
     starts, stops = runs_of(at)
-    yield Finding(
-        "held_samples",
-        view.whole(at),
-        f"{int(at.sum())} readings ({100 * float(at.mean()):.2g} %) repeat the one before while the unit goes on, in"
-        f" {starts.size} runs of up to {int((stops - starts).max())}: they are left out",
-        masks=True,
-    )
+    count, longest = int(at.sum()), int((stops - starts).max())
+    said = "1 reading repeats the one before while the load moves: it is left out"
+    if count > 1:
+        said = (
+            f"{count} readings repeat the one before while the load moves, up to {longest} in a row: they are left out"
+        )
+    yield Finding("held_samples", view.whole(at), said, masks=True)
 
 
 def held(view: View, bad: Mask) -> Mask:

@@ -33,9 +33,9 @@ def quantisation(view: View, bad: Mask) -> Iterator[Finding]:
     yield Finding(
         "quantisation",
         np.ones(len(view.recording), dtype=bool),
-        f"the reading lies on a lattice of {usual:.4g} {view.recording.sensor.unit.symbol},"
-        f" {100 * usual / view.span:.2g} % of its span: an error of {100 * error / view.span:.2g} % that noise does not"
-        " smooth away",
+        f"the reading is quantised in steps of {usual:.4g} {view.recording.sensor.unit.symbol},"
+        f" {100 * usual / view.span:.2g} % of its span: an rms error of {100 * error / view.span:.2g} % that averaging"
+        " does not remove",
         error=error,
     )
 

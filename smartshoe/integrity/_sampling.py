@@ -56,12 +56,12 @@ def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
     at = np.zeros(len(recording), dtype=bool)
     at[1:][wide] = True
     at[:-1][wide] = True
-    share = lost / (lost + len(recording))
+    share, longest_s = lost / (lost + len(recording)), f"{float(step.max()):.3g} s"
     yield Finding(
         "gaps",
         at,
-        f"time has {int(wide.sum())} gaps, of up to {float(step.max()):.3g} s, in which about {lost} samples"
-        f" ({100 * share:.2g} %) are missing",
+        f"{f'a gap of {longest_s}' if wide.sum() == 1 else f'{int(wide.sum())} gaps in time, the longest {longest_s}'}:"
+        f" about {f'{lost} samples' if lost > 1 else 'one sample'} ({100 * share:.2g} % of all) missing",
         "minor" if share < thresholds.faulty_share else "material",
     )
 

@@ -8,6 +8,7 @@ own, however far it goes, and is no fault of single samples.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -115,15 +116,13 @@ def spikes(view: View, bad: Mask) -> Iterator[Finding]:
     load_gain = view.load_span / view.span
     on_load = isolated(view.load, view.reading_corner, view.thresholds.clear * load_gain, view.load_span, view.near)
     if on_load.any():
-        yield _finding(view, on_load, view.load, view.load_span, "reference load")
+        yield replace(_finding(view, on_load, view.load, view.load_span, "reference load"), of_load=True)
 
 
 def _finding(view: View, at: Mask, signal: Signal, span: float, what: str) -> Finding:
     size = np.abs(signal.outlying[at])
-    return Finding(
-        "spikes",
-        view.whole(at),
-        f"the {what} has {int(at.sum())} isolated spikes of {100 * float(np.median(size)) / span:.2g} % of its span"
-        f" (the largest {100 * float(size.max()) / span:.2g} %): they are left out",
-        masks=True,
-    )
+    largest = f"{100.0 * float(size.max()) / span:.0f} % of its span"
+    said = f"an isolated spike of {largest}: it is left out"
+    if size.size > 1:
+        said = f"{size.size} isolated spikes, the largest of {largest}: they are left out"
+    return Finding("spikes", view.whole(at), f"the {what} has {said}", masks=True)

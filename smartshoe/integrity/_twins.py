@@ -11,19 +11,18 @@ from smartshoe.arrays import Array
 from smartshoe.recording import Channel, Recording
 
 
-def twins(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """One sentence for each recording whose time, load and readings are all those of an earlier one."""
-    said, alike = [], defaultdict[tuple[int, float], list[Recording]](list)
-    for recording in recordings:
+def twins(recordings: Sequence[Recording]) -> dict[int, str]:
+    """By place, one sentence for each recording whose time, load and readings are all those of an earlier one."""
+    said, alike = {}, defaultdict[tuple[int, float], list[Recording]](list)
+    for place, recording in enumerate(recordings):
         known = alike[recording.time_s.size, float(sum(np.nansum(_si(one)) for one in recording.sensors))]
         first = next((one for one in known if _are_alike(one, recording)), None)
         known.append(recording)
         if first is not None:
-            said.append(
-                f"{recording.label} holds the same samples as {first.label}: they are one experiment, and neither"
-                " confirms the other"
+            said[place] = (
+                f"{recording.label} holds the same samples as {first.label}: it is one experiment, given twice"
             )
-    return tuple(said)
+    return said
 
 
 def _are_alike(one: Recording, other: Recording) -> bool:

@@ -19,126 +19,151 @@ def threshold(value: Any, unit: str, meaning: str, origin: str) -> Any:
 class Thresholds:
     """What a diagnosis decides by. Carried in the result and printed in the page; `described` lists it.
 
-    Raises `UsageError` for what is no number, and for a ``material`` that is not above 0.
+    Raises `UsageError` for what is no number, and for a ``material`` that is no share of full scale up to a half.
     """
 
     material: float = threshold(
-        2e-4, "share of full scale", "what moves the reading by less counts for nothing", "contract, section 4"
+        2e-4, "share of full scale", "smallest error of the reading that counts", "chosen: 0.02 %"
+    )
+    imperfection: float = threshold(
+        2e-4, "share of full scale", "standard deviation of what any effect adds to a good unit", "0.02 % of full scale"
     )
     departure: float = threshold(
         0.25,
         "share of an effect's size",
         "standard deviation by which a real law departs from an equation of its kind",
-        "second laboratory and own truths: 0.05 to 0.4",
+        "two simulated worlds: 0.05 to 0.4",
     )
     strength_sd: float = threshold(
         0.03,
         "share of full scale",
-        "prior standard deviation of an effect that is there, and of a gain of a recording's own",
-        "effects.md: 0.1 to 10 %",
+        "prior standard deviation of an effect's size, and of a recording's own gain",
+        "effects of 0.1 to 10 %",
     )
-    false_name: float = threshold(0.02, "probability", "of an effect where there is none", "issue: floor of 2 %")
+    false_name: float = threshold(0.02, "probability", "chance of naming an effect that is not there", "chosen: 2 %")
     unknown_past: float = threshold(
-        0.05, "share of full scale", "load that an arm may remember at the start of a recording", "judgement"
+        0.05,
+        "share of full scale",
+        "load that a unit may remember from before a recording that begins at rest",
+        "judgement",
     )
     foreign_zero: float = threshold(
         0.3,
         "share of full scale",
-        "a reading at no load beyond it is a convention of the sensor's, no offset",
+        "reading at no load from which on it is how the sensor counts, and no offset",
         "judgement",
     )
     zero_sd: float = threshold(
-        4e-4, "share of full scale", "how well a recording's rest is known to be zero", "load cells: 0.02 % of rating"
+        4e-4, "share of full scale", "standard deviation of a rest's zero", "load cells: 0.02 % of rating"
     )
     linear: float = threshold(
-        0.01, "share of full scale", "an effect up to which one linearisation serves for all", "squares: 1e-4"
+        0.01,
+        "share of full scale",
+        "largest effect for which one linearisation of the model serves",
+        "its square: 1e-4",
     )
     tolerable: float = threshold(
         1.5e-3,
         "share of full scale",
-        "structure that small imperfections of a good unit add up to; a larger effect is named beside another cause"
-        " where it is likelier there than not",
+        "error that small imperfections of a good unit add up to; "
+        "a larger effect is named beside another cause where it is likelier there than not",
         "three effects of 0.08 % each: 0.14 %",
     )
     extrapolates: float = threshold(
         10.0,
         "ratio",
-        "of an effect in what is held out to that in what is fitted, beyond which it is no knowledge; of a zero's shift"
-        " to a drift beside it, within which one may be of the other",
+        "times by which an effect may be larger on held-out data than on fitted data to be trusted; "
+        "times by which a zero's shift may exceed a drift and be of it",
         "an order of magnitude",
     )
     validated: float = threshold(
-        0.5, "standard errors", "by which an effect must better what is left out", "two to one, one-sided"
+        0.5, "standard errors", "gain on recordings left out in turn that an effect must have", "two to one, one-sided"
     )
     foreseen: float = threshold(
         0.25,
         "share of squared error",
-        "of the baseline's, where recordings are left out in turn, that an extension must do away with",
+        "share of the baseline's squared error, over recordings left out in turn, that an extension must remove",
         "a law of the usual departure",
     )
     alike: float = threshold(
-        3.0, "times material", "two models whose readings differ by less are one, and the simpler is taken", "judgement"
+        3.0,
+        "times imperfection",
+        "difference of two models below which they read the same, and the simpler is taken",
+        "judgement",
     )
     law_departure: float = threshold(
-        0.4, "share of an effect's size", "a departure from which on the law is unsure", "effects.md: 5 to 40 %"
+        0.4,
+        "share of an effect's size",
+        "departure from an equation beyond which it is not its law",
+        "effects depart by 5 to 40 %",
     )
     equivalent_odds: float = threshold(
         0.3,
         "odds",
-        "of another law, or of the one kind that is named, from which on it cannot be ruled out",
+        "odds above which another law, or the one kind that comes nearest, cannot be ruled out",
         "about 1 in 4",
     )
     kind_odds: tuple[float, ...] = threshold(
         (2.77, -1.12, -0.99, -1.09, -2.22),
         "log odds",
-        "of a kind: intercept; per log of what no equation follows over its size; per standard deviation of its"
-        " departure; where no law of it follows; for its likeness to another effect that is there",
-        "logistic regression on the effects that were fitted to 661 cases of two worlds",
+        "a kind's log odds: intercept; per log of what no equation explains over its size; "
+        "per standard deviation of its departure; where no law of it fits; for its likeness to another effect "
+        "that is there",
+        "logistic regression on the effects in 661 simulated cases of two worlds",
     )
     least_confidence: float = threshold(
-        0.75,
-        "probability",
-        "of the kind; below it a cause is named for its size alone; of a zero that is never seen",
-        "three to one for being right",
+        0.75, "probability", "confidence from which on a kind is sure", "three to one for being right"
     )
     named_odds: float = threshold(
         0.5,
         "log odds",
-        "by which a kind beyond least_confidence is likelier for being named: what else speaks against it has not",
-        "1,489 names of two worlds",
+        "log odds that a kind which is sure, and named, gains by that",
+        "1,489 names in two simulated worlds",
     )
-    still_per_s: float = threshold(0.004, "full scales a second", "slower is a hold", "3 N/s on 800 N")
+    still_per_s: float = threshold(
+        0.004, "full scales a second", "change of the load below which it is held", "3 N/s on 800 N"
+    )
     memory_s: tuple[float, ...] = threshold(
         (0.3, 3.0, 30.0),
         "s",
-        "time constants by which a law may follow otherwise; an arm beyond them follows an effect",
+        "time constants by which a law may depart; slower or faster arms of the wall are an effect",
         "one a decade of the protocols",
     )
     held_out_every: int = threshold(
-        3, "load cycles", "of which one judges and fits nothing, where no recording is held out", "two thirds to fit"
+        3, "load cycles", "one in so many judges and fits nothing, where no recording is held out", "two thirds to fit"
     )
     # What an experiment can show at all.
     false_alarm: float = threshold(
         1e-4,
         "probability",
-        "that one test finds a fault in a sound recording",
+        "chance that one test finds a fault in a sound recording",
         "ten tests, a thousand recordings",
     )
     faulty_share: float = threshold(
-        0.05, "share of samples", "more of them are how a logger works and no fault", "5 %, as convention has it"
+        0.05,
+        "share of samples",
+        "share of samples beyond which a fault is how the logger works",
+        "5 %, as convention has it",
     )
-    least_samples: int = threshold(100, "samples", "fewer tell nothing", "quantiles of 5 % rest on five samples")
+    least_samples: int = threshold(
+        100, "samples", "fewest samples that tell anything", "quantiles of 5 % rest on five samples"
+    )
     follows: float = threshold(
-        0.3, "share of variance", "of a reading that its load must explain", "measured sensors: 0.33 and more"
+        0.3,
+        "share of variance",
+        "share of the reading's variance that the load must explain",
+        "measured sensors: 0.33 and more",
     )
-    clear: float = threshold(2.0, "ratio", "between two sizes that differ for certain", "judgement")
-    same: float = threshold(0.25, "share", "by which two rates, peaks or gains of one kind may differ", "judgement")
+    clear: float = threshold(2.0, "ratio", "ratio from which on two sizes differ for certain", "judgement")
+    same: float = threshold(0.25, "share", "difference up to which two rates, peaks or gains are alike", "judgement")
     standing: float = threshold(
-        0.02, "share of the span", "within which a load, or a reading that is lost, stands still", "judgement"
+        0.02, "share of the span", "movement up to which a load, or a reading that is lost, stands still", "judgement"
     )
-    echo_s: float = threshold(0.1, "s", "within which a reading answers a corner of its load", "slowest sensor known")
-    local: int = threshold(64, "samples", "over which a local scale is taken", "a median to 15 %")
-    bins: int = threshold(4000, "bins", "to which long recordings are thinned where lags are looked for", "speed")
+    echo_s: float = threshold(
+        0.1, "s", "time within which a reading answers a corner of its load", "slowest sensor known"
+    )
+    local: int = threshold(64, "samples", "samples over which a local scale is taken", "a median to 15 %")
+    bins: int = threshold(4000, "bins", "bins to which long recordings are thinned to look for lags", "speed")
     hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
     idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
 
@@ -149,8 +174,8 @@ class Thresholds:
             for value in given if isinstance(given, tuple) else (given,):
                 if isinstance(value, bool) or not isinstance(value, Real) or math.isnan(value):
                     raise UsageError(f"{one.name} is {value!r}: give a number ({one.metadata['unit']})")
-        if not 0.0 < self.material < math.inf:
-            raise UsageError(f"material is {self.material:g}: give a share of full scale above 0, such as 0.0002")
+        if not 0.0 < self.material <= 0.5:
+            raise UsageError(f"material is {self.material:g}: give a share of full scale up to 0.5, such as 0.0002")
 
     @property
     def few(self) -> int:
@@ -179,11 +204,19 @@ class Thresholds:
 
 
 def decided_by(given: Thresholds | None, material: float | None = None) -> Thresholds:
-    """``given`` or the usual, with ``material`` where there is one; `UsageError` for what are no thresholds."""
+    """``given`` or the usual, with ``material`` where there is one; `UsageError` for what are no thresholds.
+
+    Who asks for less than is usually ``material`` has better units: what imperfections of theirs add up to is less by
+    as much. Who asks for more has the units that others have, and looks at what is large.
+    """
     if given is not None and not isinstance(given, Thresholds):
         raise UsageError(f"thresholds is of type {type(given).__name__}: give Thresholds, or none for the usual ones")
     decided = Thresholds() if given is None else given
-    return decided if material is None else replace(decided, material=material)
+    if material is None:
+        return decided
+    asked = replace(decided, material=material)
+    finer = min(material / decided.material, 1.0)
+    return replace(asked, imperfection=finer * asked.imperfection, tolerable=finer * asked.tolerable)
 
 
 def described(given: Thresholds) -> list[dict[str, Any]]:

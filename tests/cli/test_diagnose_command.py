@@ -161,8 +161,20 @@ def test_hopeless_data_is_refused_in_one_sentence_and_the_json_says_so_too(
     assert found["verdict"] == "refused"
     assert holds(found, CONTRACT)
     assert last == f"error: {found['limits'][0]}"
-    assert "No diagnosis" in (out / "diagnosis.html").read_text()
+    page = (out / "diagnosis.html").read_text(encoding="utf-8")
+    assert "No diagnosis" in page
+    assert f'<p class="facts">given: {smartshoe.read(table).name} · smartshoe: ' in page
     assert not calibration.exists()
+
+
+def test_a_page_without_a_diagnosis_says_what_was_given_and_none_of_it_fitted(tmp_path: Path) -> None:
+    first, second, out = _dead(tmp_path / "dead.csv"), _dead(tmp_path / "gone.csv"), tmp_path / "out"
+    assert run_command(["diagnose", str(first), "--hold-out", str(second), "--out", str(out)]) == 5
+    page = (out / "diagnosis.html").read_text(encoding="utf-8")
+    given = ", ".join(smartshoe.read(one).name for one in (first, second))
+    assert f'<p class="facts">given: {given} · smartshoe: ' in page
+    assert "fitted: " not in page
+    assert "judged on: " not in page
 
 
 @pytest.mark.parametrize(

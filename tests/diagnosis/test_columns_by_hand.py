@@ -30,6 +30,7 @@ from smartshoe.diagnosis._sensitivity import (
     linearised,
     marginal,
     nuisance_precision,
+    nuisances,
 )
 from smartshoe.diagnosis._session import Scale
 from smartshoe.models.core import USUAL_WALL_RATIO
@@ -54,7 +55,7 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
         cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
-        own_gain_sd=0.0, gain_parts=(), zero_changes=(), thinned=1, resting=load <= 0.0,
+        own_gain_sd=0.0, gain_parts=(), zero_changes=(), gap_ends=(), thinned=1, resting=load <= 0.0,
     )  # fmt: skip
 
 
@@ -263,6 +264,36 @@ def test_the_prior_of_a_past_is_of_what_the_arm_may_hold(share: float, begun: fl
     assert turned == pytest.approx(found)
 
 
+def test_after_each_long_gap_the_arm_holds_what_nobody_knows_and_forgets_it_by_its_pole() -> None:
+    """Beside what is the recording's own otherwise, in that order: gains, changes of its zero, gaps."""
+    session = _session(_load(60, 3), np.zeros(60))
+    assert nuisances(session, 0.3).shape == (60, 2)
+    session.gap_ends = (20, 45)
+    first = np.arange(60) < 30
+    session.own_gain_sd, session.gain_parts, session.zero_changes = 0.03, (first, ~first), (50,)
+    read = np.linspace(1.0, 2.0, 60)
+    found = nuisances(session, 0.3, read)
+    for k in range(60):
+        after = [math.exp(-0.3 * STEP_S * (k - end)) if k >= end else 0.0 for end in (20, 45)]
+        gains = [0.03 * read[k] * one for one in (k < 30, k >= 30)]
+        assert found[k] == pytest.approx([1.0, math.exp(-0.3 * STEP_S * k), *gains, float(k >= 50), *after])
+
+
+@pytest.mark.parametrize("share", [0.2, -0.2, 0.0])
+def test_what_the_arm_may_hold_after_a_gap_is_of_the_largest_load(share: float) -> None:
+    load = np.array([0.0, 0.1, 0.7, 0.6, 0.0])
+    session = _session(load, np.zeros(5))
+    past, gap = (max(abs(share) * 1.1 * most, 1e-6) ** -2 for most in (0.05, 0.7))
+    session.gap_ends = (2, 4)
+    for gain in (1.1, -1.1):
+        found = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=gain), STANDARD)
+        assert found == pytest.approx(np.diag([0.0, past, gap, gap]))
+    every = np.ones(5, dtype=bool)
+    session.own_gain_sd, session.gain_parts, session.zero_changes = 0.03, (every,), (3,)
+    found = nuisance_precision(session, replace(MODEL, relaxing_share=share), STANDARD)
+    assert found == pytest.approx(np.diag([0.0, past, 1.0, STANDARD.strength_sd**-2, gap, gap]))
+
+
 def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     model = MODEL.with_part("dead_band", np.array([0.05, 0.3, 0.1])).with_part("delay", np.array([0.12]))
     sessions = _sessions(model, sizes=(150, 120))
@@ -380,6 +411,11 @@ def test_a_declared_area_tells_the_walls_ratio_within_what_can_be(ratio: float, 
     found = _wall_ratio([session], 1.1, SCALE)
     assert found == pytest.approx(ratio if is_told else USUAL_WALL_RATIO)
     assert _wall_ratio([session], 1.1, replace(SCALE, unit=VOLT)) == USUAL_WALL_RATIO
+    # One recording of the unit says it for all, wherever it stands among them.
+    bare: Any = SimpleNamespace(recording=replace(recording, metadata={}))
+    for sessions in ([bare, session], [session, bare], [bare, session, bare]):
+        assert _wall_ratio(sessions, 1.1, SCALE) == found
+    assert _wall_ratio([bare, bare], 1.1, SCALE) == USUAL_WALL_RATIO
 
 
 # -- what is held out -------------------------------------------------------------------------------------------------

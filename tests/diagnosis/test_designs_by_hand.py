@@ -77,9 +77,9 @@ def test_what_shows_and_what_is_alike_is_of_what_the_baseline_does_not_follow() 
     assert list(np.diag(found.unlike)) == [0.0, 0.0, 0.0]
     assert found.unlike[0, 2] == pytest.approx(1.0)  # what the baseline follows follows nothing beyond it
     assert (found.strength, found.evidence) == (0.003, pytest.approx(60 * 0.3**2))
-    coarse = _compared(_columns(x, told), 0.01, 0.003, replace(STANDARD, material=10.0))
+    coarse = _compared(_columns(x, told), 0.01, 0.003, replace(STANDARD, material=0.5))
     one = math.sqrt(float(left[best] @ left[best]) / 60)
-    assert coarse.least[0] == pytest.approx(10.0 / one)
+    assert coarse.least[0] == pytest.approx(0.5 / one)
 
 
 def test_what_columns_leave_of_a_square_is_a_share() -> None:
@@ -259,12 +259,23 @@ def test_the_largest_doubtful_cause_is_parted_by_what_parts_it_best(monkeypatch:
     assert (told.protocol, told.channel, told.expected_margin, told.steps.name) == (
         "long_hold", "temperature", 60.0, "long_hold",
     )  # fmt: skip
-    assert "it should tell linear leak and orifice leak apart by 60 of" in told.says
-    assert "where this data does by 5" in told.says
+    apart = "it should tell linear leak and orifice leak apart"
+    assert told.says == f"run the protocol long hold: {apart}, which this data does not"
     better = replace_margin(large, -3.0)
-    assert "where this data does by 0" in _next(monkeypatch, [better], {"steps": 40.0}).says
+    not_yet = f"run the protocol steps: {apart}, which this data does not"
+    assert _next(monkeypatch, [better], {"steps": 40.0}).says == not_yet
     unknown = _cause("linear_leak", 0.02, ("orifice_leak",))
-    assert "where this data does by 0" in _next(monkeypatch, [unknown], {"steps": 40.0}).says
+    assert _next(monkeypatch, [unknown], {"steps": 40.0}).says == not_yet
+    # What tells more than the odds of a false name, -2 log of 0.02, does tell them apart, so many times less well.
+    bound = -2.0 * math.log(0.02)
+    for margin, by, said in (
+        (0.999 * bound, 60.0, "which this data does not"),
+        (1.001 * bound, 60.0, "7.7 times as well as this data does"),
+        (8.0, 60.0, "7.5 times as well as this data does"),
+        (20.0, 2e5, "10,000 times as well as this data does"),
+    ):
+        told = _next(monkeypatch, [replace_margin(large, margin)], {"long_hold": by})
+        assert told.says == f"run the protocol long hold: {apart}, {said}"
 
 
 def test_of_protocols_that_tell_about_as_much_the_shortest_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -282,8 +293,8 @@ def test_no_protocol_is_run_that_tells_no_more_than_this_data(monkeypatch: pytes
     told = _next(monkeypatch, doubtful, {"steps": 40.0, "long_hold": 60.0})
     assert (told.protocol, told.channel, told.expected_margin, told.steps) == (None, "temperature", 60.0, None)
     assert told.says == (
-        "none of the 2 protocols is expected to tell linear leak and orifice leak apart better than this data does,"
-        " long hold by 60 of -2 log likelihood and this data by 60: log the temperature too"
+        "none of the 2 protocols is expected to tell linear leak and orifice leak apart better than this data already"
+        " does: log the temperature too"
     )
 
 
@@ -299,7 +310,7 @@ def test_what_no_load_history_parts_asks_for_a_channel_or_for_nothing(monkeypatc
     assert (below.protocol, below.channel, below.steps) == (None, "temperature", None)
     assert below.says.endswith("tells linear leak and orifice leak apart: log the temperature too")
     assert _next(monkeypatch, doubtful, {"steps": 1.001 * bound}).protocol == "steps"
-    assert _next(monkeypatch, doubtful, {}).says.endswith("take either, they predict the same")
+    assert _next(monkeypatch, doubtful, {}).says.endswith(": use either, both predict the same reading")
 
 
 def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytest.MonkeyPatch) -> None:

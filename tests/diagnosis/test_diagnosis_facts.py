@@ -113,7 +113,7 @@ def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list
     drifting += 0.012
     jumping += 0.05 * (-1.0) ** np.arange(jumping.size)
     said = where(sessions, [quiet, drifting, jumping], Thresholds())
-    assert f"largest in {sessions[1].recording.name}" in said
+    assert f"; the worst stretch is {sessions[1].recording.name}, " in said
 
 
 def test_branches_of_fast_strokes_are_told_by_a_short_echo() -> None:

@@ -91,7 +91,7 @@ class _Twin:
         return np.concatenate([one[kept] for one, kept in zip(signals, self.kept, strict=True)])
 
     def prior(self, members: tuple[int, ...]) -> Array:
-        sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.material)
+        sds = np.full(self.rows.shape[1] - 1, self.given.thresholds.imperfection)
         sds[: self.given.own] = 1.0
         for one in self.given.candidates:
             if one.effect.why_unnamed:  # what no law does is no small imperfection

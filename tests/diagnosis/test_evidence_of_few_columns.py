@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
 SD = 0.02
-MATERIAL, STRENGTH, DEPARTURE = STANDARD.material, STANDARD.strength_sd, STANDARD.departure
+MATERIAL, STRENGTH, DEPARTURE = STANDARD.imperfection, STANDARD.strength_sd, STANDARD.departure
 COLUMNS = ((3,), (4, 5), (6,), (7,))  # beside the target, of two own columns
 NAMES = ("one", "two", "three", "one")
 FAMILIES = {"one": "kind", "two": "kind", "three": "another"}

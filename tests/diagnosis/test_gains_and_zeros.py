@@ -80,7 +80,7 @@ def _wide(sessions: list[Session], model: ExtendedModel) -> tuple[Array, ...]:
 
 def _density(given: Linearised, sessions: list[Session], member: int | None) -> float:
     """-2 log density of the target, every prior written out in one covariance; the equation exact."""
-    prior = np.full(given.rows[0].shape[1] - 1, STANDARD.material)
+    prior = np.full(given.rows[0].shape[1] - 1, STANDARD.imperfection)
     prior[: given.own] = 1.0
     for one in given.candidates:
         prior[[c - 1 for c in one.columns]] *= not one.effect.why_unnamed

@@ -74,7 +74,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
         own = nuisances(session, given.model.pole_per_s)
         precision = nuisance_precision(session, given.model, limits)
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
-        prior = np.full(rows.shape[1] - 1, limits.material)
+        prior = np.full(rows.shape[1] - 1, limits.imperfection)
         prior[: given.own] = 1.0
         for member in members:
             prior[[c - 1 for c in given.candidates[member].columns]] = limits.strength_sd
@@ -95,6 +95,20 @@ def test_the_evidence_is_the_gaussian_density_of_the_explicit_covariance(small: 
     fast = [evidence.exact(members).score - evidence.odds_of(members) for members in [(), *sets]]
     # Both are known up to one constant.
     assert_allclose(np.diff(fast), np.diff(slow), rtol=1e-4, atol=0.05)
+
+
+@pytest.mark.parametrize("field", ["imperfection", "material"])
+def test_what_any_effect_adds_to_a_good_unit_is_its_imperfection_whatever_is_material(
+    small: Linearised, field: str
+) -> None:
+    """Twice as much of an effect that is there and small: its own evidence shrinks, by the twin's as much."""
+    sd, usual, member = 0.002, Evidence(small, 0.002), (11,)
+    given = replace(small, thresholds=replace(Thresholds(), **{field: 2e-3}))
+    evidence = Evidence(given, sd)
+    gained = [one.exact(member).score - one.exact(()).score for one in (usual, evidence)]
+    slow = plain_score(given, sd, member) - plain_score(given, sd, ())
+    assert gained[1] - evidence.odds_of(member) == pytest.approx(slow, rel=1e-4, abs=0.05)
+    assert (gained[0] == pytest.approx(gained[1], rel=1e-9)) is (field == "material")
 
 
 def test_every_extension_is_the_score_of_the_extended_set(small: Linearised) -> None:
@@ -246,5 +260,9 @@ def test_every_number_says_its_unit_its_meaning_and_its_origin() -> None:
 @given(st.floats(1e-5, 1e-2))
 @settings(max_examples=3, deadline=None)
 def test_material_reaches_the_result(material: float) -> None:
-    found = diagnose([recording()], material=material)
-    assert found.thresholds == replace(Thresholds(), material=material)
+    """Of less than is usual, imperfections are less by as much."""
+    found, usual = diagnose([recording()], material=material), Thresholds()
+    finer = min(material / usual.material, 1.0)
+    assert (found.thresholds.imperfection, found.thresholds.tolerable) == pytest.approx((2e-4 * finer, 1.5e-3 * finer))
+    kept = {"imperfection": usual.imperfection, "tolerable": usual.tolerable}
+    assert replace(found.thresholds, **kept) == replace(usual, material=material)

@@ -47,8 +47,8 @@ class _Model(str):
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
-        independent=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={},
-        names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={}, alone=None,
+        independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={},
+        names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={}, alone=None, weighed=[],
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -82,6 +82,10 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
             with_nothing_but=lambda plain: judged(one, plain, ()),
         )
 
+    def without_redundant(found: Any, given: Any, sessions: Any) -> Any:
+        told.weighed.append((found.fit.model, given is plain))
+        return found, found.members()
+
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
     monkeypatch.setattr(
@@ -89,6 +93,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     )
     monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
+    monkeypatch.setattr(_inference, "folds_of", lambda sessions: ["fold"] * told.folds)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
     monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
     monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
@@ -105,6 +110,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one, sessions: lawful if told.is_law else one)
     monkeypatch.setattr(_inference, "with_likelier_gains", lambda state, sessions: None)
     monkeypatch.setattr(_inference, "_judged", judged)
+    monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
     monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
     monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})

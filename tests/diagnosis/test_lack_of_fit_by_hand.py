@@ -355,12 +355,12 @@ def replace_fitted(session: Any, fitted: NDArray[np.bool_]) -> Any:
 @pytest.mark.parametrize(
     ("level", "rate", "words"),
     [
-        (0.0, 0.0, "0-25 % of the load while the load is held"),
-        (0.25, 1.0, "25-50 % of the load while loading"),
-        (0.499, -1.0, "25-50 % of the load while unloading"),
-        (0.75, 1.0, "75-100 % of the load while loading"),
-        (1.2, 1.0, "75-100 % of the load while loading"),
-        (-0.3, -1.0, "0-25 % of the load while unloading"),
+        (0.0, 0.0, "0-25 % of full load while the load is held"),
+        (0.25, 1.0, "25-50 % of full load while loading"),
+        (0.499, -1.0, "25-50 % of full load while unloading"),
+        (0.75, 1.0, "75-100 % of full load while loading"),
+        (1.2, 1.0, "75-100 % of full load while loading"),
+        (-0.3, -1.0, "0-25 % of full load while unloading"),
     ],
 )
 def test_the_place_of_the_largest_part_is_said(level: float, rate: float, words: str) -> None:
@@ -371,9 +371,9 @@ def test_the_place_of_the_largest_part_is_said(level: float, rate: float, words:
     loud.conditions.cache["rate_per_s"] = np.full(size, rate)
     said = where([quiet, loud], [np.full(size, 0.01), np.full(size, 1.0)], STANDARD)
     assert words in said
-    assert said.startswith("100 % of it sits at")
+    assert said.startswith("100 % of the power that is left lies at")
     assert "(50 % of the samples)" in said
-    assert "largest in loud" in said
+    assert "; the worst stretch is loud, " in said
 
 
 @pytest.mark.parametrize(("by", "words"), [(0.99, "while the load is held"), (1.0, "while loading")])
@@ -391,11 +391,11 @@ def test_the_tenth_of_the_time_with_the_largest_part_is_said() -> None:
     residual = np.full(1001, 0.1)
     residual[330:360] = 1.0
     residual[950:1000] = 50.0  # masked
-    assert where([one], [residual], STANDARD).endswith("largest in one, 30-40 s")
+    assert where([one], [residual], STANDARD).endswith("; the worst stretch is one, 30-40 s")
     # Noise that averages out within half a second is no slow part.
     residual[600:700] = np.resize([2.0, -2.0], 100)
-    assert where([one], [residual], STANDARD).endswith("largest in one, 30-40 s")
-    assert where([one], [np.zeros(1001)], STANDARD).startswith("0 % of it")
+    assert where([one], [residual], STANDARD).endswith("; the worst stretch is one, 30-40 s")
+    assert where([one], [np.zeros(1001)], STANDARD).startswith("0 % of the power that is left lies at")
     # It is the file's own time, which need not begin at none.
     one.recording.time_s += 2215.0
-    assert where([one], [residual], STANDARD).endswith("largest in one, 2245-2255 s")
+    assert where([one], [residual], STANDARD).endswith("; the worst stretch is one, 2245-2255 s")

@@ -185,6 +185,50 @@ def test_uneven_time_stamps_come_to_an_even_grid() -> None:
     assert session.usable[near].mean() > 0.95
 
 
+LONG, BRIEF = 160, 140  # steps beside the shortest hold: 3.2 and 2.8 s
+
+
+@pytest.mark.parametrize("is_logged", [True, False])
+@pytest.mark.parametrize(("count", "is_open"), [(LONG, True), (BRIEF, False)])
+@pytest.mark.parametrize("factor", [1, 4])
+def test_where_the_load_is_not_known_for_longer_than_a_hold_the_past_is_open_again(
+    is_logged: bool, count: int, is_open: bool, factor: int
+) -> None:
+    """Whether its samples are empty or its rows are not there; at the first sample after it."""
+    load, first = triangles(10), 1200
+    gone = (np.arange(load.size) >= first) & (np.arange(load.size) < first + count)
+    run = pressed(np.where(gone, np.nan, load), load) if is_logged else pressed(load).taken(~gone)
+    ((session,), scale) = prepared(run, factor=factor)
+    assert len(session.gap_ends) == is_open
+    (fine,) = at_full_rate([session], [run.sensor.present], scale, STANDARD)
+    assert len(fine.gap_ends) == is_open
+    if is_open:
+        assert session.gap_ends[0] == pytest.approx((first + count) / factor, abs=1.0)
+        assert fine.gap_ends[0] == pytest.approx(first + count, abs=1.0)
+        assert session.conditions.time_s[session.gap_ends[0]] == pytest.approx(STEP_S * (first + count), abs=factor * STEP_S)
+        assert not session.usable[session.gap_ends[0] - 5]
+    assert replace(session, gap_ends=()).fitted == pytest.approx(session.fitted)  # nothing else is otherwise
+
+
+def test_a_past_is_open_after_each_gap_of_the_load_and_for_no_other_reason() -> None:
+    load = triangles(10)
+    at = np.arange(load.size)
+
+    def ends(*gone: tuple[int, int], reading: bool = False) -> tuple[int, ...]:
+        lost = np.any([(at >= first) & (at < stop) for first, stop in gone], axis=0)
+        shown = np.where(lost, np.nan, load)
+        (session,), _ = prepared(pressed(load, shown) if reading else pressed(shown, load))
+        return session.gap_ends
+
+    assert ends((500, 500 + LONG), (1500, 1500 + LONG)) == (500 + LONG, 1500 + LONG)
+    assert ends((500, 500 + LONG), (1500, 1500 + BRIEF)) == (500 + LONG,)
+    assert ends((500, 500 + LONG), reading=True) == ()  # the load is known, and so is what the arm holds
+    assert ends((0, LONG)) == ()  # that is how the recording begins
+    assert ends((load.size - LONG, load.size)) == ()  # nothing comes after it
+    (whole,), _ = prepared(pressed(load))
+    assert whole.gap_ends == ()
+
+
 def test_other_channels_go_along(  # a temperature from its first value on, a neighbour in this unit's full scale
 ) -> None:
     load = triangles()
@@ -296,6 +340,11 @@ def test_a_recording_that_continues_one_that_is_not_given_says_so() -> None:
     assert not _without([second, first], 2, {})
     itself = replace(second, name="a")
     assert pastless([itself]) == [itself]
+    why = "which is itself: it is taken as the unit's first after a rest (name the recording before it)"
+    assert _without([itself], 1, {}) == [f"a continues a, {why}"]
+    assert _without([replace(first, name="before"), itself], 2, {}) == [f"a continues a, {why}"]
+    # Another recording of that name is one before it.
+    assert _without([first, itself], 2, {}) == []
 
 
 def test_a_load_cells_noise_is_taken_out_and_said() -> None:

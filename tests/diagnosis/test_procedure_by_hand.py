@@ -25,8 +25,9 @@ from smartshoe.diagnosis._procedure import (
     _trace,
     _with_offset,
 )
+from smartshoe.diagnosis._result import Rival
 from smartshoe.diagnosis._session import Scale, prepare
-from smartshoe.diagnosis._verdict import sentence_of, verdict_of
+from smartshoe.diagnosis._verdict import names_in, not_explained_of, sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of
 from smartshoe.errors import UsageError
 from smartshoe.models.effects import Conditions, effect
@@ -130,9 +131,48 @@ def test_without_a_cause_it_is_adequate_up_to_what_is_tolerable_or_material() ->
     assert verdict_of([], nothing, nothing, STANDARD) == "adequate"
 
 
-def _said(verdict: Any, *names: str, left: Any = None) -> str:
+def _named(*names: str, unnamed: int = 0) -> str:
     causes: Any = [SimpleNamespace(name=name) for name in names]
-    return sentence_of(verdict, causes, BEFORE, AFTER, left or _left(0.034), STANDARD)
+    return names_in(causes, unnamed)
+
+
+def _said(
+    verdict: Any, *names: str, left: Any = None, elsewhere: float = 0.0, unproven: float = 0.0,
+    baseline: Errors = BEFORE, best: Errors = AFTER, worse: bool = False, withheld: bool = False,
+) -> str:  # fmt: skip
+    rest = not_explained_of(left or _left(0.034), elsewhere, unproven, STANDARD)
+    return sentence_of(verdict, _named(*names), baseline, best, rest, STANDARD, worse=worse, withheld=withheld)
+
+
+def test_effects_without_a_name_are_counted_behind_the_causes() -> None:
+    assert _named() == ""
+    assert _named("linear_leak") == "linear leak"
+    assert _named("dead_band", "delay") == "dead band and delay"
+    assert _named("dead_band", "delay", "rate_gain") == "dead band, delay and rate gain"
+    assert _named(unnamed=1) == "1 effect without a name"
+    assert _named(unnamed=2) == "2 effects without a name"
+    assert _named("linear_leak", unnamed=1) == "linear leak and 1 effect without a name"
+    assert _named("dead_band", "delay", unnamed=2) == "dead band, delay and 2 effects without a name"
+
+
+def test_what_is_not_explained_is_the_larger_of_what_is_left_and_what_is_off_elsewhere() -> None:
+    for elsewhere in (0.0, 0.02, 0.034):
+        for unproven in (0.0, 0.034):
+            said = not_explained_of(_left(0.034), elsewhere, unproven, STANDARD)
+            assert said == "over all recordings 3.4 % repeats and is not explained"
+    nothing = _left(0.5, significant=False)
+    for left in (_left(0.034), nothing):
+        for unproven in (0.0, 0.19):
+            said = not_explained_of(left, 0.19, unproven, STANDARD)
+            assert said == "of held-out data 19 % is not explained"
+        for elsewhere in (0.0, 0.19):
+            said = not_explained_of(left, elsewhere, 0.2, STANDARD)
+            assert said == "20 % is left, of which nothing shows that it is noise"
+    slow = not_explained_of(_left(0.034, how="changes slowly"), 0.0, 0.0, STANDARD)
+    assert slow == "over all recordings 3.4 % changes slowly and is not explained"
+    assert not_explained_of(_left(STANDARD.material), 0.0, 0.0, STANDARD) is None
+    assert not_explained_of(_left(1.001 * STANDARD.material), 0.0, 0.0, STANDARD) is not None
+    assert not_explained_of(nothing, 0.0, 0.0, STANDARD) is None
 
 
 def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
@@ -140,18 +180,39 @@ def test_a_verdicts_sentence_has_its_numbers_in_percent() -> None:
     assert _said("explained", "linear_leak") == f"{good}, with linear leak to 10 %"
     assert _said("explained", "dead_band", "delay").endswith("with dead band and delay to 10 %")
     assert _said("explained", "dead_band", "delay", "rate_gain").endswith("with dead band, delay and rate gain to 10 %")
-    rest = "3.4 % repeats and is not explained"
+    rest = "over all recordings 3.4 % repeats and is not explained"
     assert _said("partly_explained", "delay") == f"{good}, with delay to 10 %; {rest}"
     unsure = "the extended model is good to 10 %, by effects of which none is sure"
     assert _said("unexplained") == f"{good}; {rest}: {unsure}"
-    alone = sentence_of("unexplained", [], BEFORE, BEFORE, _left(0.034), STANDARD)
-    assert alone == f"{good}; {rest}, and no effect of the catalogue accounts for it"
-    elsewhere = sentence_of("unexplained", [], BEFORE, BEFORE, _left(0.034), STANDARD, elsewhere=0.19)
-    assert f"{good}; of what is held out 19 % is not explained, and" in elsewhere
+    no_effect = "and no effect of the catalogue accounts for it"
+    assert _said("unexplained", best=BEFORE) == f"{good}; {rest}, {no_effect}"
+    elsewhere = "of held-out data 19 % is not explained"
+    assert _said("unexplained", best=BEFORE, elsewhere=0.19) == f"{good}; {elsewhere}, {no_effect}"
+    no_cause = "and no cause can be named from this data (see its limits)"
+    unproven = "3.9 % is left, of which nothing shows that it is noise"
+    said = _said("unexplained", best=BEFORE, unproven=0.039, withheld=True)
+    assert said == f"{good}; {unproven}, {no_cause}"
+    assert _said("unexplained", best=BEFORE, withheld=True) == f"{good}; {rest}, {no_cause}"
+    assert _said("unexplained", withheld=True) == f"{good}; {rest}: {unsure}"
     assert _said("adequate") == f"{good}; {rest}"
     for quiet in (_left(STANDARD.material), _left(0.5, significant=False)):
         assert _said("adequate", left=quiet) == good
-    assert "0 % repeats" in _said("unexplained", left=_left(0.5, significant=False))
+        assert _said("unexplained", left=quiet) == f"{good}: {unsure}"
+        assert _said("unexplained", left=quiet, best=BEFORE, withheld=True) == f"{good}, {no_cause}"
+        assert _said("partly_explained", "delay", left=quiet) == f"{good}, with delay to 10 %"
+
+
+def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged() -> None:
+    good = "the baseline simulation is good to 10 % of full scale on data it was not fitted to"
+    rest = "over all recordings 3.4 % repeats and is not explained"
+    worse = f"{good}; with delay it is worse there, good to 20 %"
+    assert _said("partly_explained", "delay", baseline=AFTER, best=BEFORE, worse=True) == f"{worse}; {rest}"
+    nothing = Errors(np.zeros(0), np.zeros(0), math.nan)
+    unknown = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
+    explained = f"{unknown}; what is fitted is explained by delay"
+    assert _said("explained", "delay", baseline=nothing, best=nothing) == explained
+    assert _said("partly_explained", "delay", baseline=nothing, best=nothing) == f"{explained}; {rest}"
+    assert _said("adequate", baseline=nothing, best=nothing) == f"{unknown}; {rest}"
 
 
 def test_what_was_taken_out_again_is_said_once() -> None:
@@ -159,9 +220,16 @@ def test_what_was_taken_out_again_is_said_once() -> None:
     assert refusals_of(found) == []
     found.refused = ("linear_leak", "delay", "linear_leak")
     (said,) = refusals_of(found)
-    assert said.endswith(": linear leak, delay")
+    assert said == (
+        "tried and taken out again, since they predict fitted recordings that are left out in turn worse: linear leak,"
+        " delay"
+    )
     found.undone = ("rate_gain", "delay")
-    assert refusals_of(found) == ["undo one another, so that none of them is named: rate gain, delay", said]
+    undone = "these effects largely cancel one another, so that none is named: rate gain, delay"
+    assert refusals_of(found) == [undone, said]
+    found.undone, found.refused = (), ("flexible_lag", "linear_leak")
+    (said,) = refusals_of(found)
+    assert said.endswith(" worse: lag of free form, linear leak")
     found.can_validate = False
     (said,) = refusals_of(found)
     assert "no cause can be told" in said
@@ -236,13 +304,19 @@ def _told(
 def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monkeypatch: pytest.MonkeyPatch) -> None:
     exposed = effect("linear_leak").exposed_by
     cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 7.0), ("delay", 60.0)))
-    assert [(one.effect, one.margin) for one in cause.rivals] == [("orifice_leak", 7.0), ("delay", 60.0)]
+    assert cause.rivals == (Rival("orifice_leak", 7.0, "fit"), Rival("delay", 60.0, "fit"))
     fall, size, gained, rival = cause.evidence
     assert (fall.value, fall.threshold) == (55.0, 0.0)
-    assert "less likely by 55 of -2 log" in fall.says
+    assert fall.says == (
+        "without it, all else fitted anew, the data is less likely by 55 of -2 log evidence, though the other effects"
+        " may bend to make up for it"
+    )
     assert (size.value, gained.value) == (pytest.approx(1.23), pytest.approx(50.0))
     assert (rival.value, rival.threshold) == (7.0, 0.0)
-    assert rival.says == "orifice leak in its place is worse by 7"
+    assert rival.says == "orifice leak, the nearest other, is less likely by 7 (fit)"
+    cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 95.0),))  # of another kind there is the evidence alone
+    assert cause.rivals == (Rival("delay", 90.0, "evidence"), Rival("orifice_leak", 95.0, "fit"))
+    assert cause.evidence[-1].says == "delay, the nearest other, is less likely by 90 (evidence)"
 
 
 def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,29 +324,36 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     assert exposed
     lacking = _told(monkeypatch, frozenset(), kind_only=True).evidence[-1]
     assert (lacking.value, lacking.threshold) == (len(exposed), 0.0)
-    assert lacking.says == "the data holds no " + ", no ".join(sorted(one.replace("_", " ") for one in exposed))
+    assert lacking.says == (
+        "what would show it best is missing: loads held for some seconds, at several levels; rests without load"
+        " between loads"
+    )
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 1.0, 1.0)
+    assert kind.says == "the kind is sure, the law is not: no equation of it fits better than others"
     kind = _told(monkeypatch, exposed, kind_only=True, kind=0.5).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.0, 1.0)
-    assert "a kind that the catalogue does not have" in kind.says
+    assert kind.says == "no equation of its kind fits: it may be of a kind that the catalogue does not have"
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
-    assert "not sure" in doubt.says
-    assert "named for its size" in doubt.says
+    named = "it is not sure, since other effects fit nearly as well; it is named because"
+    size = f"{named} it is larger than all that is left, or than what small imperfections add up to"
+    assert doubt.says == size
     for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another
         doubt = _told(monkeypatch, exposed, is_sure=False, alone=effect(alone)).evidence[-1]
-        assert ("by itself it foresees best" in doubt.says) is is_why
-        assert ("named for its size" in doubt.says) is not is_why
+        assert doubt.says == (f"{named} by itself it predicts best what is left out" if is_why else size)
 
 
 def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
     by = SimpleNamespace(fit="the law's", margin=10.0)
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", 25.0),), by=by)
-    assert [(one.effect, one.margin) for one in cause.rivals] == [("orifice_leak", 15.0), ("delay", 90.0)]
+    assert cause.rivals == (Rival("orifice_leak", 15.0, "fit"), Rival("delay", 90.0, "evidence"))
     told = cause.evidence[-1]
     assert (told.value, told.threshold) == (2.5, 100.0 * STANDARD.departure**2)
-    assert "the law misses 2.5 %" in told.says
+    assert told.says == (
+        "its equation misses 2.5 % of the effect, no more than equations do: the extended model keeps that as a free"
+        " form, the parameters are the equation's"
+    )
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._members import alternatives, begun_with, members_of
 from smartshoe.diagnosis._search import additions, allowed, search, step
-from smartshoe.diagnosis._validation import LeftOut, _folds, _in_standard_errors, apart, error_of, extrapolating
+from smartshoe.diagnosis._validation import LeftOut, _in_standard_errors, apart, error_of, extrapolating, folds_of
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -242,13 +242,13 @@ def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
 # -- folds ------------------------------------------------------------------------------------------------------------
 def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blocks() -> None:
     one, two, none = (session_of(WAVE, np.full(240, bool(k))) for k in (1, 1, 0))
-    folds = _folds([one, none, two])
+    folds = folds_of([one, none, two])
     assert [[fold.rest, [seen for seen, _ in fold.left_out]] for fold in folds] == [[[two], [one]], [[one], [two]]]
     assert folds[0].left_out[0][1].all()
     kept = np.ones(240, dtype=bool)
     kept[200:] = False
     single = session_of(WAVE, kept, np.repeat(np.arange(12), 20))
-    folds = _folds([single, none])
+    folds = folds_of([single, none])
     assert len(folds) == 6
     # Ten cycles are fitted: two each in four of the blocks, one in the others.
     left = [sorted(set(single.cycle[mask])) for fold in folds for _, mask in fold.left_out]
@@ -258,14 +258,14 @@ def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blo
         assert seen is single  # whose offset is its own, as that of a recording that is left out
         assert not (rest.fitted & mask).any()
         assert (rest.fitted | mask).sum() == 200
-    assert len(_folds([session_of(WAVE, None, np.repeat(np.arange(3), 80))])) == 3
-    assert _folds([session_of(WAVE)]) == []
+    assert len(folds_of([session_of(WAVE, None, np.repeat(np.arange(3), 80))])) == 3
+    assert folds_of([session_of(WAVE)]) == []
 
 
 @pytest.mark.parametrize(("count", "largest", "folds"), [(12, 1, 12), (13, 3, 6), (40, 7, 6)])
 def test_more_than_twelve_recordings_are_left_out_in_six_groups(count: int, largest: int, folds: int) -> None:
     sessions = [session_of(WAVE) for _ in range(count)]
-    found = _folds(sessions)
+    found = folds_of(sessions)
     groups = [[sessions.index(seen) for seen, _ in fold.left_out] for fold in found]
     assert (len(groups), max(map(len, groups))) == (folds, largest)
     assert sorted(k for group in groups for k in group) == list(range(count))  # each once, and nothing else

@@ -137,7 +137,7 @@ def test_a_fit_that_comes_upon_a_known_way_ends_where_that_did(
     monkeypatch: pytest.MonkeyPatch, names: str, apart: float, joins: bool
 ) -> None:
     """The same effects that read alike: what follows of one follows of the other."""
-    alike = STANDARD.alike * STANDARD.material
+    alike = STANDARD.alike * STANDARD.imperfection
     monkeypatch.setattr(_State, "thresholds", STANDARD)
     known = _State("abc", "abc", 0.0, (_model("x"), _model(names)))
     end, fits = _ends(monkeypatch, _State("", "ab", 500.0), [_State("ab", "ab", 0.0)], known, apart * alike)
@@ -177,7 +177,7 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
     state: Any = SimpleNamespace(
         thresholds=STANDARD, likelihood=lambda sessions: likelihood, evidence=SimpleNamespace(odds=10.0), fit=old
     )
-    bound = STANDARD.alike * STANDARD.material
+    bound = STANDARD.alike * STANDARD.imperfection
     for by, told in ((0.999, near), (1.0, far), (1.001, far)):
         monkeypatch.setattr(_settling, "apart", lambda *given, by=by: by * bound)
         assert _settling._is_simpler(new, state, []) is told

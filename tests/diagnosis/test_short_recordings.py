@@ -65,4 +65,4 @@ def test_where_a_residual_is_largest_is_told_of_as_many_stretches_as_there_are_s
     one: Any = SimpleNamespace(
         conditions=Conditions(np.arange(count) * 1.0, load, 1.0), usable=np.ones(count, dtype=bool), recording=run
     )
-    assert where([one], [load + 0.1], STANDARD).endswith(f"it is largest in short, {stretch}")
+    assert where([one], [load + 0.1], STANDARD).endswith(f"; the worst stretch is short, {stretch}")

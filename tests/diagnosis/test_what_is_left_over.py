@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._force import ForceError, force_error, force_of, undoes
+from smartshoe.diagnosis._force import ForceError, force_error, force_of, not_undone_of, undoes
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
@@ -145,7 +145,7 @@ def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
         assert undoes(extended, plain) is is_run
         said = force_of(plain, extended, STANDARD)
         assert (said is None) is is_run
-        assert is_run or "its twin has the effects" in str(said)
+        assert is_run or "compensates by the baseline, and its twin simulates with the effects" in str(said)
 
 
 @pytest.mark.parametrize(("held_out_n", "is_said"), [(9.1, False), (9.3, True), (np.nan, False)])
@@ -154,7 +154,17 @@ def test_a_force_that_is_worse_on_what_is_held_out_alone_is_said_and_decides_not
 ) -> None:
     extended = ForceError(8.9, held_out_n)
     assert undoes(extended, ForceError(9.0, 9.0))
-    assert ("compensate by the plain model" in str(force_of(ForceError(9.0, 9.0), extended, STANDARD))) is is_said
+    assert (": compensate by the baseline" in str(force_of(ForceError(9.0, 9.0), extended, STANDARD))) is is_said
+
+
+def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
+    late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
+    (said,) = not_undone_of(late, 0.02)
+    late_by = "no compensator takes off the delay, since undoing it takes readings that have not come yet"
+    assert said.startswith(late_by)
+    (said,) = not_undone_of(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
+    assert said.startswith("no compensator takes off the clock drift, since ")
+    assert not_undone_of(late.without("delay"), 0.02) == []
 
 
 def test_an_effect_that_is_far_larger_in_what_was_not_fitted_is_beyond_knowledge(one: Session) -> None:
@@ -293,7 +303,7 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
         return ResidualStructure(repeats_, slow_, memory, "", 0.0035)
 
     assert (left(repeated, wandering).rms, left(repeated, wandering).how) == (0.003, "repeats")
-    assert (left(wandering, repeated).rms, left(wandering, repeated).how) == (0.003, "wanders")
+    assert (left(wandering, repeated).rms, left(wandering, repeated).how) == (0.003, "changes slowly")
     assert (left(quiet, quiet).rms, left(quiet, quiet).significant) == (0.0, False)
     # Noise with a memory is no structure; what has a memory and is no noise is, though no larger than all there is.
     noise, other = _memory(), _memory(coloured=9.0)
@@ -312,8 +322,8 @@ def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Se
     late = at.time_s > 0.9 * at.time_s[-1]
     residuals[2] = 0.01 * rising + 0.05 * (rising & late)
     said = where(sessions, residuals, STANDARD)
-    assert "at 50-75 % of the load while loading" in said
-    assert f"largest in {sessions[2].recording.name}" in said
+    assert "at 50-75 % of full load while loading" in said
+    assert f"; the worst stretch is {sessions[2].recording.name}, " in said
     begin, end = map(float, re.findall(r"(\d+)-(\d+) s$", said)[0])
     assert (begin, end) == (pytest.approx(0.9 * at.time_s[-1], abs=1.0), pytest.approx(at.time_s[-1], abs=1.0))
     share, samples = float(re.findall(r"^(\d+) %", said)[0]), float(re.findall(r"\((\d+) % of the samples\)", said)[0])
@@ -323,9 +333,9 @@ def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Se
     here = (loads >= 0.5) & (loads < 0.75) & (rates > STANDARD.still_per_s)
     assert samples == pytest.approx(100.0 * float(np.mean(here)), abs=1.0)
     held = [1.0 * (s.conditions.load < 0.1) * (np.abs(s.conditions.rate_per_s) < 1e-3) for s in sessions]
-    assert "at 0-25 % of the load while the load is held" in where(sessions, held, STANDARD)
+    assert "at 0-25 % of full load while the load is held" in where(sessions, held, STANDARD)
     falling = [1.0 * (s.conditions.load > 0.8) * (s.conditions.rate_per_s < -0.05) for s in sessions]
-    assert "at 75-100 % of the load while unloading" in where(sessions, falling, STANDARD)
+    assert "at 75-100 % of full load while unloading" in where(sessions, falling, STANDARD)
 
 
 def test_the_slow_part_is_as_large_whatever_the_rate_of_the_log() -> None:
@@ -342,7 +352,7 @@ def test_the_slow_part_is_as_large_whatever_the_rate_of_the_log() -> None:
     sessions, _ = sessions_of(coarse, fine)
     assert sessions[1].conditions.step_s < 0.3 * sessions[0].conditions.step_s
     residuals = [np.full(one.reading.size, size) for one, size in zip(sessions, (0.02, 0.01), strict=True)]
-    assert f"largest in {coarse.name}" in where(sessions, residuals, STANDARD)
+    assert f"; the worst stretch is {coarse.name}, " in where(sessions, residuals, STANDARD)
 
 
 # -- which noise ------------------------------------------------------------------------------------------------------

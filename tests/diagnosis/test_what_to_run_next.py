@@ -19,6 +19,7 @@ from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._next_experiment import _channel, _in_place_of, _unseen
 from smartshoe.diagnosis._ranges import ranges_of
 from smartshoe.models.effects import effect
+from smartshoe.models.effects.exposure import SAYS, Exposure
 
 Array = NDArray[np.float64]
 
@@ -98,11 +99,11 @@ def test_what_is_lacking_is_said_and_nothing_else() -> None:
 
 def test_loads_that_grow_with_the_clock_are_told_unless_it_begins_anew_with_each() -> None:
     growing = _course((2.0, 0.0), *_heights(0.25, 0.5, 0.75, 1.0))
-    assert any("with the clock" in limit for limit in _shown(growing).limits())
+    assert any("grow, or fall, with time" in limit for limit in _shown(growing).limits())
     apart = [_course((2.0, 0.0), *_heights(*[peak] * 3)) for peak in (0.25, 0.5, 1.0)]
     each = excitation_of(prepared(*(pressed(load) for load in apart))[0], STANDARD)
     assert "peaks" in each.present
-    assert not any("with the clock" in limit for limit in each.limits())
+    assert not any("grow, or fall, with time" in limit for limit in each.limits())
 
 
 # -- narrow ranges ------------------------------------------------------------------------------------------------
@@ -144,13 +145,15 @@ def _lacking(*words: str) -> Excitation:
         ("steps", "steps"),
     ],
 )
-def test_what_was_never_shown_is_run_next(word: str, protocol: str) -> None:
+def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None:
     found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
     told = _unseen(found, (), _lacking(word))
     assert told.protocol == protocol
     assert told.steps is not None
     assert (told.steps.name, told.steps.peak_load_n) == (protocol, pytest.approx(800.0, rel=0.06))
-    assert f"holds no {word.replace('_', ' ')}" in told.says
+    assert told.says == (
+        f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
+    )
     assert _unseen(found, (), _lacking()).protocol == "repeat"
     # It shows what it is run for.
     step_s = 0.01 if word == "steps" else STEP_S

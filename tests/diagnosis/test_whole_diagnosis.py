@@ -18,7 +18,15 @@ from smartshoe.diagnosis._lack_of_fit import LackOfFit
 from smartshoe.diagnosis._procedure import _outside, _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import full_scale, prepare
-from smartshoe.diagnosis._verdict import off_elsewhere, sentence_of, verdict_of
+from smartshoe.diagnosis._verdict import (
+    left_where_judged,
+    names_in,
+    not_explained_of,
+    not_shown_to_be_noise,
+    off_elsewhere,
+    sentence_of,
+    verdict_of,
+)
 from smartshoe.diagnosis._zero import Zero, offsets, shift_of
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.models.effects import Conditions, effect
@@ -75,8 +83,8 @@ def test_what_is_being_done_is_said_on_the_way(found: Diagnosis, told: list[str]
     assert told[0] == "fitting the baseline"
     assert told[-1] == "judging on held-out data"
     assert "weighing alternatives" in told
-    assert any("flexible curve" in one for one in told if one.startswith("fitting "))
-    assert "trying laws in the place of flexible curve" in told
+    assert any("curve of free form" in one for one in told if one.startswith("fitting "))
+    assert "trying laws in the place of curve of free form" in told
 
 
 def test_parameters_are_in_newtons_and_millibars_within_their_intervals(found: Diagnosis) -> None:
@@ -246,13 +254,14 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
 
     def said(causes: Any, left: float) -> tuple[str, str]:
         verdict = verdict_of(causes, _left(large if causes else left), _left(left), limits)
-        return verdict, sentence_of(verdict, causes, before, after, _left(left), limits)
+        rest = not_explained_of(_left(left), 0.0, 0.0, limits)
+        return verdict, sentence_of(verdict, names_in(causes, 0), before, after, rest, limits)
 
     good = "the baseline simulation is good to 2 % of full scale on data it was not fitted to"
     assert said([], small) == ("adequate", good)
     assert said(causes, small) == ("explained", f"{good}, with dead band, delay and zero offset to 1 %")
     assert said(causes[:1], small)[1] == f"{good}, with dead band to 1 %"
-    rest = f"{100 * large:.2g} % repeats and is not explained"
+    rest = f"over all recordings {100 * large:.2g} % repeats and is not explained"
     assert said([], large) == (
         "unexplained", f"{good}; {rest}: the extended model is good to 1 %, by effects of which none is sure"
     )  # fmt: skip
@@ -263,7 +272,10 @@ def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     assert verdict_of(causes[:1], _left(large), _left(usual), limits) == "explained"
     assert verdict_of(causes[:1], _left(large), _left(usual), limits, follows=False) == "partly_explained"
     between = 0.5 * (limits.material + limits.tolerable)
-    assert said([], between) == ("adequate", f"{good}; {100 * between:.2g} % repeats and is not explained")
+    assert said([], between) == (
+        "adequate",
+        f"{good}; over all recordings {100 * between:.2g} % repeats and is not explained",
+    )
 
 
 def test_what_is_left_is_measured_by_what_was_wrong_before() -> None:
@@ -343,7 +355,7 @@ def test_another_unit_held_out_leaves_nothing_good_enough(runs: list[Recording],
     again = diagnose(runs[:2], hold_out=other)
     assert [one.name for one in again.causes] == [one.name for one in found.causes]
     assert (found.verdict, again.verdict) == ("explained", "partly_explained")
-    (said,) = [limit for limit in again.limits if limit.startswith("what is held out is off by")]
+    (said,) = [limit for limit in again.limits if limit.startswith("held-out recordings are off by")]
     assert "another unit" in said
     share = float(np.std(0.3 * runs[2].sensor.values) / FULL_MBAR)
     assert again.extended is not None
@@ -369,3 +381,26 @@ def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() ->
         assert told == pytest.approx(off, rel=0.05)
     assert off_elsewhere([fitted], [wave], 0.0, limits) == 0.0  # every recording is fitted in part
     assert off_elsewhere([fitted, apart], [wave, 0.05 * noise], 0.0, limits) == 0.0
+
+
+def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_than_tolerable() -> None:
+    limits, count = Thresholds(), 2000
+    time_s = STEP_S * np.arange(count)
+    run = Recording.from_arrays(time_s=time_s, force_n=100.0 + time_s, pressure_mbar=10.0 + time_s, name="r")
+    usable = np.ones(count, dtype=bool)
+    scale = full_scale([run], [usable], limits)
+    sessions = prepare([run, run], [usable, usable], [False, True], scale, 1, limits)
+    wave = np.sqrt(2.0) * np.sin(time_s)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal((2, count))
+    untested, tested = _left(0.0), SimpleNamespace(is_noise=True)
+    for size, left in ((0.9 * limits.tolerable, 0.0), (1.1 * limits.tolerable, 1.1 * limits.tolerable)):
+        residuals = [size * wave + one for one in noise]  # of what was fitted and of what was not
+        assert not_shown_to_be_noise(sessions, residuals, untested, limits) == pytest.approx(left, rel=0.1)
+        assert not_shown_to_be_noise(sessions, residuals, tested, limits) == 0.0  # type: ignore[arg-type]
+    elsewhere = [noise[0], 0.02 * wave + noise[1]]
+    half = not_shown_to_be_noise(sessions, elsewhere, untested, limits)
+    assert half == pytest.approx(0.02 / np.sqrt(2.0), rel=0.05)
+    # The most that a better model could do away with is what is left of it where it is judged.
+    assert left_where_judged(sessions, elsewhere, limits) == pytest.approx(0.02, rel=0.02)
+    assert left_where_judged(sessions, elsewhere[::-1], limits) < 3e-4
+    assert left_where_judged(sessions[:1], elsewhere[1:], limits) == 0.0  # nothing of it is held out

@@ -86,7 +86,7 @@ def _session(load: Array, fitted: Any = None) -> Any:
     return SimpleNamespace(
         conditions=Conditions(0.1 * np.arange(load.size), load, 0.1), fitted=kept, reading=0.0 * load,
         resting=np.abs(load) < 0.02, recording=SimpleNamespace(command_n=None), thinned=1,
-        own_gain_sd=0.0, gain_parts=(), zero_changes=(),
+        own_gain_sd=0.0, gain_parts=(), zero_changes=(), gap_ends=(),
     )  # fmt: skip
 
 

@@ -40,7 +40,7 @@ def test_an_extension_that_is_worse_on_faster_loads_says_so(faster: float) -> No
     found = diagnose(fitted, [held_out])
     assert "rate_gain" in {cause.name for cause in found.causes}
     assert found.gain is not None
-    worse = [said for said in found.limits if "worse than the plain one" in said]
+    worse = [said for said in found.limits if "worse than the baseline" in said]
     if faster == 1.0:
         assert found.verdict == "explained"
         assert found.gain.ci95[0] > 0.0

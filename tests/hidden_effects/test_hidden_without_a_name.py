@@ -77,7 +77,7 @@ def test_zeros_that_jump_are_told_with_their_moments_and_nothing_is_sure_beside_
     case = within_reach(effects, PLAIN[seed % len(PLAIN)], seed, recordings=2)
     fitted = [_jumped(one, jumps) for one, jumps in zip(case.recordings, JUMPS, strict=False)]
     found = diagnose(fitted, [_jumped(one, jumps) for one, jumps in zip(case.hold_out, JUMPS[2:], strict=False)])
-    (said,) = [one for one in found.limits if one.startswith("the zero changes")]
+    (said,) = [one for one in found.limits if one.startswith("the zero jumps")]
     told = [(name, float(at)) for at, name in re.findall(r"at ([0-9.]+) s in (\w+)", said)]
     for one, jumps in zip(fitted, JUMPS, strict=False):
         for at, _ in jumps:
@@ -97,7 +97,7 @@ def test_jumps_of_a_single_recording_are_told_but_for_the_cycle_that_is_held_out
 ) -> None:
     one = within_reach(effects, PLAIN[seed % len(PLAIN)], seed, recordings=2).recordings[0]
     found = diagnose(_jumped(one, jumps) if jumps else one)
-    said = " ".join(one for one in found.limits if one.startswith("the zero changes"))
+    said = " ".join(one for one in found.limits if one.startswith("the zero jumps"))
     told = [(float(at) - one.time_s[0]) / np.ptp(one.time_s) for at in re.findall(r"at ([0-9.]+) s in", said)]
     assert bool(told) is bool(jumps)
     for at, _ in jumps:

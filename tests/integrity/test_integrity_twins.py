@@ -21,16 +21,17 @@ def _run(name: str, seed: int = 1, lost: int | None = None) -> Recording:
 
 
 def test_copies_are_told_once_each_by_the_first_that_holds_the_same() -> None:
-    assert twins([_run("one"), _run("other", 2), _run("copy"), _run("again")]) == tuple(
-        f"{name} holds the same samples as one: they are one experiment, and neither confirms the other"
-        for name in ("copy", "again")
-    )
-    assert len(twins([_run("one", lost=7), _run("copy", lost=7)])) == 1
+    """By their places."""
+    assert twins([_run("one"), _run("other", 2), _run("copy"), _run("again")]) == {
+        place: f"{name} holds the same samples as one: it is one experiment, given twice"
+        for place, name in ((2, "copy"), (3, "again"))
+    }
+    assert list(twins([_run("one", lost=7), _run("copy", lost=7)])) == [1]
 
 
 def test_the_same_course_measured_again_is_another_experiment() -> None:
-    assert twins([]) == ()
-    assert twins([_run("one"), _run("again", 2), _run("one", lost=7), _run("one").taken(slice(0, 500))]) == ()
+    assert twins([]) == {}
+    assert twins([_run("one"), _run("again", 2), _run("one", lost=7), _run("one").taken(slice(0, 500))]) == {}
     one = _run("one")
-    assert twins([one, one.without("pressure")]) == ()
-    assert twins([one, one.with_channel(replace(one["force"], values=1.001 * LOAD_N))]) == ()
+    assert twins([one, one.without("pressure")]) == {}
+    assert twins([one, one.with_channel(replace(one["force"], values=1.001 * LOAD_N))]) == {}

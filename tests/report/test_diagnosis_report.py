@@ -29,13 +29,18 @@ from smartshoe.report.diagnosis._page import write_diagnosis_page
 from smartshoe.report.diagnosis._protocol_file import protocol_text
 from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
+    comparison,
     gain_sentence,
     interval,
+    is_free_form,
     listed,
     parameter_text,
     shares,
+    shares_text,
     sure,
     two_numbers,
+    unnamed,
+    why_this_one,
 )
 from smartshoe.report.diagnosis.grids import ranked
 from smartshoe.report.diagnosis.terminal import print_diagnosis
@@ -43,6 +48,7 @@ from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_a
 
 NAME = '<script>alert("1")</script> & $x$'
 FULL_LOAD_N, FULL_READING, STEP_S = 800.0, 70.0, 0.02
+NONE_AS_A_WORD = ("None of the usual ones: several rates",)
 CASES = ("adequate", "one cause", "two causes", "partly_explained", "unexplained", "refused")
 BASELINE = ExtendedModel(1.0, 0.12, 0.2, FULL_LOAD_N, FULL_READING, "mbar")
 
@@ -121,7 +127,11 @@ PLAY_CAUSE = Cause(
     (Statement("fall", 321.0, 30.0, "without it the fit is worse by 321 where 30 would do"),),
     Gain(0.33, 0.31, "mbar", 6.1, (2.0, 9.0)),
     0.004,
-    (Rival("bouc_wen_hysteresis", 1.7), Rival("dead_band", 45.0)),
+    (Rival("bouc_wen_hysteresis", 1.7, "fit"), Rival("dead_band", 45.0)),
+)
+RUN_NEXT = (
+    "run the protocol minor loops: it should tell play hysteresis and bouc wen hysteresis apart, which this data does"
+    " not"
 )
 LOOPS = Protocol("minor_loops", (Segment("ramp", 400.0, 4.0), Segment("ramp", 200.0, 2.0), Segment("ramp", 0.0, 2.0)))
 FAULTS = (
@@ -149,7 +159,7 @@ def case(name: str) -> Diagnosis:
     }[name]()
     judged = traces[-1]
     causes = {"one cause": (LEAK_CAUSE,), "two causes": (LEAK_CAUSE, PLAY_CAUSE), "partly_explained": (LEAK_CAUSE,)}
-    left = "70 % of it sits at 50-75 % of the load while unloading"
+    left = "70 % of the power that is left lies at 50-75 % of full load while unloading"
     made = Diagnosis(
         "explained" if "cause" in name else name,  # type: ignore[arg-type]
         f"the verdict on {name}",
@@ -173,10 +183,8 @@ def case(name: str) -> Diagnosis:
     )
     if name != "two causes":
         return made
-    following = NextExperiment(
-        ("play_hysteresis", "bouc_wen_hysteresis"), "minor_loops", None, "run minor loops", 35.2, LOOPS
-    )
-    return replace(made, next_experiment=following)
+    pair = ("play_hysteresis", "bouc_wen_hysteresis")
+    return replace(made, next_experiment=NextExperiment(pair, "minor_loops", None, RUN_NEXT, 35.2, LOOPS))
 
 
 @cache
@@ -207,7 +215,10 @@ def test_every_page_is_whole_and_says_no_number_that_is_none(name: str) -> None:
     assert not re.search(r'(?:src|href)="https?:', html)
     assert "<svg" not in html  # figures are numbers, not pictures
     text = plain_text(html)
-    assert not re.search(r"\b(nan|inf|None|True|False)\b", text)
+    numbers = text
+    for said in NONE_AS_A_WORD:
+        numbers = numbers.replace(said, "")
+    assert not re.search(r"\b(nan|inf|None|True|False)\b", numbers)
     assert HEADINGS[case(name).verdict] in text
     assert case(name).says[1:] in text
 
@@ -231,7 +242,11 @@ def test_the_size_comes_before_the_judgement(name: str) -> None:
 
 def test_likelihood_thresholds_and_limits_are_folded_and_the_thresholds_whole() -> None:
     html = page("two causes")
-    for said in ("is told in −2 log likelihood", "load cells: 0.02 % of rating", "An error of the sensor's gain alone"):
+    for said in (
+        "is told in −2 log likelihood",
+        "load cells: 0.02 % of rating",
+        "A wrong calibration of the sensor itself",
+    ):
         before = html[: html.index(said)]
         assert before.count("<details") > before.count("</details>"), said
     assert html.count("<summary>Every number that decides") == 1
@@ -291,10 +306,79 @@ def test_a_cause_is_told_with_interval_gain_evidence_and_what_else_it_could_be()
     assert "9.60 [8.82, 10.38] N" in text
     assert "0.800 mbar without it and 0.310 mbar with it: it falls by 61 % [55, 66]" in text
     assert "Without it the fit is worse by 321 where 30 would do." in text
-    assert "This data cannot tell it from bouc wen hysteresis" in text
+    assert (
+        "Bouc wen hysteresis cannot be ruled out, since no equation is exact: take the name as one of 2. Family:"
+        in text
+    )
     assert effect("bouc_wen_hysteresis").says in text
-    assert "the nearest, zero drift, fits worse by 88" in text
-    assert "not named, too small, unsure, undone by others or at a bound: sensor lag" in text
+    assert (
+        "No other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88 (−2 log, by"
+        " evidence). Family:" in text
+    )
+    assert "In the extended model without being causes, too small or too unsure for a name: sensor lag." in text
+    for heading in ("cannot be ruled out", "came near, and is ruled out"):
+        assert f"{heading} less likely by, −2 log what it would be what tells the two apart" in text
+    assert "bouc wen hysteresis 1.7 (fit) " in text
+    assert "dead band 45 (evidence) " in text
+    assert "zero drift 88 (evidence) " in text
+    assert "of full scale: error of the extended model" in text
+    assert "free form" not in text
+
+
+def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weighed_by() -> None:
+    text = "no other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88 (−2 log, by"
+    assert why_this_one(LEAK_CAUSE) == f"{text} evidence)"
+    assert why_this_one(replace(LEAK_CAUSE, rivals=(Rival("zero_drift", 88.0, "fit"),))) == f"{text} its fit)"
+    assert why_this_one(replace(LEAK_CAUSE, rivals=())) == "no other effect of the catalogue comes near"
+    several = replace(PLAY_CAUSE, equivalents=("bouc_wen_hysteresis", "dead_band"))
+    assert why_this_one(several) == (
+        "bouc wen hysteresis and dead band cannot be ruled out, since no equation is exact: take the name as one of 3"
+    )
+
+
+def test_effects_without_a_name_are_told_and_free_forms_as_such() -> None:
+    made = case("one cause")
+    assert unnamed(made) == ""
+    assert unnamed(replace(made, minor=("sensor_lag",))) == "sensor lag"
+    assert unnamed(replace(made, minor=("sensor_lag", "flexible_curve", "delay"))) == (
+        "curve of free form, delay and sensor lag"
+    )
+
+
+def test_what_was_added_is_told_with_what_has_no_name(tmp_path: Path) -> None:
+    one = case("one cause")
+    for minor, added, lowers in (
+        ((), "Added: linear leak.", "It lowers the error"),
+        (("flexible_lag",), "Added: linear leak; without a name: lag of free form.", "Together they lower the error"),
+    ):
+        made = replace(one, minor=minor)
+        text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
+        assert f"{added} {lowers} on data that was not fitted by 77.7 %" in text
+    assert "Added: linear leak, play hysteresis; without a name: sensor lag." in plain_text(page("two causes"))
+
+
+def test_a_free_form_is_told_as_such_with_its_own_parameters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The numbers of a block are no equation's; those of a law in the place of a block are."""
+    block = effect("flexible_lag")
+    numbers = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in block.parameters}
+    lag = effect("sensor_lag")
+    free = replace(LEAK_CAUSE, effect=lag, parameters=numbers, part=block.name)
+    own = {one.name: Parameter.from_sd(0.3, 0.01, one.unit) for one in lag.parameters}
+    assert is_free_form(free)
+    for part, values in ((block.name, own), (lag.name, own), (None, own), (block.name, {})):
+        assert not is_free_form(replace(free, part=part, parameters=values))
+    made = replace(case("one cause"), causes=(free,))
+    text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
+    assert "parameter of a free form, since no equation fits well enough value [95 % interval] what it is" in text
+    for one in block.parameters:
+        assert one.says in text
+    monkeypatch.setenv("COLUMNS", "240")
+    print_diagnosis(made)
+    said = capsys.readouterr().out
+    assert re.search(r"sensor lag\W+free form\W+no equation fits well enough", said)
+    assert "direction" not in said
 
 
 def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
@@ -304,29 +388,67 @@ def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
     assert made.extended is not None
     assert f"{made.baseline.rmse:.2f} mbar ({100 * made.baseline.rmse / FULL_READING:.1f} %)" in text
     assert f"{made.baseline.fit_percent:.2f} % {made.extended.fit_percent:.2f} %" in text
-    assert "error of the compensated force" in text
+    assert "error of the compensated force, rms" in text
+    assert "fit, 100 % for no error" in text
+    assert "structure beyond noise, over all recordings, fitted or not, rms (of full scale)" in text
     assert "explained: 90.5 %" in text
     assert "left: 1.5 %" in text
     assert "noise: 8.0 %" in text
-    assert "90.5 % is explained: 98 % of that" in text
+    assert "8 % of the error's variance is noise; of the rest 98 % is explained." in text
+
+
+def test_a_force_that_the_extended_model_gives_back_worse_is_the_baselines() -> None:
+    made = case("one cause")
+    (row,) = [one for one in comparison(made) if one.name.startswith("error of the compensated force")]
+    assert row.after.endswith(" N")
+    assert row.change.endswith(" %")
+    (row,) = [
+        one
+        for one in comparison(replace(made, force_model=BASELINE))
+        if one.name.startswith("error of the compensated")
+    ]
+    assert row.before.endswith(" N")
+    assert (row.after, row.change) == ("by the baseline, see the limits", "")
+
+
+@pytest.mark.parametrize(
+    ("explained", "explainable", "said"),
+    [
+        (0.2, 0.4, "Nearly all of the error's variance is noise, which no model explains."),
+        (0.4, 3.0, "97 % of the error's variance is noise; of the rest 13 % is explained."),
+        (0.0, 92.0, "8 % of the error's variance is noise; of the rest none is explained."),
+        (0.4, 92.0, "8 % of the error's variance is noise; of the rest none is explained."),
+        (0.5, 92.0, "8 % of the error's variance is noise; of the rest 1 % is explained."),
+        (99.0, 99.5, "Under 1 % of the error's variance is noise; of the rest over 99 % is explained."),
+        (92.0, 92.0, "8 % of the error's variance is noise; of the rest 100 % is explained."),
+    ],
+)
+def test_shares_are_said_of_what_is_no_noise(explained: float, explainable: float, said: str) -> None:
+    made = replace(case("refused"), explained_percent=explained, explainable_percent=explainable)
+    assert shares_text(made) == said
 
 
 def test_faults_left_over_and_the_next_experiment_are_told() -> None:
     text = plain_text(page("two causes"))
-    assert "Held samples, triangles_1, 5–5.6 s (2.0 % of the samples): a value repeats while the load moves." in text
-    assert "under 0.01 % of the samples" in text
-    assert "It tells play hysteresis and bouc wen hysteresis apart, with an expected margin of 35" in text
-    assert "x.toml" in text
-    assert "70 % of it sits at 50-75 % of the load while unloading." in plain_text(page("partly_explained"))
+    assert "Held samples, triangles_1, 5.0–5.6 s (2.0 % of the samples): a value repeats while the load moves." in text
+    assert "Spikes, triangles_2, 40.00 s (under 0.01 % of the samples): one sample stands alone. (Minor.)" in text
+    assert f"What to do next {RUN_NEXT[0].upper()}{RUN_NEXT[1:]}. The protocol is in x.toml : paste it into" in text
+    left = "70 % of the power that is left lies at 50-75 % of full load while unloading."
+    assert left in plain_text(page("partly_explained"))
     assert "no reference load: name it with --force" in plain_text(page("refused"))
 
 
 def test_nothing_is_named_where_nothing_was_found() -> None:
     for name in ("adequate", "unexplained"):
         text = plain_text(page(name))
-        assert " sure" not in text
+        assert " sure" not in text[: text.index("Every number that decides")]  # of which some say when a name is sure
         assert "Nothing that matters was added." in text
-    assert "none is named" in plain_text(page("unexplained"))
+        assert "No cause is named" in text
+        assert "Nearest candidates, by what each alone takes off −2 log likelihood: zero drift (88.0)." in text
+    why = "No cause may be named; the limits at the end of this page say why where the data is the reason."
+    assert why in plain_text(page("unexplained"))
+    matters = "No effect moves the reading by enough to matter, so none is named."
+    assert matters in plain_text(page("adequate"))
 
 
 def test_a_block_that_stands_for_a_cause_was_chosen() -> None:
@@ -400,7 +522,9 @@ def test_the_terminal_says_the_size_first_then_the_verdict_and_everything_after(
     if made.causes:
         assert "[0.001941, 0.002059] 1/s" in said
     if made.next_experiment:
-        assert "run minor loops" in said
+        assert RUN_NEXT in said
+    if made.minor:
+        assert "in the extended model without being causes, too small or too unsure for a name: sensor lag" in said
 
 
 def test_a_protocol_becomes_a_table_that_toml_reads_back() -> None:
@@ -477,6 +601,12 @@ def test_bins_of_a_constant_are_that_constant(x: list[float], level: float) -> N
 def test_a_gain_that_is_none_is_not_called_one() -> None:
     assert "it does not fall: −0.84 % [−2.2, 0.41]" in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
     assert parameter_text(Parameter(0.0, 0.0, (0.0, 0.0), "1/K")) == "held at 0 1/K"
+
+
+def test_a_parameter_at_the_end_of_its_range_is_told_as_such() -> None:
+    assert parameter_text(Parameter(50.0, 20.0, (0.5, 50.0), "s")) == "50 [0.5, 50] s, at its limit"
+    assert parameter_text(Parameter(0.5, 20.0, (0.5, 50.0), "1")) == "0.5 [0.5, 50], at its limit"
+    assert parameter_text(Parameter(20.0, 20.0, (0.5, 50.0), "s")) == "20 [0.5, 50] s"
 
 
 def test_words_for_numbers() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from smartshoe.diagnosis import Cause, Diagnosis, described
+from smartshoe.models.effects import effect
 from smartshoe.report.charts import Chart
 from smartshoe.report.diagnosis import _charts as charts
 from smartshoe.report.diagnosis import _sentences as sentences
@@ -29,6 +30,7 @@ class Card:
     sure: str
     gain: str
     parameters: Sequence[tuple[str, str, str]]
+    is_free_form: bool
     why: str
     equivalents: Sequence[sentences.Neighbour]
     rivals: Sequence[sentences.Neighbour]
@@ -56,10 +58,9 @@ def write_diagnosis_page(
         "shares": sentences.shares_text(diagnosis),
         "parts": _parts(diagnosis),
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
-        "minor": sentences.listed(sorted(diagnosis.minor), "and"),
+        "minor": sentences.unnamed(diagnosis),
         "bars": [(words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
         "likeness": grids.likeness(diagnosis),
-        "separates": sentences.listed(following.separates, "and") if following else "",
         "protocol_file": protocol_file,
         "next_load": charts.protocol(following.steps) if following and following.steps else None,
         "fault_lines": [sentence(sentences.fault_text(fault)) + (" (Minor.)" if fault.severity == "minor" else "")
@@ -123,7 +124,7 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         said.append(
             (
                 f"{plain(sentences.share_of_full_scale(diagnosis, after.rmse), 2)} %",
-                "of full scale: error with the causes added",
+                "of full scale: error of the extended model",
             )
         )
         part = sentences.shares(diagnosis)
@@ -141,7 +142,8 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 
 
 def _card(number: int, cause: Cause) -> Card:
-    says = {parameter.name: parameter.says for parameter in cause.effect.parameters}
+    valued = cause.effect if cause.part is None else effect(cause.part)  # of a free form, its own parameters
+    says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
     return Card(
         f"{number}. {words(cause.name).capitalize()}",
         cause,
@@ -151,6 +153,7 @@ def _card(number: int, cause: Cause) -> Card:
             (words(name), sentences.parameter_text(parameter), says.get(name, ""))
             for name, parameter in cause.parameters.items()
         ],
+        sentences.is_free_form(cause),
         sentence(sentences.why_this_one(cause)),
         sentences.neighbours(cause, cause.equivalents),
         sentences.other_rivals(cause),

@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects import catalogue, told_apart_by
+from smartshoe.models.effects import catalogue, effect, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
@@ -19,7 +19,7 @@ HEADINGS = {
     "adequate": "The simulation is good enough",
     "explained": "The simulation is wrong, and it is known why",
     "partly_explained": "The simulation is wrong, and part of it is explained",
-    "unexplained": "The simulation is wrong, and no known effect explains it",
+    "unexplained": "The simulation is wrong, and no cause can be named",
     "refused": "No diagnosis: this data does not allow one",
 }
 SUREST = 0.99
@@ -44,6 +44,18 @@ def how_sure(cause: Cause) -> str:
     said = f"{sure(cause.confidence)} sure"
     meant = listed(("this", *cause.equivalents))
     return f"{said} that it is {meant}, {sure(cause.law_confidence)} for this one" if cause.equivalents else said
+
+
+def unnamed(diagnosis: Diagnosis) -> str:
+    """The effects of the extended model that are no causes."""
+    known = [effect(name) for name in diagnosis.minor]
+    said = (f"{one.name.removeprefix('flexible_')}_of_free_form" if one.is_flexible else one.name for one in known)
+    return listed(sorted(said), "and")
+
+
+def is_free_form(cause: Cause) -> bool:
+    """Whether the numbers of a cause are those of a free form, since no equation of its kind fits well enough."""
+    return cause.part is not None and not {one.name for one in cause.effect.parameters}.issuperset(cause.parameters)
 
 
 def unit_of(symbol: str) -> str:
@@ -83,7 +95,8 @@ def parameter_text(parameter: Parameter) -> str:
     low, high = parameter.ci95
     if low == high:
         return f"held at {plain(parameter.value)}{unit_of(parameter.unit)}"
-    return interval(parameter.value, *parameter.ci95) + unit_of(parameter.unit)
+    at_a_limit = ", at its limit" if parameter.value in (low, high) else ""
+    return interval(parameter.value, low, high) + unit_of(parameter.unit) + at_a_limit
 
 
 def gain_text(gain: Gain) -> str:
@@ -151,20 +164,22 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
             of_scale(after, after.rmse),
             _change(before.rmse, after.rmse),
         ),
-        Row("fit", f"{before.fit_percent:.2f} %", f"{after.fit_percent:.2f} %", ""),
+        Row("fit, 100 % for no error", f"{before.fit_percent:.2f} %", f"{after.fit_percent:.2f} %", ""),
     ]
     if math.isfinite(before.force_rmse_n) and math.isfinite(after.force_rmse_n):
         rows.append(
             Row(
                 "error of the compensated force, rms",
                 f"{plain(before.force_rmse_n)} N",
-                f"{plain(after.force_rmse_n)} N",
-                _change(before.force_rmse_n, after.force_rmse_n),
+                f"{plain(after.force_rmse_n)} N"
+                if diagnosis.force_model is None
+                else "by the baseline, see the limits",
+                _change(before.force_rmse_n, after.force_rmse_n) if diagnosis.force_model is None else "",
             )
         )
     rows.append(
         Row(
-            "structure that is left in all recordings, rms (of full scale)",
+            "structure beyond noise, over all recordings, fitted or not, rms (of full scale)",
             of_scale(before, before.structure_rms) if before.structure_rms > 0 else NO_STRUCTURE,
             of_scale(after, after.structure_rms) if after.structure_rms > 0 else NO_STRUCTURE,
             _change(before.structure_rms, after.structure_rms),
@@ -192,7 +207,7 @@ class Neighbour:
 
 def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
     """What is known of the effects ``names`` beside ``cause``."""
-    margins = {rival.effect: rival.margin for rival in cause.rivals}
+    rivals = {rival.effect: rival for rival in cause.rivals}
     known = catalogue()
     found = []
     for name in names:
@@ -202,7 +217,7 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
             Neighbour(
                 words(name),
                 other.says if other else "",
-                plain(margins[name], 2) if name in margins else "–",
+                f"{plain(rivals[name].margin, 2)} ({rivals[name].by})" if name in rivals else "–",
                 "; ".join(apart),
             )
         )
@@ -218,14 +233,14 @@ def why_this_one(cause: Cause) -> str:
     """One sentence on how far the name can be trusted against its neighbours."""
     if cause.equivalents:
         return (
-            f"this data cannot tell it from {listed(cause.equivalents)}: take the name as one of"
-            f" {len(cause.equivalents) + 1} that fit alike"
+            f"{listed(cause.equivalents, 'and')} cannot be ruled out, since no equation is exact: take the name as one"
+            f" of {len(cause.equivalents) + 1}"
         )
-    others = other_rivals(cause)
-    if others:
+    if cause.rivals:
+        nearest = cause.rivals[0]
         return (
-            f"no other effect of the catalogue does as well; the nearest, {others[0].name}, fits worse by"
-            f" {others[0].margin} in −2 log likelihood"
+            f"no other effect of the catalogue does as well; the nearest, {words(nearest.effect)}, is less likely by"
+            f" {plain(nearest.margin, 2)} (−2 log, by {'its ' if nearest.by == 'fit' else ''}{nearest.by})"
         )
     return "no other effect of the catalogue comes near"
 
@@ -251,17 +266,20 @@ def shares_text(diagnosis: Diagnosis) -> str:
     part = shares(diagnosis)
     explainable = part.explained + part.left
     if explainable < 0.5:
-        return "Hardly any of the error's variance could be explained at all: the rest is noise."
-    said = f"{plain(explainable, 3)} % of the error's variance could be explained at all, the rest is noise;"
-    if part.explained < 0.05:
-        return f"{said} none of it is explained."
-    return f"{said} {plain(part.explained, 3)} % is explained: {100 * part.explained / explainable:.0f} % of that."
+        return "Nearly all of the error's variance is noise, which no model explains."
+    noise = "under 1 %" if part.noise < 1.0 else f"{part.noise:.0f} %"
+    explained = 100.0 * part.explained / explainable
+    of_it = "over 99 %" if 99.0 < explained < 100.0 else f"{explained:.0f} %" if explained >= 0.5 else "none"
+    return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it} is explained."
 
 
 def fault_text(fault: DataFault) -> str:
     """Kind, place, share and what it means."""
-    span = f"{file_name(fault.label)}, {fault.start_s:.6g}–{fault.stop_s:.6g} s"
-    return f"{words(fault.kind)}, {span} ({share_text(fault.share)} of the samples): {fault.says}"
+    span = (
+        f"{fault.start_s:.1f}–{fault.stop_s:.1f} s" if fault.stop_s - fault.start_s >= 0.1 else f"{fault.start_s:.2f} s"
+    )
+    where = f"{file_name(fault.label)}, {span}"
+    return f"{words(fault.kind)}, {where} ({share_text(fault.share)} of the samples): {fault.says}"
 
 
 def file_name(label: str) -> str:

@@ -16,10 +16,12 @@ from smartshoe.report.diagnosis._sentences import (
     fault_text,
     gain_text,
     how_much,
+    is_free_form,
     listed,
     parameter_text,
     shares_text,
     sure,
+    unnamed,
     why_this_one,
 )
 from smartshoe.report.tables import new_console, table_of
@@ -41,8 +43,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     if diagnosis.minor:
         _line(
             console,
-            "also in the extended model and not named, too small, unsure, undone by others or at a bound:"
-            f" {listed(sorted(diagnosis.minor), 'and')}",
+            f"in the extended model without being causes, too small or too unsure for a name: {unnamed(diagnosis)}",
         )
     if diagnosis.leftover:
         _line(console, f"what is left: {diagnosis.leftover}")
@@ -80,6 +81,8 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
     )
     for cause in diagnosis.causes:
         shown = [(words(name), parameter_text(value)) for name, value in cause.parameters.items()] or [("–", "–")]
+        if is_free_form(cause):
+            shown = [("free form", "no equation fits well enough")]
         for k, (name, value) in enumerate(shown):
             of_cause = (
                 (gain_text(cause.held_out), sure(cause.confidence), listed(cause.equivalents) or "–")

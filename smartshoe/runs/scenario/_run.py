@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -238,9 +238,13 @@ def diagnosed_on(recordings: dict[str, Recording], settings: DiagnoseTable) -> l
 def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Diagnosis:
     from smartshoe.diagnosis import diagnose
 
+    # A person knows them by the experiments' names, not by the machine that they all come from.
+    named = {
+        name: one if Path(one.source).is_file() else replace(one, source="") for name, one in recordings.items()
+    }
     return diagnose(
-        diagnosed_on(recordings, settings),
-        hold_out=[recordings[name] for name in settings.hold_out if name in recordings],
+        diagnosed_on(named, settings),
+        hold_out=[named[name] for name in settings.hold_out if name in named],
         material=settings.material_percent / 100.0,
     )
 

@@ -170,6 +170,12 @@ class DiagnoseTable(_Table):
     hold_out: tuple[str, ...] = ()
     material_percent: float = Field(0.02, gt=0.0, le=50.0)
 
+    @model_validator(mode="after")
+    def _what_judges_is_not_fitted(self) -> DiagnoseTable:
+        if both := sorted({*self.use} & {*self.hold_out}):
+            raise ValueError(f"{', '.join(both)} is to be fitted and held out at once: name it in use or in hold_out")
+        return self
+
 
 class ValidateTable(_Table):
     """``[validate]``: which experiments are judged."""

@@ -1,0 +1,109 @@
+"""The sentence of each fault, of one and of several: what there is, how large it is, and what becomes of it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smartshoe.integrity import examine
+from smartshoe.recording import Recording
+
+Array = NDArray[np.float64]
+
+TIME_S = np.arange(0.0, 60.0, 0.01)
+TRIANGLE = np.abs(2.0 * (TIME_S / 6.0 % 1.0) - 1.0)
+NOISE = np.random.default_rng(4).standard_normal((2, TIME_S.size))
+READING = TRIANGLE + 1e-3 * NOISE[0]
+
+
+def _pressed(reading: Array, load: Array = TRIANGLE) -> Recording:
+    return Recording.from_arrays(time_s=TIME_S, force_n=800.0 * load, pressure_mbar=100.0 * reading)
+
+
+def _said(recording: Recording) -> tuple[str, str]:
+    """The kind of the one fault that there is, and its sentence."""
+    (fault,) = examine([recording]).faults
+    return fault.kind, fault.says
+
+
+def _changed(signal: Array, *changes: tuple[int, float]) -> Array:
+    changed = signal.copy()
+    for at, by in changes:
+        changed[at] += by
+    return changed
+
+
+def test_a_spike_alone_is_said_with_its_size_and_several_with_the_largest() -> None:
+    one, two = ((1111, 0.3),), ((1111, 0.3), (3000, -0.2))
+    alone = "has an isolated spike of 30 % of its span: it is left out"
+    several = "has 2 isolated spikes, the largest of 30 % of its span: they are left out"
+    for changes, said in ((one, alone), (two, several)):
+        assert _said(_pressed(_changed(READING, *changes))) == ("spikes", f"the reading {said}")
+        load = _changed(TRIANGLE + 1e-3 * NOISE[1], *changes)
+        assert _said(_pressed(READING, load)) == ("spikes", f"the reference load {said}")
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        (((1000, 1001),), "a gap of 0.02 s: about one sample (0.017 % of all) missing"),
+        (((1000, 1050),), "a gap of 0.51 s: about 50 samples (0.83 % of all) missing"),
+        (
+            ((1000, 1050), (3000, 3010)),
+            "2 gaps in time, the longest 0.51 s: about 60 samples (1 % of all) missing",
+        ),
+    ],
+)
+def test_a_gap_is_one_and_several_are_counted(missing: tuple[tuple[int, int], ...], said: str) -> None:
+    kept = np.ones(TIME_S.size, dtype=bool)
+    for first, stop in missing:
+        kept[first:stop] = False
+    assert _said(_pressed(READING).taken(kept)) == ("gaps", said)
+
+
+def test_a_reading_that_repeats_once_is_one_and_several_are_told_with_the_longest_row() -> None:
+    reading = np.rint((TRIANGLE + 1e-4 * NOISE[0]) / 1e-5) * 1e-5
+    reading[1234] = reading[1233]
+    one = "1 reading repeats the one before while the load moves: it is left out"
+    assert _said(_pressed(reading)) == ("held_samples", one)
+    reading[2345:2351] = reading[2344]
+    several = "7 readings repeat the one before while the load moves, up to 6 in a row: they are left out"
+    assert _said(_pressed(reading)) == ("held_samples", several)
+
+
+def test_a_reading_drops_out_once_or_so_many_times() -> None:
+    reading = READING.copy()
+    for gone, times, samples in ((slice(580, 620), "once, for", 40), (slice(1190, 1200), "2 times, for up to", 50)):
+        reading[gone] = 0.0
+        kind, said = _said(_pressed(reading))
+        assert kind == "dropouts"
+        assert said == (
+            f"the reading drops out {times} 0.4 s, to about 0 mbar, while the load stays:"
+            f" {samples} samples are left out"
+        )
+
+
+def test_a_coarse_step_is_said_with_the_rms_error_that_it_leaves() -> None:
+    """A step of two percent over the root of twelve."""
+    kind, said = _said(_pressed(np.rint(TRIANGLE / 0.02) * 0.02))
+    assert kind == "quantisation"
+    (error,) = re.findall(r"an rms error of ([\d.]+) % that", said)
+    assert float(error) == pytest.approx(2.0 / np.sqrt(12.0), rel=0.03)
+    assert said == (
+        f"the reading is quantised in steps of 2 mbar, 2 % of its span: an rms error of {error} % that averaging does"
+        " not remove"
+    )
+
+
+def test_two_clocks_are_said_with_the_lag_and_what_to_do() -> None:
+    """Levels of no period, each reached within half a second."""
+    corners = [(3.0 * k + 0.5 * j, (k * 0.618) % 1.0) for k in range(20) for j in (1, 6)]
+    load = np.interp(TIME_S, *np.array(corners).T)
+    kind, said = _said(_pressed(np.interp(TIME_S - 0.35, TIME_S, load) + 1e-3 * NOISE[0], load))
+    assert kind == "two_clocks"
+    (late_s,) = re.findall(r"^load and reading come from two clocks: the reading is ([\d.]+) s late, at", said)
+    assert float(late_s) == pytest.approx(0.35, abs=0.02)
+    assert said.endswith("more than the unit's relaxation explains (record both by one clock)")
