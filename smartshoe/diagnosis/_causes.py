@@ -33,7 +33,7 @@ def cause_of(
     member = name.member
     law = name.by or next((a for a in member.laws if a.effect == name.effect.name), None)
     won = gain(errors(fine, member.without.model), best, scale, thresholds)
-    rivals = _rivals_of(name)
+    rivals = _rivals_of(name, 0.0 if law is None else law.margin)
     evidence = (
         _without_it(name),
         *_held_out_evidence(member.size, won, thresholds.material),
@@ -48,9 +48,9 @@ def cause_of(
     return Cause(name.effect, *sure, name.equivalents, values, evidence, won, member.size, rivals, member.name)
 
 
-def _rivals_of(name: Name) -> tuple[Rival, ...]:
-    """The nearest first. Laws are weighed against the one named, no best fit where a block stands for it."""
-    member, own = name.member, name.by.margin if name.by is not None else 0.0
+def _rivals_of(name: Name, own: float) -> tuple[Rival, ...]:
+    """The nearest first. Laws are weighed against the one named, whose ``own`` margin is that to its block."""
+    member = name.member
     near = {a.effect: Rival(a.effect, a.margin, "evidence") for a in member.alternatives if a.effect is not None}
     near |= {a.effect: Rival(a.effect, a.margin - own, "fit") for a in member.laws if a.effect is not None}
     near.pop(name.effect.name, None)
@@ -72,7 +72,7 @@ def _against(rivals: Sequence[Rival]) -> list[Statement]:
     if not rivals:
         return []
     nearest = rivals[0]
-    how = f"less likely by {nearest.margin:,.0f}" if nearest.margin > 0.0 else "as likely"
+    how = f"less likely by {nearest.margin:,.0f}" if nearest.margin >= 0.5 else "as likely"
     says = f"{nearest.effect.replace('_', ' ')}, the nearest other, is {how} ({nearest.by})"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 

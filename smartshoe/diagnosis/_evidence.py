@@ -407,7 +407,7 @@ def _factor(matrix: Array) -> Array:
     if not matrix.size:
         return matrix
     factor, failed = dpotrf(matrix, lower=1)
-    more = 1e-15 * float(np.max(np.diag(matrix)))
+    more = max(1e-15 * float(np.max(np.diag(matrix))), 1e-300)
     while failed and math.isfinite(more):
         more *= 10.0
         matrix.flat[:: matrix.shape[0] + 1] += more

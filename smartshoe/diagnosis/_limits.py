@@ -20,6 +20,7 @@ from smartshoe.diagnosis._settling import listed
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
@@ -131,7 +132,7 @@ def end_of_range_of(plain: ExtendedModel, extended: ExtendedModel) -> str | None
 
 def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
     """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
-    known = any("effective_area_m2" in one.recording.metadata for one in sessions)
+    known = model.wall_ratio != USUAL_WALL_RATIO
     stiffer = replace(model, wall_ratio=STIFFEST_WALL_RATIO)
     if known or apart(sessions, model, stiffer) <= thresholds.material:
         return None

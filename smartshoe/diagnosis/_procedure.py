@@ -191,8 +191,9 @@ def _diagnosed(
     causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
+    off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
     elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
-    unproven = 0.0 if found.can_validate else not_shown_to_be_noise(sessions, residuals, after, thresholds)
+    unproven = 0.0 if found.can_validate else not_shown_to_be_noise(fine, off, after, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         follows = all(name.is_sure and not name.kind_only for name in named.names)
@@ -201,7 +202,7 @@ def _diagnosed(
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, named.zeros, sessions, scale)
-    structure = min(max(after.rms, elsewhere, unproven), left_where_judged(sessions, residuals, thresholds))
+    structure = min(max(after.rms, elsewhere, unproven), left_where_judged(fine, off, thresholds))
     noise_variance = max(best.rmse**2 - structure**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)

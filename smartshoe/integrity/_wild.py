@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +11,21 @@ from smartshoe.arrays import Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Channel, Recording
+from smartshoe.signals.masks import runs_of
 
 
 def without_wild(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
-    """Load and reading without samples an order of magnitude beyond the span of nearly all others; what is said of it.
+    """Load and reading without samples that leap an order of magnitude beyond the span of nearly all others.
 
     A few of them would make up the span of the signal, and what follows from it: its sign, its full scale, its noise.
+    What load and reading do together was a press; but where both are one number, it is a logger's for nothing.
     """
+    channels = (*recording.of_role("load"), *recording.of_role("sensor"))
+    wild = {channel.name: _wild(channel, thresholds) for channel in channels}
+    pressed = _together(channels, wild)
     findings = []
-    for channel in (*recording.of_role("load"), *recording.of_role("sensor")):
-        at = _wild(channel, thresholds)
+    for channel in channels:
+        at = wild[channel.name] & ~pressed
         if not at.any():
             continue
         recording = with_missing(recording, channel, at)
@@ -36,15 +42,35 @@ def without_wild(recording: Recording, thresholds: Thresholds) -> tuple[Recordin
     return recording, findings
 
 
+def _together(channels: Sequence[Channel], wild: Mapping[str, Mask]) -> Mask:
+    """(n,) True where all channels are far beyond, each by a number of its own."""
+    if len(channels) < 2:
+        return np.zeros(channels[0].values.size if channels else 0, dtype=bool)
+    values = np.stack([channel.values for channel in channels])
+    return np.asarray(np.all([*wild.values()], axis=0) & (np.ptp(values, axis=0) > 0.0))
+
+
 def _wild(channel: Channel, thresholds: Thresholds) -> Mask:
-    """(n,) True at a few values that are beyond nearly all others by ten times their span."""
+    """(n,) True at a few values that leap beyond nearly all others by ten times their span, and back.
+
+    For a few samples at a time, or for longer where they are one number, which stands for nothing.
+    """
+    none = np.zeros(channel.values.size, dtype=bool)
     values = channel.values[channel.present]
     if values.size < thresholds.least_samples:
-        return np.zeros(channel.values.size, dtype=bool)
+        return none
     low, high = np.quantile(values, [0.5 * thresholds.faulty_share, 1.0 - 0.5 * thresholds.faulty_share])
-    beyond = np.abs(channel.values - np.clip(channel.values, low, high))
-    at = np.asarray(channel.present & (beyond > thresholds.extrapolates * (high - low)))
-    return at if high > low and at.mean() <= 0.5 * thresholds.faulty_share else np.zeros_like(at)
+    beyond = channel.values - np.clip(channel.values, low, high)
+    far = channel.present & (np.abs(beyond) > thresholds.extrapolates * (high - low))
+    if not high > low or far.mean() > 0.5 * thresholds.faulty_share:
+        return none
+    leap = np.abs(np.diff(beyond, prepend=0.0, append=0.0))  # into each sample, and out of the last
+    for first, last in zip(*runs_of(far), strict=True):
+        run = channel.values[first:last]
+        is_short = last - first <= thresholds.few or np.ptp(run) == 0.0
+        leaps = (leap[first] > 0.5 * abs(beyond[first]), leap[last] > 0.5 * abs(beyond[last - 1]))
+        none[first:last] = is_short and all(leaps)
+    return none
 
 
 def with_missing(recording: Recording, channel: Channel, at: Mask) -> Recording:

@@ -140,6 +140,58 @@ def test_places_that_cannot_be_written_end_in_status_2(
     assert "unknown" in capsys.readouterr().err.splitlines()[-1]
 
 
+PAST = "continues first: the filter begins as after a rest, without what drift, set, softening and leak had done by"
+
+
+@pytest.mark.parametrize("command", ["compensate", "validate"])
+@pytest.mark.parametrize(
+    ("is_continued", "is_extended", "is_warned"),
+    [(True, True, True), (True, False, False), (False, True, False), (False, False, False)],
+)
+def test_a_past_that_a_filter_with_effects_does_not_know_is_warned_of(
+    command: str,
+    is_continued: bool,
+    is_extended: bool,
+    is_warned: bool,
+    table: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Effects remember what went before; the plain filter forgets it by its pole, within seconds."""
+    from dataclasses import replace
+
+    from smartshoe.calibration import Calibration
+    from smartshoe.units import MILLIBAR
+
+    plain = Calibration(a1=0.2, b0=3.6, b1=0.85, reading_unit=MILLIBAR, unit="left_toe")
+    calibration, later = tmp_path / "c.json", tmp_path / "later.csv"
+    (replace(plain, extended=plain.model()) if is_extended else plain).save(calibration)
+    later.write_text(f"# continues: first\n{table.read_text()}" if is_continued else table.read_text())
+    assert run_command([command, str(later), "--calibration", str(calibration), "--quiet"]) == 0
+    said = capsys.readouterr().err
+    assert (f"warning: {later} {PAST}" in said) is is_warned
+    assert ("join the two files to carry it over" in said) is is_warned
+
+
+def test_of_several_recordings_each_with_a_past_is_warned_of(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from dataclasses import replace
+
+    from smartshoe.calibration import Calibration
+    from smartshoe.units import MILLIBAR
+
+    plain = Calibration(a1=0.2, b0=3.6, b1=0.85, reading_unit=MILLIBAR)
+    replace(plain, extended=plain.model()).save(tmp_path / "c.json")
+    text = table.read_text()
+    for name, before in (("second", "# continues: first\n"), ("third", "# continues: second\n"), ("alone", "")):
+        (tmp_path / f"{name}.csv").write_text(before + text)
+    files = [str(tmp_path / f"{name}.csv") for name in ("second", "alone", "third")]
+    assert run_command(["validate", *files, "--calibration", str(tmp_path / "c.json")]) == 0
+    told = [line.split(":")[1].strip() for line in capsys.readouterr().err.splitlines() if "continues" in line]
+    assert told == [f"{files[0]} continues first", f"{files[2]} continues second"]
+
+
 @pytest.mark.parametrize("words", [["identify"], ["nonsense"], ["identify", "x.csv", "--method", "magic"], ["run"]])
 def test_wrong_command_lines_end_in_status_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command(words) == 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +145,33 @@ def test_what_was_left_out_is_listed_neither_in_the_page_nor_in_the_calibration(
     assert [source["name"] for source in json.loads(calibration.read_text())["sources"]] == [str(files[0])]
     first, second = (smartshoe.read(file).name for file in files)
     assert f"fitted: {first} · judged on: {second} ·" in (out / "diagnosis.html").read_text(encoding="utf-8")
+
+
+def test_a_file_given_twice_is_one_experiment_in_the_limits_the_page_and_the_calibration(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out, calibration, copy = tmp_path / "out", tmp_path / "c.json", tmp_path / "copy.csv"
+    copy.write_bytes(files[0].read_bytes())
+    words = ["diagnose", str(files[0]), str(copy), "--hold-out", str(files[1]), "--out", str(out)]
+    assert run_command([*words, "--calibration", str(calibration)]) == 0
+    limits = json.loads((out / "diagnosis.json").read_text())["limits"]
+    (said,) = (one for one in limits if "it is one experiment, given twice" in one)
+    assert said.startswith(f"left out: {copy} holds the same samples as {files[0]}")
+    assert [source["name"] for source in json.loads(calibration.read_text())["sources"]] == [str(files[0])]
+    first, second = (smartshoe.read(file).name for file in files)
+    assert f"fitted: {first} · judged on: {second} ·" in (out / "diagnosis.html").read_text(encoding="utf-8")
+
+
+def test_files_of_several_units_end_in_status_2_and_name_them(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other, result = tmp_path / "other.csv", tmp_path / "d.json"
+    for path, name in ((tmp_path / "one.csv", "left_toe"), (other, "right_heel")):
+        smartshoe.write(replace(smartshoe.read(files[0]), unit=name), path)
+    assert run_command(["diagnose", str(tmp_path / "one.csv"), "--hold-out", str(other), "--json", str(result)]) == 2
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "recordings of different units (left_toe, right_heel): diagnose one unit at a time" in last
+    assert not result.exists()
 
 
 def test_hopeless_data_is_refused_in_one_sentence_and_the_json_says_so_too(

@@ -285,8 +285,8 @@ def test_what_the_arm_may_hold_after_a_gap_is_of_the_largest_load(share: float) 
     session = _session(load, np.zeros(5))
     past, gap = (max(abs(share) * 1.1 * most, 1e-6) ** -2 for most in (0.05, 0.7))
     session.gap_ends = (2, 4)
-    for gain in (1.1, -1.1):
-        found = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=gain), STANDARD)
+    for by in (1.1, -1.1):
+        found = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=by), STANDARD)
         assert found == pytest.approx(np.diag([0.0, past, gap, gap]))
     every = np.ones(5, dtype=bool)
     session.own_gain_sd, session.gain_parts, session.zero_changes = 0.03, (every,), (3,)

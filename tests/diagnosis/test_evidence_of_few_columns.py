@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from told_evidence import STANDARD, session_of
 
-from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._evidence import Evidence, _factor
 from smartshoe.diagnosis._sensitivity import Linearised, departures, nuisance_precision
 from smartshoe.models.extended import ExtendedModel
 
@@ -248,6 +248,45 @@ def test_a_companion_that_another_law_of_its_neighbours_kind_would_be_is_no_evid
         one[:, 0] += 0.012 * (one[:, 6] - one[:, 4])
     evidence = Evidence(replace(given, rows=tuple(rows)), 0.002)
     assert margin(of_any_law=True) > 50.0
+
+
+# -- factors --------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("rows", [1, 3, 12])
+def test_a_factor_is_choleskys(rows: int) -> None:
+    made = np.random.default_rng(rows).standard_normal((rows, rows + 3))
+    matrix = made @ made.T
+    found = _factor(matrix.copy())
+    assert found == pytest.approx(np.linalg.cholesky(matrix), rel=1e-9)
+    assert _factor(np.zeros((0, 0))).shape == (0, 0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e12, 1e-12])
+@pytest.mark.parametrize("below", [0.0, 1e-17, 1e-15, 1e-12, 1e-9])
+def test_where_rounding_made_it_indefinite_there_is_a_factor_of_as_much_as_is_needed_more(
+    scale: float, below: float
+) -> None:
+    """A matrix of rank two that falls short by a share of its largest element: by no more than ten times that."""
+    made = np.random.default_rng(5).standard_normal((2, 9))
+    exact = scale * made.T @ made
+    largest = float(np.max(np.diag(exact)))
+    matrix = exact - below * largest * np.eye(9)
+    found = _factor(matrix.copy())
+    assert np.isfinite(found).all()
+    assert np.array_equal(found, np.tril(found))
+    assert (np.diag(found) > 0.0).all()
+    more = found @ found.T - matrix
+    assert np.abs(more - np.diag(np.diag(more))).max() < 1e-13 * largest  # nothing beside the diagonal
+    assert 0.0 <= np.diag(more).max() <= max(12.0 * below, 2e-13) * largest
+    # What is determined is what it was: along its two directions it solves as before.
+    asked = made[0]
+    solved = np.linalg.solve(found.T, np.linalg.solve(found, exact @ asked))
+    assert made @ solved == pytest.approx(made @ asked, rel=1e-4)
+
+
+def test_a_matrix_of_no_numbers_ends_and_a_diagonal_of_small_and_large_keeps_the_small() -> None:
+    assert _factor(np.full((3, 3), np.nan)).shape == (3, 3)
+    wide = np.diag([1e12, 1.0, 1e-6])
+    assert np.diag(_factor(wide.copy())) == pytest.approx([1e6, 1.0, 1e-3])
 
 
 def test_members_are_a_set_in_any_order_and_known_once(given: Linearised) -> None:

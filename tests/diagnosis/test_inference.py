@@ -101,7 +101,7 @@ def test_the_evidence_is_the_gaussian_density_of_the_explicit_covariance(small: 
 def test_what_any_effect_adds_to_a_good_unit_is_its_imperfection_whatever_is_material(
     small: Linearised, field: str
 ) -> None:
-    """Twice as much of an effect that is there and small: its own evidence shrinks, by the twin's as much."""
+    """What an effect gains falls as imperfections grow, by as much as that of the explicit covariance."""
     sd, usual, member = 0.002, Evidence(small, 0.002), (11,)
     given = replace(small, thresholds=replace(Thresholds(), **{field: 2e-3}))
     evidence = Evidence(given, sd)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,16 @@ import pytest
 from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, told_fit, worth
 
 from smartshoe.diagnosis import _inference
-from smartshoe.diagnosis._inference import _best_alone, _judged, _screening, independent, infer
+from smartshoe.diagnosis._inference import (
+    _best_alone,
+    _Judged,
+    _judged,
+    _redundant,
+    _screening,
+    _without_redundant,
+    independent,
+    infer,
+)
 from smartshoe.models.effects import effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -47,8 +57,9 @@ class _Model(str):
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
-        independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[], scores={},
-        names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={}, alone=None, weighed=[],
+        independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[],
+        scores={}, names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={}, alone=None,
+        weighed=[],
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -128,6 +139,98 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
         assert (found.screening, found.likeness, found.likelihood) == ("screening", "likeness", "likelihood")
         assert found.baseline is found.fit
+
+
+@pytest.mark.parametrize("folds", [0, 1])
+def test_what_can_be_left_out_in_one_way_only_validates_nothing(flow: Any, folds: int) -> None:
+    """As of a recording whose later load cycles all lie in a gap."""
+    flow.folds = 2
+    assert flow.infer().can_validate
+    flow.folds = folds
+    found = flow.infer()
+    assert (found.can_validate, found.members, found.refused) == (False, (), ())
+    assert found.baseline is found.fit
+
+
+def test_what_is_told_is_without_what_another_effect_makes_immaterial(flow: Any) -> None:
+    """The first set, and each that a likelier law leads to; from the plain fit on."""
+    flow.infer()
+    assert flow.weighed == [("settled first", True)]
+    flow.weighed, flow.laws = [], [{"a": "b"}, {"c": "d"}]
+    flow.infer()
+    assert flow.weighed == [("settled first", True), ("law settled first", True), ("law law settled first", True)]
+
+
+def _sized(name: str, size: float) -> Any:
+    return SimpleNamespace(effect=effect(name), name=name, size=size, without=SimpleNamespace(model=f"without {name}"))
+
+
+def test_of_two_of_a_family_the_smaller_is_redundant_where_it_is_immaterial() -> None:
+    """A lag and a delay; of a drift of the zero and a warming up that shift alike."""
+    small, most = 0.999 * STANDARD.imperfection, STANDARD.imperfection
+    plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
+
+    def redundant(*members: Any, known: tuple[str, ...] = ()) -> str | None:
+        plain.model.names = known
+        found = _redundant(members, plain, STANDARD)
+        return None if found is None else str(found.name)
+
+    lag, delay, leak = _sized("sensor_lag", small), _sized("delay", 0.5 * small), _sized("linear_leak", 1e-6)
+    assert redundant(lag, delay) == redundant(delay, lag) == "delay"
+    assert redundant(lag, leak) is None  # each alone of its family
+    assert redundant(_sized("sensor_lag", 0.01), _sized("delay", most)) is None
+    assert redundant(_sized("sensor_lag", 0.01), delay, leak) == "delay"
+    assert redundant(_sized("sensor_lag", 0.01), delay, known=("delay",)) is None  # a clock, told before any model
+    assert redundant(lag, delay, known=("delay",)) == "sensor_lag"
+    assert redundant() is None
+    plain.model.names = ()
+    assert _redundant((lag, delay), plain, replace(STANDARD, imperfection=0.4 * small)) is None
+    coarser = replace(STANDARD, material=0.5)  # what is asked for is no matter of what is there
+    assert _redundant((_sized("sensor_lag", 0.01), _sized("delay", most)), plain, coarser) is None
+
+
+def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    size = 0.5 * STANDARD.imperfection
+    sets = {
+        "whole": (_sized("delay", 0.01), _sized("sensor_lag", size), _sized("clock_drift", 0.5 * size)),
+        "without clock_drift": (_sized("delay", 0.01), _sized("sensor_lag", 2.1 * size)),
+    }
+    asked: list[Any] = []
+
+    def fit(likelihood: Any, model: Any) -> Any:
+        asked.append((likelihood, model))
+        return SimpleNamespace(model=model)
+
+    def about(model: Any, sessions: Any, evidence: Any) -> Any:
+        return SimpleNamespace(thresholds=STANDARD, of=model, before=evidence.of, sessions=sessions), f"best of {model}"
+
+    monkeypatch.setattr(_inference, "fit", fit)
+    monkeypatch.setattr(_inference, "evidence_about", about)
+    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, refused, likelihood, fit: sets[fit.model])
+    plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
+    first: Any = SimpleNamespace(thresholds=STANDARD, of="whole")
+    begun = _Judged(first, "best", SimpleNamespace(model="whole"), "likelihood", ("refused",), ("undone",), True)  # type: ignore[arg-type]
+
+    def without() -> tuple[Any, Any]:
+        return _without_redundant(begun, plain, "sessions")  # type: ignore[arg-type]
+
+    found, members = without()
+    assert asked == [("likelihood", "without clock_drift")]  # of what is left the lag is not immaterial any more
+    assert members == sets["without clock_drift"]
+    assert (found.fit.model, found.best) == ("without clock_drift", "best of without clock_drift")
+    assert (found.evidence.of, found.evidence.before, found.evidence.sessions) == (
+        "without clock_drift",
+        "whole",
+        "sessions",
+    )
+    assert (found.refused, found.undone, found.is_stepped_down) == (("refused",), ("undone",), True)
+    sets["without clock_drift"] = (_sized("delay", 0.01), _sized("sensor_lag", 0.9 * size))
+    sets["without sensor_lag"] = (_sized("delay", 0.01),)
+    found, members = without()
+    assert (found.fit.model, members) == ("without sensor_lag", sets["without sensor_lag"])
+    sets["whole"] = sets["without sensor_lag"]
+    found, members = without()
+    assert (found is begun, members) == (True, sets["whole"])
 
 
 def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(

@@ -205,7 +205,9 @@ def test_where_the_load_is_not_known_for_longer_than_a_hold_the_past_is_open_aga
     if is_open:
         assert session.gap_ends[0] == pytest.approx((first + count) / factor, abs=1.0)
         assert fine.gap_ends[0] == pytest.approx(first + count, abs=1.0)
-        assert session.conditions.time_s[session.gap_ends[0]] == pytest.approx(STEP_S * (first + count), abs=factor * STEP_S)
+        assert session.conditions.time_s[session.gap_ends[0]] == pytest.approx(
+            STEP_S * (first + count), abs=factor * STEP_S
+        )
         assert not session.usable[session.gap_ends[0] - 5]
     assert replace(session, gap_ends=()).fitted == pytest.approx(session.fitted)  # nothing else is otherwise
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
-from smartshoe.diagnosis._causes import _held_out_evidence, cause_of, zero_cause_of
+from smartshoe.diagnosis._causes import _against, _held_out_evidence, cause_of, zero_cause_of
 from smartshoe.diagnosis._held_out import Errors, Gain, own_of
 from smartshoe.diagnosis._limits import refusals_of
 from smartshoe.diagnosis._naming import confidence_of
@@ -261,6 +261,7 @@ def _told(
     by: Any = None,
     alone: Any = None,
     kind: float = 0.9,
+    alternatives: Any = (),
 ) -> Any:
     asked: list[Any] = []
 
@@ -274,8 +275,12 @@ def _told(
         name="static_curve_block",
         size=0.0123,
         without=SimpleNamespace(model="without"),
-        alternatives=(SimpleNamespace(effect=None, margin=55.0), SimpleNamespace(effect="delay", margin=90.0)),
-        laws=tuple(SimpleNamespace(effect=name, margin=margin) for name, margin in laws),
+        alternatives=(
+            SimpleNamespace(effect=None, margin=55.0),
+            SimpleNamespace(effect="delay", margin=90.0),
+            *alternatives,
+        ),
+        laws=tuple(SimpleNamespace(effect=name, margin=margin, fit=f"{name}'s fit") for name, margin in laws),
         fall=400.0,
     )
     one = effect("linear_leak")
@@ -294,6 +299,8 @@ def _told(
     cause = cause_of(name, found, "fine", AFTER, SCALE, excitation, STANDARD)  # type: ignore[arg-type]
     assert asked == [("fine", "without")]
     fitted = ("fit", "static_curve_block") if by is None else (by.fit, "linear_leak")
+    if by is None and "linear_leak" in dict(laws):  # a law that the block is called by, near enough or not
+        fitted = ("linear_leak's fit", "linear_leak")
     assert cause.parameters == {"of": (*fitted, SCALE)}
     assert (cause.effect, cause.confidence, cause.law_confidence) == (one, confidence_of(name, STANDARD), 0.6)
     assert (cause.equivalents, cause.size) == (("orifice_leak",), 0.0123)
@@ -354,6 +361,45 @@ def test_a_law_that_a_block_carries_is_told_with_its_own_parameters(monkeypatch:
         "its equation misses 2.5 % of the effect, no more than equations do: the extended model keeps that as a free"
         " form, the parameters are the equation's"
     )
+
+
+@pytest.mark.parametrize(
+    ("margin", "missed", "much"), [(10.0, "2.5", "no more"), (25.0, "6.2", "no more"), (26.0, "6.5", "more")]
+)
+def test_a_block_that_is_called_by_its_nearest_law_has_that_laws_parameters(
+    monkeypatch: pytest.MonkeyPatch, margin: float, missed: str, much: str
+) -> None:
+    """Though it misses more of 400 than laws do, a sixteenth: then that is said."""
+    laws = (("linear_leak", margin), ("orifice_leak", 40.0))
+    cause = _told(monkeypatch, effect("linear_leak").exposed_by, kind_only=True, laws=laws)
+    assert cause.parameters == {"of": ("linear_leak's fit", "linear_leak", SCALE)}
+    (told,) = (one for one in cause.evidence if one.statistic.startswith("share of its kind"))
+    assert (told.value, told.threshold) == (pytest.approx(margin / 4.0), 6.25)
+    assert told.says == (
+        f"its equation misses {missed} % of the effect, {much} than equations do: the extended model keeps that as a"
+        " free form, the parameters are the equation's"
+    )
+    assert "linear_leak" not in [one.effect for one in cause.rivals]
+    # Of one that no law was fitted for, the block's own are told, and of no equation what it misses.
+    cause = _told(monkeypatch, effect("linear_leak").exposed_by, kind_only=True, laws=laws[1:])
+    assert cause.parameters == {"of": ("fit", "static_curve_block", SCALE)}
+    assert not any(one.statistic.startswith("share of its kind") for one in cause.evidence)
+
+
+def test_no_rival_is_a_block_of_free_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    exposed = effect("linear_leak").exposed_by
+    near = (SimpleNamespace(effect="flexible_lag", margin=3.0), SimpleNamespace(effect="dead_band", margin=70.0))
+    cause = _told(monkeypatch, exposed, laws=(("flexible_leak", 1.0),), alternatives=near)
+    assert cause.rivals == (Rival("dead_band", 70.0, "evidence"), Rival("delay", 90.0, "evidence"))
+    assert cause.evidence[-1].says == "dead band, the nearest other, is less likely by 70 (evidence)"
+
+
+@pytest.mark.parametrize(("margin", "said"), [(0.6, "less likely by 1"), (0.0, "as likely"), (-3.0, "as likely")])
+def test_a_rival_that_fits_no_worse_is_as_likely(monkeypatch: pytest.MonkeyPatch, margin: float, said: str) -> None:
+    cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", margin),))
+    (rival,) = (one for one in cause.evidence if one.statistic == "margin to the nearest rival")
+    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, is {said} (fit)")
+    assert _against(()) == []
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])

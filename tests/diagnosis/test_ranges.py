@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._ranges import Ranges, beyond, ranges_of
+from smartshoe.diagnosis._ranges import Ranges, _foreign, beyond, ranges_of
 from smartshoe.diagnosis._session import full_scale, prepare
 from smartshoe.recording import Recording
 
@@ -84,6 +85,48 @@ def test_gains_within_files_that_differ_from_the_gain_between_them_are_a_trap() 
 @pytest.mark.parametrize("factor", [0.5, 1.0])
 def test_files_over_different_ranges_of_one_unit_are_no_trap(factor: float) -> None:
     assert not _ranges(_proportional(0.0, 800.0), _proportional(0.0, 800.0 * factor)).is_trap
+
+
+def _foreign_ones(found: Ranges) -> list[str]:
+    return [said for said in found.says if "under the same load" in said]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "told"),
+    [(10.0, "10"), (0.1, "0.1"), (-1.0, "-1"), (4.1, "4.1"), (0.24, "0.24"), (3.9, None), (0.26, None), (1.0, None)],
+)
+def test_a_file_that_reads_many_times_what_the_first_does_or_the_other_way_is_named(
+    ratio: float, told: str | None
+) -> None:
+    """Beyond twice what differs for certain: four times, or a quarter."""
+    load, reading = _proportional(0.0, 800.0)
+    found = _ranges((load, reading), (load, 1.1 * reading), (load, ratio * reading))
+    if told is None:
+        assert _foreign_ones(found) == []
+        return
+    (said,) = _foreign_ones(found)
+    assert said.endswith("is it in another unit, of the other sign, or of another sensor?")
+    name, shown = said.removesuffix(said.partition(" times what")[2]).removesuffix(" times what").split(" reads ")
+    assert name == "run_2"
+    assert float(shown) == pytest.approx(ratio, rel=0.02)
+    assert "times what run_0 does under the same load: is it" in said
+
+
+def test_it_is_named_beside_the_first_that_tells_its_gain_and_only_where_it_is_fitted() -> None:
+    load, reading = _proportional(0.0, 800.0)
+    first, foreign = (load, reading), (load, 10.0 * reading)
+    (said, again) = _foreign_ones(_ranges(foreign, first, first))
+    assert (said[:11], again[:11]) == ("run_1 reads", "run_2 reads")
+    assert "0.1 times what run_0 does" in said
+    still = (np.full(TIME_S.size, 400.0), np.full(TIME_S.size, 400.0 * GAIN_MBAR_PER_N))  # of which none is told
+    (said,) = _foreign_ones(_ranges(still, first, foreign))
+    assert said.startswith("run_2 reads 10 times what run_1 does")
+    assert _foreign_ones(_ranges(first, foreign, held_out=[False, True])) == []
+    assert _foreign([("a", None), ("b", None)], Thresholds()) == []
+    assert _foreign([], Thresholds()) == []
+    (said,) = _foreign([("level", 0.0), ("a", 1.0), ("b", 10.0)], Thresholds())  # beside nothing none is many times
+    assert said.startswith("b reads 10 times what a does")
+    assert _foreign([("a", 0.1), ("b", 1.0)], replace(Thresholds(), clear=4.0)) == []
 
 
 @pytest.mark.parametrize(

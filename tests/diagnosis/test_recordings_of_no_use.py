@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
-from smartshoe.errors import UnitError
+from smartshoe.errors import UnitError, UsageError
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import find_unit
@@ -124,7 +124,45 @@ def test_readings_of_two_quantities_are_refused_by_name(hold_out: bool) -> None:
         diagnose(GOOD, hold_out=counted) if hold_out else diagnose([GOOD, counted])
 
 
-def test_a_copy_confirms_nothing_and_is_said() -> None:
+TWICE = "copy holds the same samples as good: it is one experiment, given twice"
+
+
+def test_a_copy_confirms_nothing_and_is_left_out_and_said() -> None:
+    """Held out it would judge what it was fitted to; fitted twice it would count twice."""
     copy = replace(GOOD, name="copy")
     found = diagnose([GOOD, OTHER], hold_out=copy)
-    assert any("copy holds the same samples as" in limit for limit in found.limits)
+    assert any(limit.startswith("left out: ") and TWICE in limit for limit in found.limits)
+    assert [trace.name for trace in found.traces] == ["good", "other"]
+    assert all(0.1 < float(np.mean(trace.held_out)) < 0.6 for trace in found.traces)
+    assert sum("load cycles of those that are fitted are held out instead" in one for one in found.limits) == 1
+    plain, beside = diagnose(GOOD, hold_out=OTHER), diagnose([GOOD, copy], hold_out=OTHER)
+    assert [(trace.name, trace.recording) for trace in beside.traces] == [("good", 0), ("other", 2)]
+    assert (beside.verdict, beside.baseline, beside.gain) == (plain.verdict, plain.baseline, plain.gain)
+    assert beside.model is not None
+    assert plain.model is not None
+    assert beside.model.theta == pytest.approx(plain.model.theta, rel=1e-12)
+    assert sum(TWICE in limit for limit in beside.limits) == 1
+
+
+def test_a_copy_of_wild_values_taken_out_is_one_all_the_same() -> None:
+    """Whatever a logger wrote where it had none."""
+    values = GOOD.sensor.values.copy()
+    values[[700, 900]] = -9999.0
+    wild = GOOD.with_channel(replace(GOOD.sensor, values=values))
+    copy = replace(
+        wild.with_channel(replace(wild.sensor, values=np.where(values < -1e3, 99999.0, values))), name="copy"
+    )
+    found = diagnose([wild, OTHER, copy])
+    assert [trace.name for trace in found.traces] == ["good", "other"]
+    assert sum(TWICE in limit for limit in found.limits) == 1
+
+
+@pytest.mark.parametrize("hold_out", [True, False])
+def test_recordings_of_several_units_are_refused_by_the_units_names(hold_out: bool) -> None:
+    left, right = replace(GOOD, unit="left toe"), replace(OTHER, unit="right heel")
+    said = r"^recordings of different units \(left toe, right heel\): diagnose one unit at a time$"
+    with pytest.raises(UsageError, match=said):
+        diagnose(right, hold_out=left) if hold_out else diagnose([right, left])
+    # What says nothing of its unit may be of any.
+    assert diagnose(left, hold_out=OTHER).verdict == "adequate"
+    assert diagnose(left, hold_out=replace(OTHER, unit="left toe")).verdict == "adequate"

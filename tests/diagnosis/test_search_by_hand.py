@@ -260,6 +260,11 @@ def test_of_several_recordings_each_is_left_out_and_of_one_its_cycles_in_six_blo
         assert (rest.fitted | mask).sum() == 200
     assert len(folds_of([session_of(WAVE, None, np.repeat(np.arange(3), 80))])) == 3
     assert folds_of([session_of(WAVE)]) == []
+    # Of a recording whose later cycles lie in a gap there is nothing that could be left out.
+    begun = session_of(WAVE, np.arange(240) < 20, np.repeat(np.arange(12), 20))
+    assert folds_of([begun]) == []
+    twice = session_of(WAVE, np.arange(240) < 21, np.repeat(np.arange(12), 20))
+    assert len(folds_of([twice])) == 2
 
 
 @pytest.mark.parametrize(("count", "largest", "folds"), [(12, 1, 12), (13, 3, 6), (40, 7, 6)])

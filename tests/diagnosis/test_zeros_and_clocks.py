@@ -14,6 +14,8 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._aligned import aligned
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
+from smartshoe.diagnosis._held_out import residual_of
+from smartshoe.diagnosis._limits import wall_ratio_of
 from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
@@ -214,6 +216,42 @@ def test_an_effective_area_tells_how_much_of_the_load_the_wall_bears() -> None:
     for impossible in (1.0, 1e-4, None):  # the wall would pull, or bear nearly all
         assert _ratio(impossible) == USUAL_WALL_RATIO
     assert _ratio(0.02, "v") == USUAL_WALL_RATIO
+
+
+def test_an_area_tells_it_whatever_the_place_of_the_recording_that_declares_it() -> None:
+    declared, bare = _run(effective_area_m2=0.005), _run(seed=1)
+    told = {baseline_of(*_sessions(*runs)).wall_ratio for runs in ((declared, bare), (bare, declared))}
+    assert min(told) == pytest.approx(max(told), rel=1e-6) == pytest.approx(1.0 / (0.005 * 17.5), rel=0.02)
+    assert baseline_of(*_sessions(bare, _run(seed=2))).wall_ratio == USUAL_WALL_RATIO
+
+
+@pytest.mark.parametrize(("name", "values"), [("linear_leak", [0.003]), ("gas_heat", [0.2, 2.0, 0.0])])
+def test_what_a_leak_or_heat_does_goes_with_how_stiff_the_wall_is_which_is_said_where_nothing_tells_it(
+    name: str, values: list[float]
+) -> None:
+    """By the rms between that of the model and that of the stiffest wall known, beside what counts."""
+    bare, declared = _run(seed=1), _run(seed=2, effective_area_m2=0.005)
+    sessions, _ = _sessions(bare, _run(seed=2))
+    model = MODEL.with_part(effect(name), np.array(values))
+    stiffest = replace(model, wall_ratio=1.78)
+    off = [residual_of(one, model) - residual_of(one, stiffest) for one in sessions]
+    rms = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+    assert rms > 0.0
+    for material, is_said in ((0.999 * rms, True), (1.001 * rms, False)):
+        assert (wall_ratio_of(model, sessions, replace(STANDARD, material=material)) is not None) is is_said
+    sensitive = replace(STANDARD, material=0.999 * rms)
+    assert wall_ratio_of(model, sessions, sensitive) == (
+        "how stiff the wall is beside the gas is not known (N = 1.6 is taken, units of the paper have 1.51 to 1.78):"
+        " rates of leaks and times of heat go with it, beyond their intervals (declare effective_area_m2)"
+    )
+    for runs in ((declared, bare), (bare, declared)):
+        told, scale = _sessions(*runs)
+        assert wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is None
+    # An area that no wall has tells nothing.
+    told, scale = _sessions(_run(seed=1, effective_area_m2=1.0), bare)
+    assert wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is not None
+    # Without either it decides over nothing.
+    assert wall_ratio_of(MODEL.with_part("dead_band"), sessions, replace(STANDARD, material=1e-12)) is None
 
 
 @pytest.mark.parametrize("declared", ["40 cm2", "nan", "0", "-0.004"])

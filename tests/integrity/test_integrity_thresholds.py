@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from smartshoe import diagnose
 from smartshoe.errors import UsageError
 from smartshoe.integrity import Integrity, examine
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -123,10 +125,37 @@ def test_material_is_the_error_from_which_on_a_lattice_is_a_fault() -> None:
     assert "quantisation" not in _kinds(coarse, material=1e-2)
 
 
-@pytest.mark.parametrize("material", [float("nan"), float("inf"), -1.0, 0.0, "a", True])
-def test_what_is_material_is_a_share_above_zero(material: float) -> None:
+@pytest.mark.parametrize("material", [float("nan"), float("inf"), -1.0, 0.0, 0.5001, 2.0, "a", True])
+def test_what_is_material_is_a_share_above_zero_up_to_a_half(material: float) -> None:
     with pytest.raises(UsageError, match=r"material is .*: give a"):
         diagnose(_pressed(TRIANGLE), material=material)
+    for within in (0.5, 1e-9):
+        assert decided_by(None, within).material == within
+
+
+@given(st.floats(1e-7, 0.5))
+def test_who_asks_for_less_has_better_units_and_who_asks_for_more_has_those_that_others_have(material: float) -> None:
+    """Nothing else is decided otherwise, whatever the record that is given."""
+    for record in (None, replace(STANDARD, imperfection=5e-4, tolerable=3e-3, clear=3.0)):
+        usual = record or STANDARD
+        found, finer = decided_by(record, material), min(material / 2e-4, 1.0)
+        assert (found.imperfection, found.tolerable) == pytest.approx(
+            (finer * usual.imperfection, finer * usual.tolerable), rel=1e-12
+        )
+        kept = {"imperfection": usual.imperfection, "tolerable": usual.tolerable}
+        assert replace(found, **kept) == replace(usual, material=material)
+    more, less = (decided_by(None, by * material) for by in (1.0, 0.5))
+    assert less.imperfection <= more.imperfection <= STANDARD.imperfection
+    assert less.tolerable <= more.tolerable <= STANDARD.tolerable
+
+
+def test_where_nothing_is_asked_for_the_record_decides_as_it_is() -> None:
+    """Also one of another smallest error: what is less, or more, is so beside that."""
+    given_one = replace(STANDARD, material=1e-3)
+    assert decided_by(None) == STANDARD
+    assert decided_by(given_one) is given_one
+    assert decided_by(given_one, 1e-3) == given_one
+    assert decided_by(given_one, 5e-4).imperfection == pytest.approx(0.5 * STANDARD.imperfection)
 
 
 @pytest.mark.parametrize("numbers", [{"standing": float("nan")}, {"memory_s": (0.3, "x")}, {"hold_s": None}])

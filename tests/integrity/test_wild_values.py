@@ -78,7 +78,9 @@ def test_wild_values_are_missing_and_told_with_channel_count_and_the_farthest(
     st.dictionaries(st.integers(0, TIME_S.size - 1), st.floats(2e4, 1e9), min_size=1, max_size=20),
     st.sampled_from([-1.0, 1.0]),
 )
-def test_all_else_is_judged_as_if_they_had_never_been_logged(channel: str, sizes: dict[int, float], sign: float) -> None:
+def test_all_else_is_judged_as_if_they_had_never_been_logged(
+    channel: str, sizes: dict[int, float], sign: float
+) -> None:
     values = {at: sign * size for at, size in sizes.items()}
     found, never = examine([_wild(channel, values)]), examine([_wild(channel, dict.fromkeys(values, np.nan))])
     assert _missing(found, channel) == _missing(never, channel) == sorted(values)
@@ -117,11 +119,56 @@ def test_more_of_them_than_a_fortieth_are_how_a_channel_is(count: int, is_wild: 
     )
     kept, findings = without_wild(run, STANDARD)
     assert (len(findings), int((~kept.load.present).sum())) == ((1, count) if is_wild else (0, 0))
+    # So many to both sides together, where neither alone reaches what nearly all others are.
+    apart = {500 + 20 * k: (-1.0) ** k * 1e6 for k in range(count)}
+    kept, findings = without_wild(replace_load(run, apart), STANDARD)
+    assert (len(findings), int((~kept.load.present).sum())) == ((1, count) if is_wild else (0, 0))
+
+
+def replace_load(run: Recording, values: dict[int, float]) -> Recording:
+    ramp = np.linspace(0.0, 800.0, len(run))
+    return run.with_channel(replace(run.load, values=_with(ramp, values)))
+
+
+@pytest.mark.parametrize("count", [1, 5, 6, 40])
+def test_for_longer_than_a_moment_only_one_number_stands_for_nothing(count: int) -> None:
+    ramp = np.linspace(0.0, 800.0, 4000)
+    run = Recording.from_arrays(time_s=0.01 * np.arange(4000), force_n=ramp, pressure_mbar=ramp / 8.0)
+    rising = {2000 + k: 1e6 + k for k in range(count)}
+    for values, is_wild in ((rising, count <= STANDARD.few), (dict.fromkeys(rising, -9999.0), True)):
+        kept, findings = without_wild(replace_load(run, values), STANDARD)
+        assert (len(findings), int((~kept.load.present).sum())) == ((1, count) if is_wild else (0, 0))
+
+
+def test_what_load_and_reading_do_together_was_a_press_unless_both_are_one_number() -> None:
+    ramp = np.linspace(0.0, 8.0, 4000)
+    for load_n, mbar, is_wild in ((800.0, 100.0, False), (-9999.0, -9999.0, True)):
+        run = Recording.from_arrays(
+            time_s=0.01 * np.arange(4000), force_n=_with(ramp, {7: load_n}), pressure_mbar=_with(ramp / 8.0, {7: mbar})
+        )
+        kept, findings = without_wild(run, STANDARD)
+        assert (len(findings), bool(kept.load.present[7])) == ((2, False) if is_wild else (0, True))
+
+
+@pytest.mark.parametrize("half_s", [1.0, 1.5])
+def test_a_few_presses_of_a_unit_that_rests_most_of_the_time_are_no_wild_values(half_s: float) -> None:
+    """Less than a fortieth of the samples are loaded, so that what nearly all others are is noise."""
+    rng, time_s = np.random.default_rng(0), np.arange(0.0, 400.0, 0.01)
+    load_n = sum(800.0 * np.clip(1.0 - np.abs(time_s - at) / half_s, 0.0, 1.0) for at in (100, 200, 300))
+    run = Recording.from_arrays(
+        time_s=time_s,
+        force_n=load_n + 0.3 * rng.standard_normal(time_s.size),
+        pressure_mbar=0.1 * load_n + 0.02 * rng.standard_normal(time_s.size),
+        name="idle",
+    )
+    assert (examine([run]).faults, examine([run]).refusals) == ((), ())
+    assert diagnose(run).verdict == "adequate"
 
 
 def test_of_a_channel_that_hardly_tells_anything_none_is_wild() -> None:
     def kept(load_n: Array) -> Recording:
-        run = Recording.from_arrays(time_s=0.01 * np.arange(load_n.size), force_n=load_n, pressure_mbar=load_n / 8.0)
+        sound = np.linspace(0.0, 100.0, load_n.size)
+        run = Recording.from_arrays(time_s=0.01 * np.arange(load_n.size), force_n=load_n, pressure_mbar=sound)
         return without_wild(run, STANDARD)[0]
 
     flat, few = _with(np.full(4000, 5.0), {7: 1e6}), _with(np.linspace(0.0, 800.0, 99), {7: 1e6})

@@ -48,7 +48,6 @@ from smartshoe.report.diagnosis.views import binned, edges_of, evidence, loops_a
 
 NAME = '<script>alert("1")</script> & $x$'
 FULL_LOAD_N, FULL_READING, STEP_S = 800.0, 70.0, 0.02
-NONE_AS_A_WORD = ("None of the usual ones: several rates",)
 CASES = ("adequate", "one cause", "two causes", "partly_explained", "unexplained", "refused")
 BASELINE = ExtendedModel(1.0, 0.12, 0.2, FULL_LOAD_N, FULL_READING, "mbar")
 
@@ -215,10 +214,7 @@ def test_every_page_is_whole_and_says_no_number_that_is_none(name: str) -> None:
     assert not re.search(r'(?:src|href)="https?:', html)
     assert "<svg" not in html  # figures are numbers, not pictures
     text = plain_text(html)
-    numbers = text
-    for said in NONE_AS_A_WORD:
-        numbers = numbers.replace(said, "")
-    assert not re.search(r"\b(nan|inf|None|True|False)\b", numbers)
+    assert not re.search(r"\b(nan|inf|None|True|False)\b", text)
     assert HEADINGS[case(name).verdict] in text
     assert case(name).says[1:] in text
 

@@ -232,7 +232,8 @@ def _levelled(residual: Array) -> Array:
     # Differences, so that a slow misfit does not count for noise.
     rough = np.abs(np.diff(centred, append=centred[-1]))[: count * length].reshape(count, length).mean(axis=1)
     size = np.interp(np.arange(residual.size), (np.arange(count) + 0.5) * length, rough)
-    return np.asarray(centred / np.maximum(size, 0.1 * float(np.median(rough)) + 1e-300))
+    least = 0.1 * float(np.median(rough)) + 1e-9 * float(np.max(np.abs(centred)))  # where hardly any noise is at all
+    return np.asarray(centred / np.maximum(size, least + 1e-300))
 
 
 def _refined(residual: Array, near_hz: float, sample_time_s: float) -> float:

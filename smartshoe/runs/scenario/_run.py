@@ -239,9 +239,7 @@ def _diagnosed(recordings: dict[str, Recording], settings: DiagnoseTable) -> Dia
     from smartshoe.diagnosis import diagnose
 
     # A person knows them by the experiments' names, not by the machine that they all come from.
-    named = {
-        name: one if Path(one.source).is_file() else replace(one, source="") for name, one in recordings.items()
-    }
+    named = {name: one if Path(one.source).is_file() else replace(one, source="") for name, one in recordings.items()}
     return diagnose(
         diagnosed_on(named, settings),
         hold_out=[named[name] for name in settings.hold_out if name in named],
