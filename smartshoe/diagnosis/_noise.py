@@ -31,4 +31,4 @@ def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
         square += float(signal @ signal)
         count += size
         repeated += size * float(2.0 * covariance[:until].sum() / max(float(covariance[0]), 1e-300) - 1.0)
-    return float(np.hypot(np.sqrt(square * max(repeated / max(count, 1), 1.0) / max(count, 1)), FLOOR))
+    return max(float(np.sqrt(square * max(repeated / max(count, 1), 1.0) / max(count, 1))), FLOOR)

@@ -90,8 +90,8 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
 
 def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recording:
     """Without the samples of the load at which it was not the load."""
-    at = [finding.at for finding in findings if finding.of_load]
-    return with_missing(recording, recording.load, np.any(at, axis=0)) if at else recording
+    none = [finding.no_load for finding in findings if finding.no_load is not None and finding.no_load.any()]
+    return with_missing(recording, recording.load, np.any(none, axis=0)) if none else recording
 
 
 def _examined(

@@ -47,7 +47,7 @@ class Finding:
 
     Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
     ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded; ``error`` that of
-    `DataFault`. ``of_load``: it is the load's, of which these samples tell nothing.
+    `DataFault`. ``no_load`` (n,) marks samples of the load that are none.
     """
 
     kind: str
@@ -58,7 +58,7 @@ class Finding:
     refuses: str | None = None
     values: Array = field(default_factory=lambda: np.zeros(0))
     error: float = 0.0
-    of_load: bool = False
+    no_load: Mask | None = None
 
 
 @dataclass(frozen=True)

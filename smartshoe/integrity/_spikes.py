@@ -116,7 +116,10 @@ def spikes(view: View, bad: Mask) -> Iterator[Finding]:
     load_gain = view.load_span / view.span
     on_load = isolated(view.load, view.reading_corner, view.thresholds.clear * load_gain, view.load_span, view.near)
     if on_load.any():
-        yield replace(_finding(view, on_load, view.load, view.load_span, "reference load"), of_load=True)
+        # A peak between two samples looks like a spike of a part of the span; what is beyond all of it is none.
+        beyond = on_load & (np.abs(view.load.outlying) > view.load_span)
+        found_on_load = _finding(view, on_load, view.load, view.load_span, "reference load")
+        yield replace(found_on_load, no_load=view.whole(beyond))
 
 
 def _finding(view: View, at: Mask, signal: Signal, span: float, what: str) -> Finding:

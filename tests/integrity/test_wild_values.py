@@ -201,26 +201,20 @@ def test_recordings_come_back_in_their_order_and_sound_ones_as_they_were_given()
     assert [fault.recording for fault in found.faults if fault.kind == "spikes"] == [1]
 
 
-@pytest.mark.parametrize("size_n", [200.0, 3000.0])
-def test_a_spike_of_the_load_is_missing_of_the_load_and_one_of_the_reading_is_left_out_of_fits(size_n: float) -> None:
-    """Both within what may be a load: the one tells nothing of what came later, the other does."""
+@pytest.mark.parametrize(("size_n", "is_none"), [(200.0, False), (3000.0, True)])
+def test_a_spike_beyond_its_span_is_missing_of_the_load_and_one_of_the_reading_is_left_out_of_fits(
+    size_n: float, is_none: bool
+) -> None:
+    """A peak between two samples is a spike of a part of the span, and was a load."""
     loaded = examine([_run(_with(LOAD_N, {1111: LOAD_N[1111] + size_n}))])
     assert [fault.kind for fault in loaded.faults] == ["spikes"]
     assert loaded.faults[0].says.startswith("the reference load has an isolated spike of ")
-    assert (_missing(loaded, "force"), _missing(loaded, "pressure")) == ([1111], [])
+    assert (_missing(loaded, "force"), _missing(loaded, "pressure")) == ([1111] if is_none else [], [])
     assert np.flatnonzero(~loaded.usable[0]).tolist() == [1111]
     read = examine([_run(mbar=_with(MBAR, {1111: MBAR[1111] + 0.1 * size_n}))])
     assert read.faults[0].says.startswith("the reading has an isolated spike of ")
     assert (_missing(read, "force"), _missing(read, "pressure")) == ([], [])
     assert np.flatnonzero(~read.usable[0]).tolist() == [1111]
-
-
-def test_what_is_said_of_the_load_takes_away_all_of_its_samples_and_no_others() -> None:
-    run, at = _run(), [np.isin(np.arange(TIME_S.size), places) for places in ([3], [5, 6], [8])]
-    findings = [Finding("spikes", one, "", of_load=of) for one, of in zip(at, (True, True, False), strict=True)]
-    assert np.flatnonzero(~_with_known_load(run, findings).load.present).tolist() == [3, 5, 6]
-    assert _with_known_load(run, findings[2:]) is run
-    assert _with_known_load(run, ()) is run
 
 
 @pytest.mark.parametrize("value", [5000.0, 99999.0, -9999.0])
@@ -238,3 +232,11 @@ def test_a_unit_of_which_one_load_sample_is_wild_is_as_good_as_it_was(value: flo
     assert found.baseline.rmse == pytest.approx(plain.baseline.rmse, rel=0.02)
     (fault,) = (one for one in found.data_faults if one.kind == "spikes")
     assert fault.share == pytest.approx(1.0 / len(run))
+
+
+def test_of_the_load_no_samples_are_taken_but_those_that_are_none() -> None:
+    run, at = _run(), [np.isin(np.arange(TIME_S.size), places) for places in ([3], [5, 6], [8])]
+    findings = [Finding("spikes", one, "", no_load=of) for one, of in zip(at, (*at[:2], None), strict=True)]
+    assert np.flatnonzero(~_with_known_load(run, findings).load.present).tolist() == [3, 5, 6]
+    assert _with_known_load(run, findings[2:]) is run
+    assert _with_known_load(run, ()) is run
