@@ -8,6 +8,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 
+ROUNDING = 1e-9  # share of full scale: what it leaves where nothing else is left
 FLOOR = 1e-6  # share of full scale: no sensor is better, and less than that of noise leaves rounding to decide
 
 
@@ -31,4 +32,4 @@ def correlated_sd(residuals: Sequence[Array], kept: Sequence[Mask]) -> float:
         square += float(signal @ signal)
         count += size
         repeated += size * float(2.0 * covariance[:until].sum() / max(float(covariance[0]), 1e-300) - 1.0)
-    return max(float(np.sqrt(square * max(repeated / max(count, 1), 1.0) / max(count, 1))), FLOOR)
+    return max(float(np.sqrt(square * max(repeated / max(count, 1), 1.0) / max(count, 1))) + ROUNDING, FLOOR)
