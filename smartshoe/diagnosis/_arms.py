@@ -93,7 +93,9 @@ def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
 
 
 def with_arm(model: ExtendedModel, arm: Arm) -> ExtendedModel:
-    return replace(model, relaxing_share=arm.share, relaxation_rate_per_s=arm.rate_per_s)
+    """``model`` with another arm, which reads as much of a fast load: what a held one reads is for the arm to say."""
+    fast = model.gain / (1.0 + model.relaxing_share)
+    return replace(model, gain=fast * (1.0 + arm.share), relaxing_share=arm.share, relaxation_rate_per_s=arm.rate_per_s)
 
 
 def effect_count(model: ExtendedModel) -> int:

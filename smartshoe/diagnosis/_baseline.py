@@ -64,6 +64,6 @@ def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float
     if recording is None or scale.unit.quantity != "pressure":
         return USUAL_WALL_RATIO
     area_m2 = recording.positive("effective_area_m2", "m2")
-    pascal_per_newton = gain * float(scale.unit.to_si(np.array([scale.reading]))[0]) / scale.load_n
+    pascal_per_newton = gain * float(scale.unit.to_si(np.array([abs(scale.reading)]))[0]) / scale.load_n
     ratio = 1.0 / (area_m2 * pascal_per_newton)
     return ratio if 1.02 < ratio < 50.0 else USUAL_WALL_RATIO

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 
 from smartshoe.arrays import Mask
 from smartshoe.diagnosis._session import LEAST_WINDOW, Session, have_later_cycles
-from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import LATER_CYCLES
 from smartshoe.signals.loading import turning_points
@@ -171,8 +172,17 @@ def _are_shuffled(each: Sequence[Sequence[_Rise]], thresholds: Thresholds) -> bo
 
 
 def _still(session: Session, thresholds: Thresholds) -> Mask:
-    """(n,) True where the load does not move."""
-    return np.asarray(np.abs(session.conditions.rate_per_s) < thresholds.still_per_s)
+    """(n,) True where the load does not move, from sample to sample; of a noisy load by its means before and after."""
+    conditions, largest = session.conditions, largest_of_noise(session.conditions.load.size, thresholds)
+    if largest * math.sqrt(2.0) * conditions.load_noise <= thresholds.still_per_s * conditions.step_s:
+        return np.asarray(np.abs(conditions.rate_per_s) < thresholds.still_per_s)
+    width = max(1, round(0.5 * thresholds.settled_s / conditions.step_s))
+    total, at = np.concatenate([[0.0], np.cumsum(conditions.load)]), np.arange(conditions.load.size)
+    first, last = np.maximum(at + 1 - width, 0), np.minimum(at + 1 + width, at.size)
+    before = (total[at + 1] - total[first]) / (at + 1 - first)
+    after = np.where(last > at + 1, (total[last] - total[at + 1]) / np.maximum(last - at - 1, 1), before)
+    noise = largest * conditions.load_noise * math.sqrt(2.0 / width)
+    return np.asarray(np.abs(after - before) < thresholds.still_per_s * width * conditions.step_s + noise)
 
 
 def _held(session: Session, thresholds: Thresholds) -> Mask:

@@ -64,8 +64,10 @@ def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
 
 def _off_n(session: Session, model: ExtendedModel) -> Array:
     """(n,) compensated force less load in N; the recording's own offset and past are no part of the reading."""
-    _, own = own_of(session, model, session.reading - model.simulate(session.conditions))
-    compensator = ExtendedCompensator(model, 1.0 / session.conditions.step_s)
+    compensator, undone = ExtendedCompensator(model, 1.0 / session.conditions.step_s), model
+    for name in compensator.not_inverted:  # what is not taken off is the offset's as far as it is one
+        undone = undone.without(name)
+    _, own = own_of(session, undone, session.reading - undone.simulate(session.conditions))
     force_n = compensator.apply((session.reading - own) * model.full_scale_reading)
     return force_n - session.conditions.load * model.full_scale_load_n
 

@@ -103,10 +103,11 @@ def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
 
     A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
     """
-    shapes = law.shapes_with(logged_channels(likelihood.sessions))
+    logged = logged_channels(likelihood.sessions)
+    begun = (law.begun(shape, sizes, logged) for shape in law.shapes_with(logged) for sizes in SIZES)
     slopes = [rows_of(model, session)[:, 1:] for session in likelihood.sessions]
     tried = []
-    for start in (model.with_part(law, law.begun(shape, sizes)) for shape in shapes for sizes in SIZES):
+    for start in (model.with_part(law, values) for values in begun):
         rows = [_with_own(start, law.name, one, known) for one, known in zip(likelihood.sessions, slopes, strict=True)]
         tried.append(fit(likelihood, start, 1, rows))
     return fit(likelihood, min(tried, key=lambda f: f.cost).model, FEW_STEPS)

@@ -106,22 +106,25 @@ def few_cycles_of(name: Name, cycles: int) -> str:
 def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> str | None:
     """What is said of an effect beside a surer one of its mechanism, of whose law it may be the departure.
 
-    It is none where it is larger than laws depart by.
+    So may a curve be beside a curve that no law follows: what its free form misses is of the load alone. It is none
+    where it is larger than laws depart by.
     """
-    alike = (one for one in names if one.effect.mechanism == name.effect.mechanism != "")
+    alike = [one for one in names if one.effect.mechanism == name.effect.mechanism != ""]
+    if name.effect.is_memoryless and not name.kind_only:
+        alike += [one for one in names if one.effect.is_memoryless and one.kind_only]
     surest = max(alike, key=lambda one: one.kind, default=name)
     if surest is name or name.member.size > thresholds.law_departure * surest.member.size:
         return None
     said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
     return (
         f"{said} fits, but it may be no more than the error of the equation of {other} (both are"
-        f" {name.effect.mechanism}), so that it is not named"
+        f" {name.effect.mechanism or 'curves of the load'}), so that it is not named"
     )
 
 
-def end_of_range_of(plain: ExtendedModel, extended: ExtendedModel) -> str | None:
-    """What is said of a unit that relaxes more slowly, or faster, than the baseline can follow."""
-    slow, fast = plain.relaxation_rate_per_s <= RATE.lower, extended.relaxation_rate_per_s >= RATE.upper
+def end_of_range_of(model: ExtendedModel) -> str | None:
+    """What is said of a unit that relaxes more slowly, or faster, than the ``model`` can follow, effects and all."""
+    slow, fast = model.relaxation_rate_per_s <= RATE.lower, model.relaxation_rate_per_s >= RATE.upper
     if not (slow or fast):
         return None
     return (

@@ -136,8 +136,9 @@ def _other_laws(
 
 def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:
     """``model`` with a law at the likeliest of its shapes, from where a fit begins."""
-    shapes = law.shapes_with(logged_channels(likelihood.sessions))
-    return min((model.with_part(law, law.begun(shape)) for shape in shapes), key=likelihood.cost)
+    logged = logged_channels(likelihood.sessions)
+    begun = (law.begun(shape, logged=logged) for shape in law.shapes_with(logged))
+    return min((model.with_part(law, values) for values in begun), key=likelihood.cost)
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:

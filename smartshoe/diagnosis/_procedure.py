@@ -192,7 +192,7 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
-    elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
+    elsewhere = off_elsewhere(fine, off, within.size, thresholds)
     unproven = 0.0 if found.can_validate else not_shown_to_be_noise(fine, off, after, thresholds)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
@@ -249,7 +249,7 @@ def _diagnosed(
             *(
                 said
                 for said in (
-                    end_of_range_of(found.baseline.model, extended),
+                    end_of_range_of(extended),
                     wall_ratio_of(extended, sessions, thresholds),
                 )
                 if said is not None

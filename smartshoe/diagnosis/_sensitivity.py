@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, correlated_sd
 from smartshoe.diagnosis._session import Session, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
@@ -282,7 +282,7 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
     count = sum(int(s.fitted.sum()) for s in fitted)
     scales = np.sqrt(power / count)
     scales[0] = 1.0
-    scales[scales == 0] = 1.0
+    scales[scales < FLOOR] = 1.0  # what is less than any noise is rounding, and is not made as large as the others
     for columns in rows:
         columns /= scales
     return Linearised(

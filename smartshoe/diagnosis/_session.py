@@ -162,7 +162,7 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
         slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
         fastest = float(np.percentile(slope, 99.5))
         ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
-        factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s)))
+        factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)))  # time stamps are rounded
     total = sum(len(recording) for recording in recordings)
     shape = min(factors)
     return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))

@@ -65,6 +65,10 @@ def causes_among(
         is_unsteady=bool(found.zero_changes),
         alone=found.alone,
     )
+    if not likely and found.alone is not None:
+        # What does most by itself does not hang on what undoes it beside others.
+        undone = [one for one in found.members if one.name in found.undone and one.effect.kind == found.alone.kind]
+        likely = names_of(undone, left, thresholds, is_unsteady=True, alone=found.alone)
     seen = Named(likely).without(
         lambda one: other_kind_of(one, model, thresholds) or not_shown_of(one, given.excitation)
     )

@@ -134,8 +134,9 @@ def zeros_of(
     load, reading = float(np.mean(loads)), float(np.mean(readings))
     many = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
-    if abs(reading) > thresholds.foreign_zero or abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
-        return ()  # a convention of the sensor's; or the reading agrees with the load, and the unit bears it
+    if abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
+        return ()  # the reading agrees with the load, and the unit bears it
+    is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
     commanded = any(one.recording.command_n is not None for one in sessions if one.fitted.any())
     borne = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):

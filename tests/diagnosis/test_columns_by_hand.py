@@ -18,7 +18,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, baseline_of, with_usual_arm
 from smartshoe.diagnosis._force import force_error
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
-from smartshoe.diagnosis._noise import correlated_sd
+from smartshoe.diagnosis._noise import FLOOR, correlated_sd
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
@@ -332,8 +332,11 @@ def test_columns_are_what_each_strength_does_to_the_reading() -> None:
             assert told[:, list(one.columns)] == pytest.approx(expected)
     whole = np.concatenate([row[one.fitted] for row, one in zip(found.rows, sessions, strict=True)])
     rms = np.sqrt(np.mean(whole[:, 1:] ** 2, axis=0))
-    assert rms[rms > 0.0] == pytest.approx(1.0)
-    assert list(found.scales[1:][rms == 0.0]) == [1.0] * int(np.sum(rms == 0.0))
+    # What moves the reading by less than any noise is rounding, which is left as small as it is.
+    is_there = rms * found.scales[1:] >= FLOOR
+    assert 0 < np.sum(~is_there) < np.sum(is_there)
+    assert rms[is_there] == pytest.approx(1.0)
+    assert (found.scales[1:][~is_there] == 1.0).all()
 
 
 def effect_of(candidates: Any, name: str) -> Any:

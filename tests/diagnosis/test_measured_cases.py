@@ -307,9 +307,13 @@ class TestSensors:
 
     @pytest.mark.bank
     @pytest.mark.parametrize("seed", [0, 1, 2])
-    def test_a_curve_and_what_relaxes_are_told_of_three_rates(self, measured: Path, seed: int) -> None:
+    def test_a_curve_and_no_wrong_kind_is_told_of_three_rates(self, measured: Path, seed: int) -> None:
+        """What relaxes is in the extension, and is named in one draw of eight."""
         found = diagnose(_shaken(_files(measured, "vhb_0d0[135]", "position_mm"), seed))
-        assert {cause.effect.family for cause in found.causes} == KINDS["vhb_two_rates"]
+        assert {"static_curve"} <= {cause.effect.family for cause in found.causes} <= KINDS["vhb_two_rates"]
+        assert {"power_law_creep", "second_relaxation"} & {*found.minor, *(cause.name for cause in found.causes)}
+        assert found.extended is not None
+        assert found.extended.variance_explained_percent > 99.8
 
     @pytest.mark.bank
     @pytest.mark.parametrize("seed", range(6))
@@ -317,8 +321,7 @@ class TestSensors:
         """It fits in many draws, in the place of a slow relaxation: nothing in the strip's files tells."""
         found = _sensor(measured, "vhb_two_rates", seed)
         assert "zero" not in {cause.effect.family for cause in found.causes}
-        of_sets = [said for said in found.limits if said.startswith("permanent set fits")]
-        assert all("recordings of one load cycle cannot show it" in said for said in of_sets)
+        assert all("is not named" in said for said in found.limits if said.startswith("permanent set fits"))
 
     @pytest.mark.bank
     def test_rates_three_times_apart_are_several_though_presses_have_few_samples(self, measured: Path) -> None:
@@ -366,7 +369,7 @@ class TestSensors:
                 least = Thresholds().least_confidence
                 assert cause.confidence <= (0.5 if cause.effect.goes_with_the_clock else least)
         assert "shuffle the loads" in _limit(found, "grow, or fall, with time")
-        assert found.verdict == "partly_explained"
+        assert found.verdict in ("partly_explained", "explained")  # where a law of the curve follows
         assert found.extended is not None
         assert found.extended.variance_explained_percent > 98.0
 

@@ -141,7 +141,7 @@ def test_the_fastest_ramp_keeps_so_many_samples() -> None:
     # Of a fiftieth of a second in a sample a window is two; of a load that never moves the whole of 9.6 s is one.
     assert thinning([slow, _run(np.linspace(0.0, 1.0, 4))], SCALE, STANDARD) == 1
     assert thinning([_run(np.linspace(0.0, 1.0, 5))], SCALE, STANDARD) == 1
-    assert thinning([_run(np.full(481, 0.5), np.linspace(0.0, 1.0, 481))], SCALE, STANDARD) == 19
+    assert thinning([_run(np.full(481, 0.5), np.linspace(0.0, 1.0, 481))], SCALE, STANDARD) == 20
     falling = _run(1.0 - np.minimum(np.arange(800) / 155.0, 1.0))
     assert thinning([falling], SCALE, STANDARD) == 5
 

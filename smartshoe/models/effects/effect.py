@@ -268,11 +268,16 @@ class Effect(ABC):
             raise UsageError(f"effect {self.name}: shape parameter {missing[0]} has no value")
         return np.array([at[p.name] if p.null is None else p.null for p in self.parameters], dtype=float)
 
-    def begun(self, shape: Mapping[str, float] | None = None, sizes: float = 0.5) -> Array:
-        """As `start`, with each strength ``sizes`` typical ones away from null, on the side that physics allows."""
+    def begun(
+        self, shape: Mapping[str, float] | None = None, sizes: float = 0.5, logged: Collection[str] = ()
+    ) -> Array:
+        """As `start`, with each strength ``sizes`` typical ones away from null, on the side that physics allows.
+
+        Those of a channel that is not ``logged`` stay at null: nothing would move them from where they begin.
+        """
         values = self.start(shape)
         for k, p in enumerate(self.parameters):
-            if p.null is not None:
+            if p.null is not None and (not p.channel or p.channel in logged):
                 values[k] = min(max(p.null + (sizes if p.upper > p.null else -sizes) * p.size, p.lower), p.upper)
         return values
 
