@@ -24,7 +24,7 @@ from smartshoe.integrity.thresholds import Thresholds
 
 
 @dataclass(frozen=True, eq=False)
-class Named:
+class Chosen:
     """``names`` and ``zeros`` that are causes; ``limits``: what is said of those that fit and are none.
 
     ``nameless``: how far the largest that is of no kind with a name moves the reading, rms, a share of full scale.
@@ -35,7 +35,7 @@ class Named:
     limits: tuple[str, ...] = ()
     nameless: float = 0.0
 
-    def without(self, why: Callable[[Name], str | None]) -> Named:
+    def without(self, why: Callable[[Name], str | None]) -> Chosen:
         """Without the names for which there is a reason why they are none, which is said."""
         reasons = [why(one) for one in self.names]
         kept = tuple(one for one, said in zip(self.names, reasons, strict=True) if said is None)
@@ -50,7 +50,7 @@ def causes_among(
     thresholds: Thresholds,
     *,
     is_followed: bool,
-) -> Named:
+) -> Chosen:
     """Of what was ``found``, and of ``zeros`` that were seen; ``left``: rms of the structure that no effect explains.
 
     ``is_followed``: all effects together leave as little of what was fitted as laws do.
@@ -69,7 +69,7 @@ def causes_among(
         # What does most by itself does not hang on what undoes it beside others.
         undone = [one for one in found.members if one.name in found.undone and one.effect.kind == found.alone.kind]
         likely = names_of(undone, left, thresholds, is_unsteady=True, alone=found.alone)
-    seen = Named(likely).without(
+    seen = Chosen(likely).without(
         lambda one: other_kind_of(one, model, thresholds) or not_shown_of(one, given.excitation)
     )
     nameless = max((one.member.size for one in likely if one not in seen.names), default=0.0)
@@ -88,7 +88,7 @@ def causes_among(
     kept = tuple(
         one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
     )
-    seen = Named(names, kept, (*before, *seen.limits, *past), nameless)
+    seen = Chosen(names, kept, (*before, *seen.limits, *past), nameless)
     return seen.without(lambda one: _crept(one, kept, thresholds))
 
 
