@@ -133,7 +133,7 @@ def infer(
         found = found.with_nothing_but(plain) if again is None or again.is_stepped_down else again
         members = found.members()
     alone, refused = None, found.refused
-    nameable = [one for one in members if not found.undone or one.name not in found.undone]
+    nameable = [one for one in members if one.name not in found.undone]
     if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in nameable):
         progress("trying each of a few effects alone")
         best_alone = _best_alone(begun, plain, sessions)

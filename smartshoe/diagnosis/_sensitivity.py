@@ -98,7 +98,7 @@ def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) ->
     time_s = session.conditions.time_s
     own = [session.own_gain_sd * read * part for part in session.gain_parts]
     steps = [np.arange(time_s.size) >= at for at in session.zero_changes]
-    after = [_from(at, np.exp(-pole_per_s * (time_s[at:] - time_s[at])), time_s.size) for at in session.gap_ends]
+    after = [np.pad(np.exp(-pole_per_s * (time_s[at:] - time_s[at])), (at, 0)) for at in session.gap_ends]
     more = [*own, *steps, *after]
     columns = np.empty((time_s.size, 2 + len(more)), order="F")
     columns[:, 0] = 1.0
@@ -106,11 +106,6 @@ def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) ->
     for k, one in enumerate(more, start=2):
         columns[:, k] = one
     return columns
-
-
-def _from(at: int, values: Array, count: int) -> Array:
-    """(count,) nothing until the sample ``at``, and ``values`` from there on."""
-    return np.concatenate([np.zeros(at), values])[:count]
 
 
 def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:

@@ -14,6 +14,7 @@ from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import in_words
 from smartshoe.models.extended import ExtendedModel
 
 Progress = Callable[[str], None]
@@ -124,11 +125,8 @@ def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood,
 
 
 def listed(names: Iterable[str]) -> str:
-    """Identifiers as words, one after the other; a flexible block as the free form that it is."""
-    free = (
-        f"{name.removeprefix('flexible_')} of free form" if name.startswith("flexible_") else name for name in names
-    )
-    return ", ".join(name.replace("_", " ") for name in free)
+    """Identifiers as words, one after the other."""
+    return ", ".join(map(in_words, names))
 
 
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:

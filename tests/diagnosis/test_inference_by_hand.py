@@ -54,6 +54,12 @@ class _Model(str):
     parts: tuple[Any, ...] = ()
 
 
+class _Sure(float):
+    """A member, told as how sure it is."""
+
+    name = "member"
+
+
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
@@ -246,7 +252,7 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
     monkeypatch.setattr(_inference, "with_likelier_gains", likelier)
     monkeypatch.setattr(_inference, "gains_of", lambda sessions, model: (sessions, model))
     monkeypatch.setattr(_inference, "zero_changes_of", lambda sessions, model: ())
-    flow.members = (0.9,)
+    flow.members = (_Sure(0.9),)
     stands = [True, True, True]  # of each that is told, from the innermost on
     monkeypatch.setattr(_inference, "foretells", lambda *given: stands.pop())
     found = infer(MODEL, "shared", STANDARD, flow.said.append)  # type: ignore[arg-type]
@@ -289,7 +295,7 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
 def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> None:
     """And it is the answer where nothing else is left."""
     least = STANDARD.least_confidence
-    flow.members, flow.refused = (0.1, 0.99 * least), {"settled first": ("b", "curve")}  # told as how sure each is
+    flow.members, flow.refused = (_Sure(0.1), _Sure(0.99 * least)), {"settled first": ("b", "curve")}
     assert flow.infer().alone is None
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
@@ -303,7 +309,7 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     flow.parts = {"settled first": (part, part)}
     found = flow.infer()
     assert (found.alone, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
-    flow.members = (0.1, least)
+    flow.members = (_Sure(0.1), _Sure(least))
     assert flow.infer().alone is None
 
 

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._lack_of_fit import LackOfFit
 from smartshoe.diagnosis._procedure import _outside, _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
-from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._session import Session, full_scale, prepare
 from smartshoe.diagnosis._verdict import (
     left_where_judged,
     names_in,
@@ -362,15 +362,18 @@ def test_another_unit_held_out_leaves_nothing_good_enough(runs: list[Recording],
     assert again.extended.rmse / FULL_MBAR == pytest.approx(share, rel=0.2)
 
 
-def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() -> None:
-    limits, count = Thresholds(), 2000
-    time_s = STEP_S * np.arange(count)
+def _fitted_and_held_out(time_s: Array, limits: Thresholds) -> list[Session]:
     run = Recording.from_arrays(time_s=time_s, force_n=100.0 + time_s, pressure_mbar=10.0 + time_s, name="r")
-    usable = np.ones(count, dtype=bool)
+    usable = np.ones(time_s.size, dtype=bool)
     scale = full_scale([run], [usable], limits)
-    fitted, apart = prepare([run, run], [usable, usable], [False, True], scale, 1, limits)
+    return prepare([run, run], [usable, usable], [False, True], scale, 1, limits)
+
+
+def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() -> None:
+    limits, time_s = Thresholds(), STEP_S * np.arange(2000)
+    fitted, apart = _fitted_and_held_out(time_s, limits)
     wave = np.sqrt(2.0) * np.sin(time_s)
-    noise = np.random.default_rng(1).standard_normal(count)
+    noise = np.random.default_rng(1).standard_normal(time_s.size)
     for size, within, off in (
         (2.1 * limits.tolerable, 0.0, 2.1 * limits.tolerable),
         (1.9 * limits.tolerable, 0.0, 0.0),
@@ -384,14 +387,10 @@ def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() ->
 
 
 def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_than_tolerable() -> None:
-    limits, count = Thresholds(), 2000
-    time_s = STEP_S * np.arange(count)
-    run = Recording.from_arrays(time_s=time_s, force_n=100.0 + time_s, pressure_mbar=10.0 + time_s, name="r")
-    usable = np.ones(count, dtype=bool)
-    scale = full_scale([run], [usable], limits)
-    sessions = prepare([run, run], [usable, usable], [False, True], scale, 1, limits)
+    limits, time_s = Thresholds(), STEP_S * np.arange(2000)
+    sessions = _fitted_and_held_out(time_s, limits)
     wave = np.sqrt(2.0) * np.sin(time_s)
-    noise = 1e-3 * np.random.default_rng(1).standard_normal((2, count))
+    noise = 1e-3 * np.random.default_rng(1).standard_normal((2, time_s.size))
     untested, tested = _left(0.0), SimpleNamespace(is_noise=True)
     for size, left in ((0.9 * limits.tolerable, 0.0), (1.1 * limits.tolerable, 1.1 * limits.tolerable)):
         residuals = [size * wave + one for one in noise]  # of what was fitted and of what was not

@@ -1,7 +1,14 @@
 """What a measurement may hold beside the standard linear solid: one file an effect, found by `catalogue`."""
 
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.catalogue import blocks, catalogue, effect, is_told_from_its_family, told_apart_by
+from smartshoe.models.effects.catalogue import (
+    blocks,
+    catalogue,
+    effect,
+    in_words,
+    is_told_from_its_family,
+    told_apart_by,
+)
 from smartshoe.models.effects.effect import Conditions, CoreEffect, CStep, Effect, EffectParameter, Inverse, Place
 from smartshoe.models.effects.exposure import by
 from smartshoe.models.elements import Arm, Heat, Leak
@@ -23,6 +30,7 @@ __all__ = [
     "c_number",
     "catalogue",
     "effect",
+    "in_words",
     "is_told_from_its_family",
     "told_apart_by",
 ]

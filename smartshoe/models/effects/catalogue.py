@@ -84,6 +84,13 @@ def blocks() -> Mapping[str, tuple[Effect, ...]]:
     return MappingProxyType({name: tuple(one for one in flexible if one.family == name) for name in families})
 
 
+def in_words(name: str) -> str:
+    """What a person calls an effect, or any other word of an identifier; a flexible block is one "of free form"."""
+    found = _found().get(name)
+    said = f"{name.removeprefix('flexible_')} of free form" if found is not None and found.is_flexible else name
+    return said.replace("_", " ")
+
+
 def effect(name: str) -> Effect:
     """The effect or flexible block called ``name``; raises `UsageError` with the names there are."""
     found = _found().get(name)

@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects import catalogue, effect, told_apart_by
+from smartshoe.models.effects import catalogue, in_words, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
@@ -48,9 +48,7 @@ def how_sure(cause: Cause) -> str:
 
 def unnamed(diagnosis: Diagnosis) -> str:
     """The effects of the extended model that are no causes."""
-    known = [effect(name) for name in diagnosis.minor]
-    said = (f"{one.name.removeprefix('flexible_')}_of_free_form" if one.is_flexible else one.name for one in known)
-    return listed(sorted(said), "and")
+    return listed(sorted(map(in_words, diagnosis.minor)), "and")
 
 
 def is_free_form(cause: Cause) -> bool:
