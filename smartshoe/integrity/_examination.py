@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,6 +49,18 @@ Clock = tuple[float, float, Lags]  # offset and rate as in `Integrity`, lags tha
 UNTOLD: Clock = (0.0, 0.0, UNSEEN)
 
 
+@dataclass(frozen=True, eq=False)
+class _Tamed:
+    """A recording as ``logged``, but each channel at its own rate; ``recording`` is it without wild values.
+
+    ``findings``: what was found on the way.
+    """
+
+    logged: Recording
+    recording: Recording
+    findings: tuple[Finding, ...]
+
+
 def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
     """What is wrong with the data of ``recordings``, before any model; deterministic.
 
@@ -61,17 +74,15 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     clocks: list[Clock] = []
     refusals: list[str] = []
     decided = decided_by(thresholds)
-    slow = at_their_rates(recordings, decided)
-    recordings = [recording for recording, _ in slow]
-    tame = [without_wild(recording, decided) for recording in recordings]
-    tame = [(one, [*held, *wild]) for (one, wild), (_, held) in zip(tame, slow, strict=True)]
-    examined = [_examined(one, *rest, decided) for one, rest in zip(recordings, tame, strict=True)]
+    tamed = _tamed(recordings, decided)
+    examined = [_examined(one, decided) for one in tamed]
     dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
     if dropped_to.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
-        examined = [_examined(one, *rest, decided, dropped_to) for one, rest in zip(recordings, tame, strict=True)]
+        examined = [_examined(one, decided, dropped_to) for one in tamed]
     kept: list[Recording] = []
-    for number, ((recording, _), (findings, mask, clock)) in enumerate(zip(tame, examined, strict=True)):
+    for number, (tame, (findings, mask, clock)) in enumerate(zip(tamed, examined, strict=True)):
+        recording = tame.recording
         kept.append(_with_known_load(recording, findings))
         faults += [_fault(number, recording, finding) for finding in findings]
         refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
@@ -88,24 +99,28 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
 
 
+def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
+    made = []
+    for logged, held in at_their_rates(recordings, thresholds):
+        recording, wild = without_wild(logged, thresholds)
+        made.append(_Tamed(logged, recording, (*held, *wild)))
+    return made
+
+
 def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recording:
     """Without the samples of the load at which it was not the load."""
     none = [finding.no_load for finding in findings if finding.no_load is not None and finding.no_load.any()]
     return with_missing(recording, recording.load, np.any(none, axis=0)) if none else recording
 
 
-def _examined(
-    recording: Recording, tame: Recording, wild: Sequence[Finding], thresholds: Thresholds, dropped_to: Array = NONE
-) -> tuple[list[Finding], Mask, Clock]:
-    """The findings of one recording, its usable samples, its clock; ``dropped_to`` as in `View`.
-
-    ``tame`` is the recording without what is ``wild``, as was found before.
-    """
+def _examined(tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE) -> tuple[list[Finding], Mask, Clock]:
+    """The findings of one recording, its usable samples, its clock; ``dropped_to`` as in `View`."""
+    recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
     if findings:
         return findings, ~usable, UNTOLD
-    findings = [*wild, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
+    findings = [*tame.findings, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
@@ -114,7 +129,7 @@ def _examined(
     if lacking is not None:
         findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
     else:
-        view = _view(tame, thresholds, dropped_to)
+        view = _view(tame.recording, thresholds, dropped_to)
         if view is None:
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))

@@ -55,22 +55,22 @@ def _wild(channel: Channel, thresholds: Thresholds) -> Mask:
 
     For a few samples at a time, or for longer where they are one number, which stands for nothing.
     """
-    none = np.zeros(channel.values.size, dtype=bool)
+    wild = np.zeros(channel.values.size, dtype=bool)
     values = channel.values[channel.present]
     if values.size < thresholds.least_samples:
-        return none
+        return wild
     low, high = np.quantile(values, [0.5 * thresholds.faulty_share, 1.0 - 0.5 * thresholds.faulty_share])
     beyond = channel.values - np.clip(channel.values, low, high)
     far = channel.present & (np.abs(beyond) > thresholds.extrapolates * (high - low))
     if not high > low or far.mean() > 0.5 * thresholds.faulty_share:
-        return none
+        return wild
     leap = np.abs(np.diff(beyond, prepend=0.0, append=0.0))  # into each sample, and out of the last
     for first, last in zip(*runs_of(far), strict=True):
         run = channel.values[first:last]
         is_short = last - first <= thresholds.few or np.ptp(run) == 0.0
         leaps = (leap[first] > 0.5 * abs(beyond[first]), leap[last] > 0.5 * abs(beyond[last - 1]))
-        none[first:last] = is_short and all(leaps)
-    return none
+        wild[first:last] = is_short and all(leaps)
+    return wild
 
 
 def with_missing(recording: Recording, channel: Channel, at: Mask) -> Recording:
