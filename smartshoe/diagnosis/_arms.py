@@ -76,11 +76,17 @@ def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     """The best of fits from a baseline that creeps under load, where that of ``state`` falls.
 
     Which of two exponentials is the baseline's is a convention: of a wall it is the one that creeps under load, and
-    what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls.
+    what falls is an effect's. It may be the arm of an effect that was found, or hidden by the one that falls, which may
+    be an effect by itself: air that leaves.
     """
-    bare = _without_core_effects(state.fit.model)
-    arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(state.fit.model))]
-    found = _fits_from([with_arm(bare, arm) for arm in arms], state, sessions)
+    model, bare = state.fit.model, _without_core_effects(state.fit.model)
+    arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(model))]
+    starts = creeping = [with_arm(bare, arm) for arm in arms]
+    for effect in available(sessions, state.thresholds):
+        values = effect.falling_at(model.pole_per_s, model.wall_ratio)
+        if values is not None and effect.name not in bare.names:
+            starts = [*starts, *(one.with_part(effect, values) for one in creeping)]
+    found = _fits_from(starts, state, sessions)
     return _at_best_of(_at_their_end(_likeliest(found, state)), state, sessions)
 
 

@@ -28,7 +28,7 @@ from smartshoe.diagnosis._gains_and_zeros import (
     zero_changes_of,
 )
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._laws import likelier_laws, with_laws, with_likelier_laws
+from smartshoe.diagnosis._laws import likelier, with_laws
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
@@ -41,7 +41,6 @@ from smartshoe.diagnosis._settling import (
     better_from_one,
     law_or_block,
     listed,
-    score_of,
     settled,
     simpler,
 )
@@ -119,19 +118,15 @@ def infer(
         other = _judged(with_blocks, plain, sessions)
         if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
-    found, members = _without_redundant(found, plain, sessions)
-    while laws := likelier_laws(members, state.banned):
-        state = with_likelier_laws(state, found.fit.model, laws, sessions)
-        other = _judged(state, plain, sessions)
-        odds = state.evidence.odds
-        if score_of(other.fit.model, other.likelihood, odds) >= score_of(found.fit.model, other.likelihood, odds):
-            break  # a law that follows better in its place led to a set that does not
-        found, members = _without_redundant(other, plain, sessions)
+    found, members = _likeliest(found, plain, sessions, progress)
     if found.is_stepped_down:
         first = _first_step(begun, state, sessions)
         again = None if first is None else _judged(first, plain, sessions)
-        found = found.with_nothing_but(plain) if again is None or again.is_stepped_down else again
-        members = found.members()
+        if again is not None and not again.is_stepped_down:
+            found, members = _likeliest(again, plain, sessions, progress)
+        else:
+            found = found.with_nothing_but(plain)
+            members = found.members()
     alone, refused = None, found.refused
     nameable = [one for one in members if one.name not in found.undone]
     if all(probability_of_kind(one, 0.0, thresholds) < thresholds.least_confidence for one in nameable):
@@ -242,6 +237,29 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = len(extra) < following
     return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)
+
+
+def _likeliest(
+    found: _Judged, plain: Fit, sessions: Sequence[Session], progress: Progress
+) -> tuple[_Judged, tuple[Member, ...]]:
+    """The likeliest set that changes of one member or law lead to from ``found``, and its members, weighed."""
+    while True:
+        found, members = _without_redundant(found, plain, sessions)
+        told = [one for one in members if one.name not in plain.model.names]  # two clocks were told before any model
+        for better in likelier(found.fit, found.evidence, told, sessions):
+            progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
+            other = _judged(better, plain, sessions)
+            if _is_likelier(other, found, sessions):
+                found = other
+                break
+        else:  # no change is likelier, or leads to a set that is
+            return found, members
+
+
+def _is_likelier(other: _Judged, found: _Judged, sessions: Sequence[Session]) -> bool:
+    """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``."""
+    new, old = (evidence_about(one.fit.model, sessions, found.evidence)[1].score for one in (other, found))
+    return new < old
 
 
 def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) -> tuple[_Judged, tuple[Member, ...]]:

@@ -11,6 +11,7 @@ gain, a slow walk, a random telegraph repeat with no cycle, but they do not aver
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -32,18 +33,28 @@ PLACES = 64  # of a cycle, when repeats are laid over each other
 class LackOfFit:
     """``rms`` of the structure over the record, shares of full scale (0 where its variance comes out negative).
 
-    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks. ``significant``: noise that is
-    known by so many hardly reaches it (Student's t).
+    ``z`` is its score against noise alone, from ``pairs`` of repeats or as many blocks; ``variance_sd`` the standard
+    deviation of its variance under noise alone. ``significant``: noise that is known by so many hardly reaches it
+    (Student's t).
     """
 
     rms: float
     z: float
     pairs: int
     thresholds: Thresholds
+    variance_sd: float = math.inf
 
     @property
     def significant(self) -> bool:
-        return self.pairs > 1 and self.z > -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
+        return self.pairs > 1 and self.z > self._largest_of_noise
+
+    def would_show(self, rms: float) -> bool:
+        """Whether structure of this ``rms`` would be significant: where it would not, none is no proof of noise."""
+        return self.pairs > 1 and rms**2 > self._largest_of_noise * self.variance_sd
+
+    @property
+    def _largest_of_noise(self) -> float:
+        return -float(stdtrit(self.pairs - 1, 0.5 * self.thresholds.false_alarm))
 
 
 def repeating(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> LackOfFit:
@@ -65,8 +76,8 @@ def repeating(sessions: Sequence[Session], residuals: Sequence[Array], threshold
         pairs += pair_count
     if not pairs:
         return LackOfFit(0.0, 0.0, 0, thresholds)
-    z = power / max(float(np.sqrt(variance)), 1e-300)
-    return LackOfFit(float(np.sqrt(max(power, 0.0))), z, pairs, thresholds)
+    sd = max(float(np.sqrt(variance)), 1e-300)
+    return LackOfFit(float(np.sqrt(max(power, 0.0))), power / sd, pairs, thresholds, sd)
 
 
 def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: float) -> list[tuple[Array, float]]:
@@ -131,8 +142,8 @@ def slow(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Th
     if not excess:
         return LackOfFit(0.0, 0.0, 0, thresholds)
     mean = float(np.mean(excess))
-    z = mean * len(excess) / max(float(np.sqrt(spread)), 1e-300)
-    return LackOfFit(float(np.sqrt(max(mean, 0.0))), z, len(excess), thresholds)
+    sd = max(float(np.sqrt(spread)) / len(excess), 1e-300)
+    return LackOfFit(float(np.sqrt(max(mean, 0.0))), mean / sd, len(excess), thresholds, sd)
 
 
 def _quiet(rows: Array) -> Mask:

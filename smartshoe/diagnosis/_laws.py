@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
-import numpy as np
-
-from smartshoe.arrays import Array
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
-from smartshoe.diagnosis._members import Member, begun_with
-from smartshoe.diagnosis._sensitivity import Candidate, available, logged_channels
+from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._members import Alternative, Member, fit_with
+from smartshoe.diagnosis._search import SWAPS
+from smartshoe.diagnosis._sensitivity import Candidate, available
 from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._state import State, state_at, with_members
+from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
-
-SIZES = (0.5, 5.0, 20.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
 
 
 def with_laws(given: State, plain: ExtendedModel, sessions: Sequence[Session]) -> State:
@@ -47,28 +44,38 @@ def _replaced_with(block: Effect) -> tuple[str, ...]:
     return tuple(curves) if block.is_memoryless else (block.name,)
 
 
-def likelier_laws(members: Sequence[Member], banned: Sequence[str]) -> dict[str, str]:
-    """Members, and the law of its family that follows better in the place of each: fits of the whole model tell.
+def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions: Sequence[Session]) -> Iterator[State]:
+    """What one change makes of a fit, the likeliest first: a member left out, another law or effect in its place.
 
-    The linearised search prefers what comes nearest to all equations of the family.
+    The linearised search weighs all changes about one fit; here each is fitted as a whole model and linearised anew.
+    ``evidence`` gives the noise, which all of them share. None of what is not worth another fit.
     """
-    nearest = ((one, next(iter(one.laws), None)) for one in members if not one.effect.is_flexible)
-    return {
-        one.name: str(law.effect)
-        for one, law in nearest
-        if law is not None and law.margin < 0.0 and law.effect not in banned
-    }
+    tried: list[Fit] = []
+    for one in members:
+        if any(a.effect is None and a.margin < 0.0 for a in one.alternatives):
+            tried.append(one.without)
+        most = evidence.thresholds.law_departure**2 * max(one.fall, 0.0)
+        tried += [a.fit for a in one.laws if a.fit is not None and a.margin < most]
+        other = _nearest_of_another_kind(one, found.model)
+        if other is not None and one.departed > 1.0 and one.size > evidence.thresholds.tolerable:
+            # What departs by more than equations do may be of another kind.
+            law = catalogue()[str(other.effect)]
+            tried.append(fit_with(law, one.without.model, found.likelihood, (other.shape or {},)))
+    if not tried:
+        return
+    score = evidence_about(found.model, sessions, evidence)[1].score
+    changed = []
+    for fitted in tried:
+        about, best = evidence_about(fitted.model, sessions, evidence)
+        if score - best.score >= evidence.odds:
+            changed.append(State(about.given, about, best, fitted))
+    yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
 
 
-def with_likelier_laws(
-    state: State, model: ExtendedModel, laws: Mapping[str, str], sessions: Sequence[Session]
-) -> State:
-    """``state`` at ``model`` with each of ``laws`` in its member's place, and not the other way round again."""
-    likelihood = state.likelihood(sessions)
-    for name, law in laws.items():
-        if law not in model.names:  # it may follow better in the place of more than one
-            model = begun_with(catalogue()[law], model.without(name), likelihood)
-    return state_at(fit(likelihood, model), sessions, state.thresholds, (*state.banned, *laws))
+def _nearest_of_another_kind(member: Member, model: ExtendedModel) -> Alternative | None:
+    """The nearest effect that is not in the model, and no law that was fitted in the member's place."""
+    known = {*model.names, *(a.effect for a in member.laws)}
+    return next((a for a in member.alternatives if a.shape is not None and a.effect not in known), None)
 
 
 def _law_of(
@@ -88,7 +95,7 @@ def _law_of(
         if law.is_flexible or not (law.is_memoryless if is_curve else law.family == block.effect.family):
             continue
         # A law that stands beside the block may do without it.
-        one = nothing if law.name in bare.names else _begun(law, nothing.model, likelihood)
+        one = nothing if law.name in bare.names else fit_with(law, nothing.model, likelihood)
         # A law of another family is another name, with the odds against one.
         other = state.evidence.odds if law.family != block.effect.family else 0.0
         most = thresholds.departure if _is_stretched(one.model, law) else thresholds.law_departure
@@ -96,28 +103,6 @@ def _law_of(
         if missed < most**2:
             misses.append((missed, one))
     return min(misses, key=lambda pair: pair[0]) if misses else None
-
-
-def _begun(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Fit:
-    """``model`` with a law: the best of fits from all its shapes, small and large.
-
-    A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
-    """
-    logged = logged_channels(likelihood.sessions)
-    begun = (law.begun(shape, sizes, logged) for shape in law.shapes_with(logged) for sizes in SIZES)
-    slopes = [rows_of(model, session)[:, 1:] for session in likelihood.sessions]
-    tried = []
-    for start in (model.with_part(law, values) for values in begun):
-        rows = [_with_own(start, law.name, one, known) for one, known in zip(likelihood.sessions, slopes, strict=True)]
-        tried.append(fit(likelihood, start, 1, rows))
-    return fit(likelihood, min(tried, key=lambda f: f.cost).model, FEW_STEPS)
-
-
-def _with_own(model: ExtendedModel, name: str, session: Session, slopes: Array) -> Array:
-    """`rows_of` a model whose last effect is ``name``: the ``slopes`` of all else are as they are without it."""
-    trace = model.trace(session.conditions)
-    own = model.own_sensitivities(name, session.conditions, trace)
-    return np.column_stack([session.reading - trace[0], slopes, own])
 
 
 def _is_stretched(model: ExtendedModel, law: Effect) -> bool:

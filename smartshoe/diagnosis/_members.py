@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,24 +10,30 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
 from smartshoe.diagnosis._search import BREADTH, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
+
+SIZES = (0.5, 5.0, 20.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
+FEW_SHAPES = 2  # of a law, the likeliest by a linearisation, from which its fit begins
 
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
     """Another explanation of what one member explains: ``effect``, None for nothing at all.
 
-    ``margin`` is by how much -2 log of its evidence is worse. ``fit``: of a law that was fitted in a member's place.
+    ``margin`` is by how much -2 log of its evidence is worse. ``fit``: of a law that was fitted in a member's place;
+    ``shape``: of an effect that was not, that at which it is likeliest.
     """
 
     effect: str | None
     margin: float
     fit: Fit | None = None
+    shape: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +94,11 @@ def members_of(
                 best.departed[k],
                 alternatives(evidence, best, member, refused),
                 less[k],
-                _other_laws(one, less[k], likelihood, extended, thresholds, is_ended=is_ended) if is_there else (),
+                _other_laws(
+                    one, less[k], extended, _shapes_beside(best, member, evidence), thresholds, is_ended=is_ended
+                )
+                if is_there
+                else (),
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
@@ -115,19 +125,34 @@ def _without(name: str, model: ExtendedModel) -> ExtendedModel:
     return replace(model, parts=tuple(one for one in model.parts if not one.effect.is_memoryless))
 
 
+def _shapes_beside(best: Posterior, member: int, evidence: Evidence) -> dict[str, list[Mapping[str, float]]]:
+    """The shapes of each effect in a member's place, the likeliest first."""
+    less = tuple(m for m in best.members if m != member)
+    shapes: dict[str, list[Mapping[str, float]]] = {}
+    for _, k, _ in sorted(evidence.extensions(less), key=lambda extension: extension[0]):
+        one = evidence.given.candidates[k]
+        shapes.setdefault(one.name, []).append(one.shape)
+    return shapes
+
+
 def _other_laws(
-    one: Candidate, less: Fit, likelihood: Likelihood, extended: Fit, thresholds: Thresholds, *, is_ended: bool
+    one: Candidate,
+    less: Fit,
+    extended: Fit,
+    shapes: Mapping[str, Sequence[Mapping[str, float]]],
+    thresholds: Thresholds,
+    *,
+    is_ended: bool,
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
-    of_curves = _is_any_curve(one.effect, is_ended)
+    likelihood, of_curves = less.likelihood, _is_any_curve(one.effect, is_ended)
     channels = {e.name for e in available(likelihood.sessions, thresholds)}
     found = []
     for law in catalogue().values():
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
-        start = begun_with(law, less.model, likelihood)
-        fitted = fit(likelihood, start, FEW_STEPS)
+        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:FEW_SHAPES])
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
@@ -159,5 +184,29 @@ def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequ
             continue
         other = evidence.posterior((*less, k))
         if allowed(evidence, other):
-            found.append(Alternative(one.name, other.score - best.score))
+            found.append(Alternative(one.name, other.score - best.score, shape=one.shape))
     return tuple(sorted(found, key=lambda one: one.margin))
+
+
+def fit_with(
+    law: Effect, model: ExtendedModel, likelihood: Likelihood, shapes: Sequence[Mapping[str, float]] = ()
+) -> Fit:
+    """``model`` with a law: the best of fits from ``shapes``, all of its own where none is given, small and large.
+
+    A corner below the least load, or a bend beyond the largest, has no slope towards where it belongs.
+    """
+    logged = logged_channels(likelihood.sessions)
+    begun = (law.begun(shape, sizes, logged) for shape in shapes or law.shapes_with(logged) for sizes in SIZES)
+    slopes = [rows_of(model, session)[:, 1:] for session in likelihood.sessions]
+    tried = []
+    for start in (model.with_part(law, values) for values in begun):
+        rows = [_with_own(start, law.name, one, known) for one, known in zip(likelihood.sessions, slopes, strict=True)]
+        tried.append(fit(likelihood, start, 1, rows))
+    return fit(likelihood, min(tried, key=lambda f: f.cost).model, FEW_STEPS)
+
+
+def _with_own(model: ExtendedModel, name: str, session: Session, slopes: Array) -> Array:
+    """`rows_of` a model whose last effect is ``name``: the ``slopes`` of all else are as they are without it."""
+    trace = model.trace(session.conditions)
+    own = model.own_sensitivities(name, session.conditions, trace)
+    return np.column_stack([session.reading - trace[0], slopes, own])

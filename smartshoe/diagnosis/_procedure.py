@@ -193,11 +193,13 @@ def _diagnosed(
     won = gain(baseline, best, scale, thresholds)
     off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
     elsewhere = off_elsewhere(fine, off, within.size, thresholds)
-    unproven = 0.0 if found.can_validate else not_shown_to_be_noise(fine, off, after, thresholds)
+    known = known_error(integrity.faults, sessions, scale)
+    # Beside causes what is left is weighed against what was wrong.
+    is_shown = found.can_validate and (after.is_tested or bool(causes))
+    unproven = 0.0 if is_shown else not_shown_to_be_noise(fine, off, after, thresholds, known)
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         follows = all(name.is_sure and not name.kind_only for name in named.names)
-        known = known_error(integrity.faults, sessions, scale)
         besides = max(elsewhere, unproven, named.nameless if named.nameless > thresholds.tolerable else 0.0)
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)

@@ -50,6 +50,11 @@ class ResidualStructure:
         return self.memory is not None and self.memory.is_noise and not self.significant
 
     @property
+    def is_tested(self) -> bool:
+        """Whether a test would have shown all that is beyond white noise: else finding none says nothing."""
+        return self.memory is not None or any(one.would_show(self.size) for one in (self.repeating, self.slow))
+
+    @property
     def _found(self) -> list[float]:
         if self.memory is not None and self.memory.is_noise:
             return [self.repeating.rms] if self.repeating.significant else []

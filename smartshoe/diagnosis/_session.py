@@ -22,7 +22,7 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects.cycle_conditioning import half_way
 from smartshoe.recording import Channel, Recording
-from smartshoe.signals.loading import turning_points
+from smartshoe.signals.loading import ramps, turning_points
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
 
@@ -150,7 +150,10 @@ def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
 
 
 def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> int:
-    """By how much the samples may be thinned so that the fastest ramp keeps its shape."""
+    """By how much the samples may be thinned so that the fastest ramp keeps its shape.
+
+    Of quick steps between long holds, which take next to no time, what is clear of that many samples is enough.
+    """
     factors = []
     for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
         step_s = recording.sample_time_s
@@ -160,7 +163,8 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
             factors.append(1)
             continue
         slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
-        fastest = float(np.percentile(slope, 99.5))
+        stepped = max((abs(one.rate_n_per_s) for one in ramps(recording.time_s, load)), default=0.0)
+        fastest = max(float(np.percentile(slope, 99.5)), stepped / thresholds.clear)
         ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
         factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)))  # time stamps are rounded
     total = sum(len(recording) for recording in recordings)

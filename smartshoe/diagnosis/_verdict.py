@@ -84,11 +84,18 @@ def names_in(causes: Sequence[Cause], unnamed: int) -> str:
 
 
 def not_shown_to_be_noise(
-    sessions: Sequence[Session], residuals: Sequence[Array], left: ResidualStructure, thresholds: Thresholds
+    sessions: Sequence[Session],
+    residuals: Sequence[Array],
+    left: ResidualStructure,
+    thresholds: Thresholds,
+    known: float = 0.0,
 ) -> float:
-    """Rms beyond white noise of all that can be used, where too little is there to test it; 0 where it is tolerable."""
+    """Rms beyond white noise of all that can be used, where too little is there to test it.
+
+    0 where it is tolerable, or no more than what is ``known`` to be a fault's of the data.
+    """
     size = beyond_noise(_all_fitted(sessions), residuals, thresholds)
-    return 0.0 if left.is_noise or size <= thresholds.tolerable else size
+    return 0.0 if left.is_noise or size <= max(thresholds.tolerable, known) else size
 
 
 def left_where_judged(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:

@@ -12,7 +12,8 @@ from told_evidence import STANDARD
 
 from smartshoe.diagnosis import _arms, _laws, _settling
 from smartshoe.diagnosis._arms import arms_of, effect_count, is_beyond_memory, is_stretched
-from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, with_laws, with_likelier_laws
+from smartshoe.diagnosis._laws import _is_stretched, _replaced_with, likelier, with_laws
+from smartshoe.diagnosis._members import Alternative
 from smartshoe.models.effects import blocks, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -131,9 +132,11 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
     """The best by cost and odds against effects: an arm of the baseline's that falls is one."""
     model = ExtendedModel(1.0, -0.1, 0.3, 800.0, 140.0, "mbar").with_part("second_relaxation", np.array([0.2, 5.0]))
     starts: list[Any] = []
+    leaks: list[float] = []
 
     def searched(start: ExtendedModel, sessions: Any, thresholds: Any) -> Any:
         starts.append((start.names, start.relaxing_share, start.relaxation_rate_per_s))
+        leaks.extend(float(part.values[0]) for part in start.parts)
         return "given", None, "best"
 
     costs = {1.0 / 0.3: 50.0, 1.0 / 3.0: 45.0, 1.0 / 30.0: 100.0, 0.2: 40.0}
@@ -156,7 +159,10 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
         found: Any = _arms.with_an_arm_that_creeps(state, [])
         assert (found.model.relaxation_rate_per_s, found.steps) == (rate, 25)  # the best go on to their end
     memories = [((), 0.08, 1.0 / tau_s) for tau_s in STANDARD.memory_s]
-    assert starts[:4] == [*memories, ((), pytest.approx(0.2), pytest.approx(0.2))]
+    arms = [*memories, ((), pytest.approx(0.2), pytest.approx(0.2))]
+    # Each arm by itself, and beside the effect that makes the reading of a hold fall.
+    assert starts[:8] == [*arms, *((("linear_leak",), *arm[1:]) for arm in arms)]
+    assert leaks == [pytest.approx(model.pole_per_s / (1.0 - 1.0 / model.wall_ratio))] * 8  # twice
     starts.clear()
     rates: list[float] = []
 
@@ -243,31 +249,59 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
     assert with_laws(state, MODEL, []) is state
 
 
-def test_likelier_laws_take_their_members_places_and_ban_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_laws, "begun_with", lambda law, model, likelihood: model.with_part(law))
-    monkeypatch.setattr(_laws, "fit", lambda likelihood, model: model)
-    monkeypatch.setattr(_laws, "state_at", lambda found, sessions, thresholds, banned: (found.names, banned))
-    state: Any = SimpleNamespace(likelihood=lambda sessions: None, thresholds=STANDARD, banned=("z",))
-    model = MODEL.with_part("linear_leak").with_part("dead_band")
-    told: Any = with_likelier_laws(state, model, {"linear_leak": "orifice_leak"}, [])
-    assert told == (("dead_band", "orifice_leak"), ("z", "linear_leak"))
+def _weighed(
+    name: str, *laws: tuple[str, float], nothing: float = 50.0, departed: float = 0.5, size: float = 0.01
+) -> Any:
+    fits: dict[str, Any] = {law: SimpleNamespace(model=f"{law} for {name}") for law, _ in laws}
+    made = tuple(Alternative(law, margin, fits[law]) for law, margin in laws)
+    others = [Alternative(other, 1.0, shape={"at": 3.0}) for other in ("delay", "near", "dead_band", "gas_heat")]
+    return SimpleNamespace(
+        name=name, fall=100.0, departed=departed, laws=made, alternatives=(Alternative(None, nothing), *others),
+        without=SimpleNamespace(model=f"without {name}"), size=size,
+    )  # fmt: skip
 
 
-def test_a_law_begins_from_all_its_shapes_small_and_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    law = effect("second_relaxation")
-    begun: list[Any] = []
+def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of those that are worth another fit the likeliest three, the best first."""
+    scores = {"found": 100.0}
+    asked: list[str] = []
 
-    def fitted(likelihood: Any, model: ExtendedModel, steps: int, rows: Any = None) -> Any:
-        begun.append((tuple(model.parts[-1].values), steps))
-        return SimpleNamespace(model=model, cost=-len(begun))
+    def about(model: Any, sessions: Any, evidence: Any) -> Any:
+        asked.append(model if isinstance(model, str) else "found")
+        return SimpleNamespace(given=f"given {asked[-1]}"), SimpleNamespace(score=scores.get(asked[-1], 100.0))
 
-    monkeypatch.setattr(_laws, "fit", fitted)
-    unlogged: Any = SimpleNamespace(sessions=[])
-    found: Any = _laws._begun(law, MODEL, unlogged)
-    starts = [tuple(law.begun(shape, sizes)) for shape in law.shapes for sizes in (0.5, 5.0, 20.0)]
-    assert begun[:-1] == [(start, 1) for start in starts]
-    assert begun[-1] == (starts[-1], 4)  # the best of them goes on
-    assert found.model.parts[-1].effect is law
+    def with_law(law: Any, model: Any, likelihood: Any, shapes: Any) -> Any:
+        assert shapes == ({"at": 3.0},)
+        return SimpleNamespace(model=f"{law.name} {model}")
+
+    monkeypatch.setattr(_laws, "evidence_about", about)
+    monkeypatch.setattr(_laws, "fit_with", with_law)
+    found: Any = SimpleNamespace(model=SimpleNamespace(names=("delay", "leak")), likelihood=None)
+    evidence: Any = SimpleNamespace(thresholds=STANDARD, odds=10.0)
+
+    def told(*members: Any) -> list[str]:
+        asked.clear()
+        return [state.fit.model for state in likelier(found, evidence, members, [])]  # type: ignore[misc]
+
+    assert told() == told(_weighed("leak")) == []
+    assert asked == []  # nothing to be weighed
+    most = 100.0 * STANDARD.law_departure**2
+    members = _weighed("leak", ("near", 0.99 * most), ("far", 1.01 * most)), _weighed("lag", nothing=-0.1)
+    assert told(*members) == []
+    assert asked == ["found", "near for leak", "without lag"]
+    scores |= {"near for leak": 90.0, "without lag": 90.1}
+    assert told(*members) == ["near for leak"]
+    scores["without lag"] = 80.0
+    assert told(*members) == ["without lag", "near for leak"]
+    # One whose equation is far from what it follows, and which is large, may be of another kind: the nearest effect
+    # that is neither there nor tried.
+    other = "dead_band without leak"
+    for departed, size, is_tried in ((1.0, 0.01, False), (1.01, STANDARD.tolerable, False), (1.01, 0.01, True)):
+        assert told(_weighed("leak", ("near", 99.0), departed=departed, size=size)) == []
+        assert (asked == ["found", other]) is is_tried
+    scores |= {other: 70.0, "near for lag": 60.0}
+    more = _weighed("leak", ("near", 99.0), departed=2.0), _weighed("lag", ("near", 1.0))
+    assert told(*members, *more) == ["near for lag", other, "without lag"]
 
 
 def test_only_a_shape_within_its_bounds_is_not_stretched() -> None:

@@ -14,6 +14,7 @@ from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, t
 from smartshoe.diagnosis import _inference
 from smartshoe.diagnosis._inference import (
     _best_alone,
+    _is_likelier,
     _Judged,
     _judged,
     _redundant,
@@ -63,9 +64,9 @@ class _Sure(float):
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
-        independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], laws=[], lawful=None, said=[],
-        scores={}, names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={}, alone=None,
-        weighed=[],
+        independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
+        unlikely=(), changeable=[], names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={},
+        alone=None, weighed=[],
     )  # fmt: skip
     plain = told_fit(100.0)
 
@@ -92,12 +93,17 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         return SimpleNamespace(
             members=lambda: told.members,
             fit=SimpleNamespace(model=model),
+            evidence="evidence",
             likelihood="likelihood",
             refused=told.refused.get(one.name, ()),
             undone=(),
             is_stepped_down=one.name in told.stepped,
             with_nothing_but=lambda plain: judged(one, plain, ()),
         )
+
+    def likelier(found: Any, evidence: Any, members: Any, sessions: Any) -> Any:
+        told.changeable.append([one.name for one in members])
+        return iter([state(f"{change} {found.model}") for change in (told.changes.pop() if told.changes else ())])
 
     def without_redundant(found: Any, given: Any, sessions: Any) -> Any:
         told.weighed.append((found.fit.model, given is plain))
@@ -130,10 +136,9 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
     monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
-    monkeypatch.setattr(_inference, "likelier_laws", lambda members, banned: told.laws.pop() if told.laws else {})
-    monkeypatch.setattr(_inference, "with_likelier_laws", lambda one, model, laws, sessions: state(f"law {one.name}"))
-    monkeypatch.setattr(_inference, "score_of", lambda model, likelihood, odds: told.scores.get(model, -len(model)))
-    told.state = state
+    monkeypatch.setattr(_inference, "likelier", likelier)
+    monkeypatch.setattr(_inference, "_is_likelier", lambda other, found, sessions: other.fit.model not in told.unlikely)
+    told.state, told.plain = state, plain
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
     return told
 
@@ -159,12 +164,22 @@ def test_what_can_be_left_out_in_one_way_only_validates_nothing(flow: Any, folds
 
 
 def test_what_is_told_is_without_what_another_effect_makes_immaterial(flow: Any) -> None:
-    """The first set, and each that a likelier law leads to; from the plain fit on."""
+    """The first set, and each that a likelier one leads to; from the plain fit on."""
     flow.infer()
     assert flow.weighed == [("settled first", True)]
-    flow.weighed, flow.laws = [], [{"a": "b"}, {"c": "d"}]
+    flow.weighed, flow.changes = [], [["law"], ["other"]]
     flow.infer()
-    assert flow.weighed == [("settled first", True), ("law settled first", True), ("law law settled first", True)]
+    assert flow.weighed == [("settled first", True), ("other settled first", True), ("law other settled first", True)]
+
+
+def test_changes_are_tried_until_one_leads_to_a_likelier_set(flow: Any) -> None:
+    flow.members, flow.changes = (_Sure(0.9),), [["c", "d"], ["a", "b"]]
+    flow.unlikely = ("a settled first", "c b settled first", "d b settled first")
+    assert flow.infer().fit.model == "b settled first"
+    assert flow.changeable == [["member"], ["member"]]
+    flow.plain.model.names, flow.changeable = ("member",), []  # a clock, told before any model
+    flow.infer()
+    assert flow.changeable == [[]]
 
 
 def _sized(name: str, size: float) -> Any:
@@ -288,8 +303,8 @@ def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> 
     assert flow.infer().fit.model == "settled lawful"
     flow.is_law = False
     assert flow.infer().fit.model == "settled first"
-    flow.lawful, flow.laws = None, [{"a": "b"}, {"c": "d"}]
-    assert flow.infer().fit.model == "law law settled first"
+    flow.lawful, flow.changes = None, [["law"], ["other"]]
+    assert flow.infer().fit.model == "law other settled first"
 
 
 def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> None:
@@ -311,6 +326,24 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     assert (found.alone, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
     flow.members = (_Sure(0.1), _Sure(least))
     assert flow.infer().alone is None
+
+
+def test_of_two_sets_that_is_likelier_which_has_more_evidence_about_its_own_fit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scores = {"a": 5.0, "b": 5.0, "c": 4.9}
+
+    def about(model: Any, sessions: Any, evidence: Any) -> Any:
+        assert evidence == "of found"  # under one noise
+        return None, SimpleNamespace(score=scores[model])
+
+    monkeypatch.setattr(_inference, "evidence_about", about)
+
+    def judged(name: str, evidence: str = "of other") -> Any:
+        return SimpleNamespace(fit=SimpleNamespace(model=name), evidence=evidence)
+
+    told = [_is_likelier(judged(other), judged("a", "of found"), []) for other in "abc"]
+    assert told == [False, False, True]
 
 
 def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -354,15 +387,6 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     assert found() == "n2"
     errors["plain"] = STANDARD.tolerable
     assert found() is None
-
-
-def test_a_likelier_law_that_leads_to_a_worse_set_leaves_the_one_that_is_better(flow: Any) -> None:
-    laws = [{"a": "b"}, {"c": "d"}, {"e": "f"}]
-    for last, kept, left in ((-19.001, "law law settled first", 0), (-18.0, "law settled first", 1)):
-        flow.laws, flow.scores = list(laws), {"law settled first": -18.0, "law law settled first": last}
-        flow.scores["law law law settled first"] = 0.0
-        assert flow.infer().fit.model == kept
-        assert len(flow.laws) == left  # nothing is tried beyond it
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import tracemalloc
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -192,6 +193,29 @@ def test_a_score_is_significant_beyond_students_quantile(pairs: int) -> None:
     bound = float(student.isf(0.5 * STANDARD.false_alarm, pairs - 1))
     told = [LackOfFit(0.1, by * bound, pairs, STANDARD).significant for by in (0.99999, 1.00001)]
     assert told == [False, True]
+
+
+@pytest.mark.parametrize("pairs", [2, 5, 40])
+def test_structure_would_show_where_its_variance_is_beyond_students_quantile_of_noise(pairs: int) -> None:
+    bound = float(student.isf(0.5 * STANDARD.false_alarm, pairs - 1))
+    one = LackOfFit(0.0, 0.0, pairs, STANDARD, 1e-6)
+    assert not one.would_show(0.999e-3 * bound**0.5)
+    assert one.would_show(1.001e-3 * bound**0.5)
+    assert not replace(one, pairs=1).would_show(9.0)
+    assert not LackOfFit(0.0, 0.0, pairs, STANDARD).would_show(9.0)
+
+
+def test_what_a_test_would_show_is_what_it_finds_significant() -> None:
+    load, cycle = _pressed(*[(40, 1.0)] * 6)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(load.size)
+    found = repeating([_session(load, cycle)], [noise], STANDARD)
+    assert not found.significant
+    assert found.z == pytest.approx((found.rms**2 or found.z * found.variance_sd) / found.variance_sd)
+    least = np.sqrt(float(student.isf(0.5 * STANDARD.false_alarm, found.pairs - 1)) * found.variance_sd)
+    bow = load * (1.0 - load)
+    bow *= 1.5 * least / np.sqrt(np.mean(bow**2))
+    assert found.would_show(1.5 * least)
+    assert repeating([_session(load, cycle)], [noise + bow], STANDARD).significant
 
 
 @pytest.mark.parametrize(("count", "is_told"), [(9, False), (10, True)])

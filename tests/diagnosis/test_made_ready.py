@@ -80,6 +80,19 @@ def test_samples_are_thinned_to_some_twenty_on_the_fastest_ramp(ramp_s: float, r
     assert thinning([run, slower], Scale(800.0, 140.0, MILLIBAR), STANDARD) == factor  # that of the fastest
 
 
+@pytest.mark.parametrize("hold_s", [60.0, 300.0])
+def test_quick_steps_between_long_holds_keep_their_shape(hold_s: float) -> None:
+    """Dead weights put on and off: ramps of a share of the time that no quantile over time sees."""
+    rate_hz, ramp_s = 100.0, 0.5
+    corners = np.cumsum([0.0, 5.0, *([ramp_s, hold_s] * 6)])
+    time_s = np.arange(0.0, corners[-1], 1.0 / rate_hz)
+    load = np.interp(time_s, corners, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.7, 0.7, 0.2, 0.2, 1.0, 1.0, 0.0, 0.0])
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(time_s.size)
+    run = Recording.from_arrays(time_s=time_s, force_n=800.0 * (load + noise), pressure_mbar=140.0 * load)
+    shape = 0.8 * ramp_s * rate_hz / 12.0  # at least half as many samples as usual, and no more than six times fewer
+    assert 1 <= thinning([run], Scale(800.0, 140.0, MILLIBAR), STANDARD) <= 6.0 * shape
+
+
 def test_a_long_recording_is_thinned_further_and_a_short_one_not_at_all() -> None:
     scale = Scale(800.0, 140.0, MILLIBAR)
     long = triangles(400, 2.0, 1.0)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
-from smartshoe.diagnosis._laws import likelier_laws
 from smartshoe.diagnosis._likelihood import Fit, Likelihood
 from smartshoe.diagnosis._members import Alternative, Member
 from smartshoe.diagnosis._naming import Name, confidence_of, names_of, probability_of_kind, probability_of_law
@@ -88,19 +87,6 @@ def test_a_dead_heat_of_two_laws_is_one_half() -> None:
 
 def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
     assert probability_of_law(member("rate_gain"), STANDARD) == (1.0, ())
-
-
-def test_a_law_that_follows_better_takes_its_rivals_place_once() -> None:
-    """Two laws that fit in turn better in each other's place change places no second time."""
-
-    better = member(laws=(("orifice_leak", -3.0),))
-    other = member("gas_compression", laws=(("contact_area", -2.0),))
-    assert likelier_laws((better, other), ()) == {"linear_leak": "orifice_leak", "gas_compression": "contact_area"}
-    assert likelier_laws((better, other), ("orifice_leak",)) == {"gas_compression": "contact_area"}
-    assert not likelier_laws((member(laws=(("orifice_leak", 3.0),)), member("rate_gain")), ())
-    (block, *_) = blocks()["static_curve"]
-    # A curve gives way under conditions of its own.
-    assert not likelier_laws((member(block, laws=(("contact_area", -3.0),)),), ())
 
 
 @given(st.floats(0.0, 1.0))

@@ -46,7 +46,9 @@ AFTER = Errors(np.array([1.0, 3.0]), np.array([100.0, 300.0]), 0.8)
 def _left(rms: float, significant: bool = True, how: str = "repeats", is_noise: bool = False) -> Any:
     """A structure: the rms is of what stands out, 0 where nothing does."""
     seen = rms if significant else 0.0
-    return SimpleNamespace(rms=seen, significant=significant, how=how, is_noise=is_noise, says="here", size=rms)
+    return SimpleNamespace(
+        rms=seen, significant=significant, how=how, is_noise=is_noise, is_tested=True, says="here", size=rms
+    )
 
 
 # -- refusals ---------------------------------------------------------------------------------------------------------

@@ -15,7 +15,14 @@ from told_evidence import STANDARD, WAVE, ToldEvidence, candidate, session_of, w
 from smartshoe.diagnosis import _members, _search, _state, _validation
 from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._held_out import residual_of
-from smartshoe.diagnosis._members import alternatives, begun_with, members_of
+from smartshoe.diagnosis._members import (
+    _other_laws,
+    _shapes_beside,
+    alternatives,
+    begun_with,
+    fit_with,
+    members_of,
+)
 from smartshoe.diagnosis._search import additions, allowed, search, step
 from smartshoe.diagnosis._validation import LeftOut, _in_standard_errors, apart, error_of, extrapolating, folds_of
 from smartshoe.models.effects import effect
@@ -187,14 +194,17 @@ def test_ten_are_weighed_against_a_member() -> None:
 def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
     one, two = effect("linear_leak"), effect("dead_band")
     candidates = [SimpleNamespace(name=e.name, effect=e, columns=(k,), slot=e.family) for k, e in enumerate((one, two))]
-    evidence: Any = SimpleNamespace(given=SimpleNamespace(candidates=candidates), thresholds=STANDARD)
+    evidence: Any = SimpleNamespace(
+        given=SimpleNamespace(candidates=candidates), thresholds=STANDARD, extensions=lambda members: []
+    )
     sizes = {"linear_leak": 0.999 * STANDARD.material, "dead_band": 2.0 * STANDARD.material}
     costs = {(): 500.0, ("dead_band",): 130.0, ("linear_leak",): 170.0}
     asked: list[Any] = []
 
     def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
         asked.append(steps)
-        return SimpleNamespace(model=model, cost=costs.get(model.names, 103.0 + len(model.names[-1])))
+        cost = costs.get(model.names, 103.0 + len(model.names[-1]))
+        return SimpleNamespace(model=model, cost=cost, likelihood=likelihood)
 
     monkeypatch.setattr(_members, "fit", fitted)
     ways = {"linear_leak": np.ones(2), "dead_band": np.array([math.sqrt(2.0), 0.0])}  # 45 degrees apart
@@ -205,7 +215,9 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
 
     monkeypatch.setattr(_members, "_left", left)
     monkeypatch.setattr(_members, "alternatives", lambda *given: given[2:])
-    monkeypatch.setattr(_members, "begun_with", lambda law, model, likelihood: model.with_part(law))
+    monkeypatch.setattr(
+        _members, "fit_with", lambda law, model, likelihood, shapes: fitted(likelihood, model.with_part(law), 4)
+    )
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
     extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0)
@@ -237,6 +249,59 @@ def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
         cost=lambda model: float(np.sum(np.abs(model.parts[-1].values - wanted))), sessions=[]
     )
     assert list(begun_with(law, MODEL, likelihood).parts[-1].values) == list(wanted)
+
+
+def test_a_law_is_fitted_from_all_its_shapes_small_and_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    law = effect("second_relaxation")
+    begun: list[Any] = []
+
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int, rows: Any = None) -> Any:
+        begun.append((tuple(model.parts[-1].values), steps))
+        return SimpleNamespace(model=model, cost=-len(begun))
+
+    monkeypatch.setattr(_members, "fit", fitted)
+    unlogged: Any = SimpleNamespace(sessions=[])
+    found: Any = fit_with(law, MODEL, unlogged)
+    starts = [tuple(law.begun(shape, sizes)) for shape in law.shapes for sizes in (0.5, 5.0, 20.0)]
+    assert begun[:-1] == [(start, 1) for start in starts]
+    assert begun[-1] == (starts[-1], 4)  # the best of them goes on
+    assert found.model.parts[-1].effect is law
+    begun.clear()
+    few = law.shapes[1:3]
+    fit_with(law, MODEL, unlogged, few)
+    assert [start for start, _ in begun[:-1]] == [tuple(law.begun(one, sizes)) for one in few for sizes in (0.5, 5, 20)]
+
+
+def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
+    law = effect("second_relaxation")
+    shapes = [{"time_constant": at} for at in (1.0, 2.0, 3.0)]
+    of_creep = [SimpleNamespace(name=law.name, shape=shape) for shape in shapes]
+    others = [SimpleNamespace(name="power_law_creep", shape={}), SimpleNamespace(name="delay", shape={})]
+    scores = {0: 5.0, 1: 7.0, 2: 3.0, 4: 1.0}
+    asked: list[Any] = []
+
+    def extensions(members: Any) -> Any:
+        asked.append(members)
+        return [(score, k, np.ones(1)) for k, score in scores.items()]
+
+    evidence: Any = SimpleNamespace(given=SimpleNamespace(candidates=[*of_creep, *others]), extensions=extensions)
+    found = _shapes_beside(Posterior((3, 4), 0.0, (), (), (0.3, 0.7)), 3, evidence)
+    assert found == {law.name: [shapes[2], shapes[0], shapes[1]], "delay": [{}]}
+    assert asked == [(4,)]
+    tried: list[Any] = []
+
+    def fitted(law: Any, model: Any, likelihood: Any, shapes: Any) -> Any:
+        tried.append((law.name, list(shapes)))
+        return SimpleNamespace(cost=110.0, model=model)
+
+    monkeypatch.setattr(_members, "fit_with", fitted)
+    monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
+    less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=()))
+    one: Any = SimpleNamespace(name="power_law_creep", effect=effect("power_law_creep"))
+    extended: Any = SimpleNamespace(cost=100.0)
+    (other,) = _other_laws(one, less, extended, found, STANDARD, is_ended=False)
+    assert (other.effect, other.margin) == (law.name, 10.0)
+    assert tried == [(law.name, [shapes[2], shapes[0]])]
 
 
 # -- folds ------------------------------------------------------------------------------------------------------------

@@ -315,6 +315,16 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
     assert left(quiet, quiet, replace(other, rms=0.001)).rms == 0.001
 
 
+def test_what_is_left_is_tested_where_a_test_would_show_all_of_it() -> None:
+    blind, keen = LackOfFit(0.0, 0.0, 9, STANDARD), LackOfFit(0.0, 0.0, 9, STANDARD, 1e-12)
+    for repeats_, slow_, memory, told in (
+        (blind, blind, None, False), (keen, blind, None, True), (blind, keen, None, True),
+        (blind, blind, _memory(), True),
+    ):  # fmt: skip
+        assert ResidualStructure(repeats_, slow_, memory, "", 0.0035).is_tested is told
+    assert not ResidualStructure(keen, keen, None, "", 1e-6).is_tested
+
+
 def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Session]) -> None:
     at = sessions[2].conditions
     rising = (at.rate_per_s > 0.05) & (at.load > 0.5) & (at.load < 0.75)

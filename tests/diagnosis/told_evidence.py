@@ -24,7 +24,7 @@ def candidate(name: str, slot: str = "", sign: float = 1.0, **of: Any) -> Any:
     made = SimpleNamespace(name=name, is_flexible=False, is_memoryless=False, parameters=(), why_unnamed="")
     made.__dict__.update(of)
     return SimpleNamespace(
-        name=name, slot=slot or name, effect=made, columns=(1,),
+        name=name, slot=slot or name, effect=made, columns=(1,), shape={},
         has_sign_of=lambda strengths: bool(sign * float(strengths[0]) >= 0.0),
     )  # fmt: skip
 

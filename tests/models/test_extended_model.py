@@ -117,3 +117,25 @@ def test_models_that_differ_elsewhere_in_the_chain_share_their_core() -> None:
     assert model.with_part("zero_offset", np.array([0.01])).core is model.core
     assert model.at(model.theta * np.array([1.1, 1.0, 1.0])).core is model.core
     assert model.at(model.theta * np.array([1.0, 1.1, 1.0])).core is not model.core
+
+
+@given(st.floats(0.01, 1.0), st.sampled_from([1.3, 1.6, 3.0]))
+@settings(max_examples=20, deadline=None)
+def test_what_makes_a_hold_fall_makes_it_fall_at_the_rate_that_was_asked_for(rate_per_s: float, ratio: float) -> None:
+    step_s = 0.01 / rate_per_s
+    load = np.ones(301)
+    load[0] = 0.0
+    held = Conditions(step_s * np.arange(load.size), load, step_s)
+    model = ExtendedModel(1.0, 0.0, 0.22, 800.0, 140.0, "mbar", (), ratio)
+    told = {
+        name: values for name, one in catalogue().items() if (values := one.falling_at(rate_per_s, ratio)) is not None
+    }
+    assert told.keys() == {"linear_leak"}  # by a law that is a hole's no hold falls at a rate
+    for name, values in told.items():
+        reading = model.with_part(effect(name), values).simulate(held)[1:]
+        assert_allclose(np.diff(np.log(reading)) / step_s, -rate_per_s, rtol=1e-3)
+
+
+def test_a_hold_falls_no_faster_than_the_parameter_goes() -> None:
+    (rate,) = effect("linear_leak").parameters
+    assert effect("linear_leak").falling_at(9.0, 1.6) == [rate.upper]

@@ -36,11 +36,12 @@ def titles(sheet: Sheet) -> str:
 
 
 def _titled(columns: Sequence[Column], wanted: str) -> list[int]:
-    """The columns of that name or header text: exactly, or else apart from case."""
+    """The columns of that header text, or else of that name: exactly, or else apart from case."""
     for alike in (str, str.casefold):
-        found = [i for i, c in enumerate(columns) if alike(wanted) in (alike(c.label), alike(c.name)) and wanted]
-        if found:
-            return found
+        for titles in ([c.label for c in columns], [c.name for c in columns]):
+            found = [i for i, title in enumerate(titles) if wanted and alike(title) == alike(wanted)]
+            if found:
+                return found
     return []
 
 
@@ -112,8 +113,11 @@ def need_quantity(sheet: Sheet, found: Pick, option: str, quantity: str, example
     """The pick's unit; raises `UnitError` where it is of another ``quantity``, and as `need_unit` does."""
     in_unit = need_unit(sheet, found, option, example)
     if in_unit.quantity != quantity:
+        also = ""
+        if quantity == "force" and in_unit.quantity == "length":  # a unit that is stretched is diagnosed as any other
+            also = f", or take the unit out of its title and say '[{example}]' to use its numbers in the load's place"
         raise UnitError(
             f"{sheet.path}: column {sheet.columns[found.index].name!r} for {option} is in {in_unit.symbol}, which is"
-            f" no {quantity}: choose a column in a unit such as {example}"
+            f" no {quantity}: choose a column in a unit such as {example}{also}"
         )
     return in_unit

@@ -244,6 +244,13 @@ class Effect(ABC):
         """Of a block that follows what no law does: by what share of itself it differs from a law."""
         return 1.0
 
+    def falling_at(self, rate_per_s: float, wall_ratio: float) -> Array | None:
+        """The parameters by which the reading of a held load falls at a rate, None of one that makes none fall so.
+
+        ``wall_ratio``: 1 + k1 x0^2/(nRT), how stiff the wall is beside the gas.
+        """
+        return None
+
     def late_s(self, values: Array, time_s: float) -> float:
         """By how much a reading of a steady ramp is late ``time_s`` into a recording, of one that ``is_latency``."""
         return 0.0

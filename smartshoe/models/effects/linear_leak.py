@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smartshoe.arrays import Array
 from smartshoe.models.effects.effect import CoreEffect, EffectParameter
 from smartshoe.models.effects.exposure import by
@@ -30,6 +32,11 @@ class LinearLeak(CoreEffect):
         "zero_drift": by("idle", "long_hold", "temperature"),
     }
     is_leak = True
+
+    def falling_at(self, rate_per_s: float, wall_ratio: float) -> Array:
+        """Of the air that leaves the part 1 - 1/N is seen."""
+        (rate,) = self.parameters
+        return np.array([min(rate_per_s / (1.0 - 1.0 / wall_ratio), rate.upper)])
 
     def elements(self, values: Array) -> tuple[Element, ...]:
         """One leak."""

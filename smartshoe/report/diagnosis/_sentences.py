@@ -236,9 +236,12 @@ def why_this_one(cause: Cause) -> str:
         )
     if cause.rivals:
         nearest = cause.rivals[0]
+        by = f"(−2 log, by {'its ' if nearest.by == 'fit' else ''}{nearest.by})"
+        if nearest.margin <= 0.0:
+            return f"{words(nearest.effect)} alone in its place is likelier by {plain(-nearest.margin, 2)} {by}"
         return (
             f"no other effect of the catalogue does as well; the nearest, {words(nearest.effect)}, is less likely by"
-            f" {plain(nearest.margin, 2)} (−2 log, by {'its ' if nearest.by == 'fit' else ''}{nearest.by})"
+            f" {plain(nearest.margin, 2)} {by}"
         )
     return "no other effect of the catalogue comes near"
 

@@ -80,13 +80,23 @@ def test_numbers_with_units_where_there_is_no_header() -> None:
     assert one.sensor.name == "sensor"
 
 
+def test_a_whole_title_goes_before_the_name_of_another() -> None:
+    log = sheet("time|s", "Load|N", "Pin|V", "Pin|bar")
+    log.columns[2].label, log.columns[3].label = "Pin", "Pin (spare)"
+    assert recording_from(log, sensors=["Pin"]).sensor.unit.symbol == "V"
+    assert recording_from(log, sensors=["pin"]).sensor.unit.symbol == "V"
+    with pytest.raises(InputError, match="fits 2 columns"):
+        recording_from(sheet("time|s", "Load|N", "Pin|V", "Pin|bar"), sensors=["Pin"])
+
+
 FAULTS = [
-    ({"time": "9[s]"}, MissingChannelError, "no column '9'.*from 1 to 4"),
+    ({"time": "9[s]"}, MissingChannelError, "no column '9'.*from 1 to 5"),
     ({"force": "Missing[N]"}, MissingChannelError, "no column 'Missing' for --force"),
     ({"force": "bare"}, InputError, r"no unit.*'bare\[N\]'"),
     ({"sensors": ["bare"]}, InputError, r"no unit.*'bare\[mbar\]'"),
     ({"time": "bare"}, InputError, r"no unit.*'bare\[s\]'"),
     ({"force": "Pin"}, UnitError, "is in V, which is no force"),
+    ({"force": "way"}, UnitError, r"is in mm, which is no force: .* take the unit out of its title and say '\[N\]'"),
     ({"time": "Load"}, UnitError, "is in N, which is no time"),
     ({"force": "Load[kN]"}, UnitError, "is in N by the file"),
     ({"force": "bare[furlong]"}, UnitError, "furlong"),
@@ -97,7 +107,7 @@ FAULTS = [
 @pytest.mark.parametrize(("choices", "error", "says"), FAULTS)
 def test_choices_that_do_not_fit(choices, error, says: str) -> None:
     with pytest.raises(error, match=says) as caught:
-        recording_from(sheet("time|s", "Load|N", "Pin|V", "bare"), **choices)
+        recording_from(sheet("time|s", "Load|N", "Pin|V", "bare", "way|mm"), **choices)
     assert caught.value.exit_status == 3
     assert "log.tdms" in str(caught.value)
 

@@ -56,6 +56,29 @@ def test_one_cell_with_the_other_decimal_mark_refuses_the_file(tmp_path: Path, c
         smartshoe.read(path)
 
 
+@pytest.mark.parametrize("header", ["t[s],F[N],P[bar],T,H", "t[s],F[N],P[bar],T,H,", ""])
+@pytest.mark.parametrize("tail", [",,", ",,,", ",2,", ",2,3", ",2,3,"])
+def test_empty_cells_at_the_end_of_rows_are_of_columns_that_the_first_row_has(
+    tmp_path: Path, header: str, tail: str
+) -> None:
+    """As of sensors that are read now and then: neither the header nor a full row is taken for a remark."""
+    lines = [header] if header else []
+    lines += ["0,1,2,3,4", *(f"{k},{k + 1},{k + 2}{tail}" for k in range(1, 9))]
+    choices = {} if header else {"time": "1[s]", "force": "2[N]", "sensors": ["3[bar]"]}
+    found = smartshoe.read(text(tmp_path, "\n".join(lines)), **choices)
+    assert found.time_s.tolist() == list(range(9))
+    assert found.sensor.values.tolist() == list(range(2, 11))
+
+
+@pytest.mark.parametrize("header", ["t[s];F[N];P[bar]", "t[s];F[N];P[bar];", ""])
+def test_rows_that_end_with_a_delimiter_have_no_cell_more(tmp_path: Path, header: str) -> None:
+    rows = [f"{k};{k + 1};{k + 2};" for k in range(5)]
+    choices = {} if header else {"time": "1[s]", "force": "2[N]", "sensors": ["3[bar]"]}
+    found = smartshoe.read(text(tmp_path, "\n".join([header, *rows])), **choices)
+    assert found.sensor.values.tolist() == list(range(2, 7))
+    assert sorted(found.channels) == ["force", "pressure"]
+
+
 def test_points_as_thousands_and_decimal_mark(tmp_path: Path) -> None:
     rows = "999.000;3.658;7.315\r\n1.002.000;3.657;7.314\r\n1.102.000;3.657;7.313"
     recording = smartshoe.read(text(tmp_path, rows), time="1[ms]", sensors=["3[bar]"])

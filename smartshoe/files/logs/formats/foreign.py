@@ -34,14 +34,14 @@ def _without_trailing(cells: list[str]) -> list[str]:
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
-def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, int]:
-    """The delimiter under which most cells of the later lines are numbers, and the number of cells in a row."""
-    best: tuple[float, str | None, int] | None = None
+def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, list[list[str]]]:
+    """The delimiter under which most cells of the later lines are numbers, and the rows that are as most are."""
+    best: tuple[float, str | None, list[list[str]]] | None = None
     for delimiter in _DELIMITERS:
-        rows = [_without_trailing(row) for row in split_cells(lines, delimiter)]
+        rows = split_cells(lines, delimiter)
         width, count = Counter(map(len, rows)).most_common(1)[0]
         even = [row for row in rows if len(row) == width]
-        cells = [cell for row in even for cell in row]
+        cells = [cell for row in even for cell in _without_trailing(row)]
         numeric = sum(map(is_number, cells)) / len(cells)
         if width < 2:
             continue
@@ -49,7 +49,7 @@ def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, int]:
         if score < _LEAST_SCORE:
             continue
         if best is None or score > best[0] + 1e-9:
-            best = (score, delimiter, width)
+            best = (score, delimiter, even)
     if best is None:
         raise FormatError(
             f"{path} holds no table of numbers with two columns or more: separate columns by comma, semicolon or tab"
@@ -104,11 +104,19 @@ def _split_table(path: Path, lines: list[str]) -> tuple[str | None, int, int]:
         raise InputError(f"{path} is empty: give a file with samples in it")
     # Lines further down are of the table, whatever stands above it.
     sample = filled[len(filled) // 2 :][:_SAMPLE_LINES]
-    delimiter, width = _delimiter(path, sample)
+    delimiter, rows = _delimiter(path, sample)
+    width = len(rows[0])
+    # Rows end with a delimiter, or with a cell that is empty in all of them: what stands above them tells.
+    ends_empty = not any(row[-1] for row in rows)
     for index, line in enumerate(lines):
-        cells = _without_trailing(split_cells([line], delimiter)[0]) if line.strip() else []
-        if len(cells) == width and not (line.startswith("#") and ":" in line):
+        cells = split_cells([line], delimiter)[0] if line.strip() else [""]
+        if line.startswith("#") and ":" in line:
+            continue
+        own = _without_trailing(cells)
+        if len(own) == width or (len(cells) == width and not ends_empty):
             return delimiter, width, index
+        if len(own) == width - 1 and ends_empty:
+            return delimiter, width - 1, index
     raise FormatError(f"{path} holds no table: no line has the {width} cells that most have")
 
 
