@@ -30,18 +30,18 @@ def force_error(fine: Sequence[Session], model: ExtendedModel) -> ForceError:
     return ForceError(_rms(fitted), _rms(judged))
 
 
-def undoes(extended: ForceError, plain: ForceError) -> bool:
-    """Whether the extended model's inverse gives the load of what was fitted back no worse than the plain one's.
+def undoes(extended: ForceError, plain: ForceError, thresholds: Thresholds) -> bool:
+    """Whether the extended model's inverse gives the load of what was fitted back hardly worse than the plain one's.
 
     A curve that hardly rises, or a gain that nearly vanishes, follows the reading and tells no load: its inverse makes
     more of all that is left.
     """
-    return not extended.fitted_n > plain.fitted_n
+    return not extended.fitted_n > (1.0 + thresholds.standing) * plain.fitted_n
 
 
 def force_of(plain: ForceError, extended: ForceError, thresholds: Thresholds) -> str | None:
     """What is said of an extended model that gives the load back worse than the plain one does."""
-    if not undoes(extended, plain):
+    if not undoes(extended, plain, thresholds):
         return (
             "the extended model fits the reading but gives a worse force: on what was fitted it is off by"
             f" {extended.fitted_n:.3g} N, the baseline by {plain.fitted_n:.3g} N; so the calibration compensates by the"

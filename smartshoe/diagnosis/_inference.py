@@ -88,7 +88,7 @@ def infer(
     given, evidence, best = searched(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
     # Within one, nothing validates anything.
-    can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
+    can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions, thresholds)) > 1
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, likeness, (), can_validate)

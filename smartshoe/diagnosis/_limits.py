@@ -224,7 +224,7 @@ def refusals_of(found: Inference) -> list[str]:
         said.append(f"these effects largely cancel one another, so that none is named: {listed(found.undone)}")
     if found.refused:
         said.append(
-            "tried and taken out again, since they predict fitted recordings that are left out in turn worse:"
-            f" {listed(dict.fromkeys(found.refused))}"
+            "tried and taken out again, not borne out by fitted recordings or load cycles that are left out in turn, or"
+            f" too small there for the loads that are held out: {listed(dict.fromkeys(found.refused))}"
         )
     return said

@@ -192,7 +192,7 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
-    elsewhere = off_elsewhere(fine, off, within.size, thresholds)
+    elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
     known = known_error(integrity.faults, sessions, scale)
     # Beside causes what is left is weighed against what was wrong.
     is_shown = found.can_validate and (after.is_tested or bool(causes))
@@ -212,9 +212,9 @@ def _diagnosed(
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
     parameters, covariance = joint_parameters(found.fit, scale)
     plain_force, force = (force_error(fine, model) for model in (found.baseline.model, extended))
-    by_extended = undoes(force, plain_force)
+    by_extended = undoes(force, plain_force, thresholds)
     told_force = force_of(plain_force, force, thresholds)
-    ways = beyond(fine, scale, thresholds) if won.is_loss or elsewhere else None
+    ways = beyond(sessions, scale, thresholds) if won.is_loss or elsewhere else None
     return Diagnosis(
         verdict,
         sentence_of(

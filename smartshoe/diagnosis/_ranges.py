@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects.exposure import LATER_CYCLES, SAYS
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +83,9 @@ def _foreign(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) 
 
 
 def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> str | None:
-    """How the loads that are held out go beyond what was fitted: faster, higher or longer; None where they do not.
+    """How the loads that are held out go beyond what was fitted: faster, higher or longer, or by what these lack.
 
-    ``same`` apart, as rates and peaks of one kind may be.
+    ``same`` apart, as rates and peaks of one kind may be. None where they do not.
     """
     fitted = [(one, one.fitted) for one in sessions if one.fitted.any()]
     judged = [(one, one.judged) for one in sessions if one.judged.any()]
@@ -102,7 +104,14 @@ def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) ->
         known, asked = (max((of(*one) for one in some), default=0.0) for some in (fitted, judged))
         if asked > (1.0 + thresholds.same) * known:
             said.append(f"{does} {_told(asked * factor)} {unit} ({_told(known * factor)} in what was fitted)")
-    return "the held-out loads " + " and ".join(said) if said else None
+    there, asked_for = (
+        excitation_of(some, thresholds).present - LATER_CYCLES - {"rates"}
+        for some in (sessions, [replace(one, held_out=~one.held_out) for one in sessions])
+    )
+    parts = ["the held-out loads " + " and ".join(said)] if said else []
+    if lacking := sorted(SAYS[word] for word in asked_for - there):
+        parts.append(f"what was fitted lacks {', '.join(lacking)}")
+    return "; ".join(parts) or None
 
 
 def _told(value: float) -> str:

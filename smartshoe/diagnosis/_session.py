@@ -163,7 +163,12 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
             factors.append(1)
             continue
         slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
-        stepped = max((abs(one.rate_n_per_s) for one in ramps(recording.time_s, load)), default=0.0)
+        moved = [
+            one
+            for one in ramps(recording.time_s, load)
+            if abs(load[one.stop - 1] - load[one.start]) > thresholds.same * span
+        ]
+        stepped = max((abs(one.rate_n_per_s) for one in moved), default=0.0)
         fastest = max(float(np.percentile(slope, 99.5)), stepped / thresholds.clear)
         ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
         factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)))  # time stamps are rounded

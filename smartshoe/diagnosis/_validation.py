@@ -11,7 +11,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, within_bounds
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, load_cycles
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -31,7 +31,7 @@ class LeftOut:
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
         self.sessions, self.thresholds = sessions, thresholds
-        self._folds = folds_of(sessions)
+        self._folds = folds_of(sessions, thresholds)
         self._rest = [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in self._folds]
         self._errors: dict[ExtendedModel, Array] = {}
 
@@ -105,15 +105,20 @@ class _Fold:
     left_out: list[tuple[Session, Mask]]
 
 
-def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
+def folds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
     """What is left out in turn: recordings, or cycles of a single one where they are fitted.
 
-    Many recordings are dealt out to groups, there and back.
+    Of two recordings, each of several load cycles, thirds of both: neither need hold what the other shows, a rate or a
+    peak, so that the one would have to foretell what only the other can tell.
 
-    Neighbours, which a loading rate or a day often has in common, come into different groups, and so do those of a
-    protocol that comes round with every sixth: no group takes all of a kind away.
+    Many recordings are dealt out to groups, there and back. Neighbours, which a loading rate or a day often has in
+    common, come into different groups, and so do those of a protocol that comes round with every sixth: no group takes
+    all of a kind away.
     """
     fitted = [session for session in sessions if session.fitted.any()]
+    several = thresholds.held_out_every
+    if len(fitted) == 2 and all(load_cycles([one], thresholds) >= several for one in fitted):
+        return _blocks_of(fitted, several)
     if len(fitted) > 1:
         turns = [*range(MOST_FOLDS), *reversed(range(MOST_FOLDS))]
         groups = [k if len(fitted) <= MOST_ALONE else turns[k % len(turns)] for k in range(len(fitted))]
@@ -124,22 +129,34 @@ def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
             )
             for k in range(max(groups) + 1)
         ]
-    (session,) = fitted
+    return _blocks_of(fitted, MOST_FOLDS)
+
+
+def _blocks_of(fitted: Sequence[Session], count: int) -> list[_Fold]:
+    """So many blocks of the load cycles of each recording, the same one of all left out."""
+    blocks = [np.array_split(np.unique(one.cycle[one.fitted]), count) for one in fitted]
     folds = []
-    for cycles in np.array_split(np.unique(session.cycle[session.fitted]), MOST_FOLDS):
-        mask = np.isin(session.cycle, cycles) & session.fitted
-        rest = replace(session, held_out=session.held_out | mask)
-        if mask.any() and rest.fitted.any():
-            folds.append(_Fold([rest], [(session, mask)]))
+    for cycles in zip(*blocks, strict=True):
+        masks = [np.isin(one.cycle, own) & one.fitted for one, own in zip(fitted, cycles, strict=True)]
+        rest = [replace(one, held_out=one.held_out | mask) for one, mask in zip(fitted, masks, strict=True)]
+        left_out = [(one, mask) for one, mask in zip(fitted, masks, strict=True) if mask.any()]
+        if left_out and all(one.fitted.any() for one in rest):
+            folds.append(_Fold(rest, left_out))
     return folds
 
 
 def extrapolating(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> str | None:
-    """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide."""
+    """An effect that moves recordings that were not fitted far more than those that were; their loads alone decide.
+
+    It is none where it is so large where it was fitted that a small imperfection of the unit, taken for it, is no more
+    than its own equation may be wrong by.
+    """
     whole = [model.simulate(one.conditions) for one in sessions]
     for part in model.parts:
         by = _moved(sessions, whole, model.without(part.name))
         within = _spread(by, [one.fitted for one in sessions])
+        if thresholds.departure * within >= thresholds.imperfection:
+            continue
         if _spread(by, [one.judged for one in sessions]) > thresholds.extrapolates * max(within, thresholds.material):
             return part.name
     return None

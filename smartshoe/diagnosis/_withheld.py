@@ -55,31 +55,14 @@ def causes_among(
 
     ``is_followed``: all effects together leave as little of what was fitted as laws do.
     """
-    model, members = found.fit.model, [one for one in found.members if one.name not in found.undone]
-    likely = names_of(
-        members,
-        left,
-        thresholds,
-        is_followed=is_followed,
-        is_clocked=given.excitation.goes_with_the_clock,
-        is_unsteady=bool(found.zero_changes),
-        alone=found.alone,
-    )
-    if not likely and found.alone is not None:
-        # What does most by itself does not hang on what undoes it beside others.
-        undone = [one for one in found.members if one.name in found.undone and one.effect.kind == found.alone.kind]
-        likely = names_of(undone, left, thresholds, is_unsteady=True, alone=found.alone)
-    seen = Chosen(likely).without(
-        lambda one: other_kind_of(one, model, thresholds) or not_shown_of(one, given.excitation)
-    )
-    nameless = max((one.member.size for one in likely if one not in seen.names), default=0.0)
+    seen = _shown(found, given, left, thresholds, is_followed=is_followed)
     seen = seen.without(lambda one: moved_of(one) if given.is_moved and one.effect.is_latency else None)
     rivals = seen.names
     seen = seen.without(lambda one: departure_of(one, rivals, thresholds))
     cycles = load_cycles(given.sessions, thresholds)
     surest = sorted(seen.names, key=lambda one: -one.kind)[:cycles]
     seen = seen.without(lambda one: None if one in surest else few_cycles_of(one, cycles))
-    parted = parted_clocks(given.clocks, model, given.sessions, thresholds)
+    parted = parted_clocks(given.clocks, found.fit.model, given.sessions, thresholds)
     clocks = [] if parted is None else [effect for effect, _ in given.clocks]
     names = tuple(one for one in seen.names if one.effect not in clocks)
     before = () if parted is None else (parted,)
@@ -88,8 +71,37 @@ def causes_among(
     kept = tuple(
         one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
     )
-    seen = Chosen(names, kept, (*before, *seen.limits, *past), nameless)
+    seen = Chosen(names, kept, (*before, *seen.limits, *past), seen.nameless)
     return seen.without(lambda one: _crept(one, kept, thresholds))
+
+
+def _shown(found: Inference, given: Prepared, left: float, thresholds: Thresholds, *, is_followed: bool) -> Chosen:
+    """The names of what was found that this data shows; what is of no kind with a name gives none to others, either."""
+    members = [one for one in found.members if one.name not in found.undone]
+    limits: tuple[str, ...] = ()
+    nameless = 0.0
+    while True:
+        likely = names_of(
+            members,
+            left,
+            thresholds,
+            is_followed=is_followed,
+            is_clocked=given.excitation.goes_with_the_clock,
+            is_unsteady=bool(found.zero_changes),
+            alone=found.alone,
+        )
+        if not likely and found.alone is not None:
+            # What does most by itself does not hang on what undoes it beside others.
+            undone = [one for one in found.members if one.name in found.undone and one.effect.kind == found.alone.kind]
+            likely = names_of(undone, left, thresholds, is_unsteady=True, alone=found.alone)
+        shown = Chosen(likely, (), limits).without(
+            lambda one: other_kind_of(one, found.fit.model, thresholds) or not_shown_of(one, given.excitation)
+        )
+        withheld = [one.member for one in likely if one not in shown.names]
+        limits, nameless = shown.limits, max([nameless, *(one.size for one in withheld)])
+        if not any(one in members for one in withheld):
+            return replace(shown, nameless=nameless)
+        members = [one for one in members if one not in withheld]
 
 
 def _crept(name: Name, zeros: Sequence[Zero], thresholds: Thresholds) -> str | None:

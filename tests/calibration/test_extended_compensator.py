@@ -204,8 +204,8 @@ def test_drifts_go_on_from_the_time_that_a_unit_has_been_on(seed: int, on_s: flo
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("delay", "have not come yet"),
-        ("clock_drift", "have not come yet"),
+        ("delay", "cannot be moved to another time"),
+        ("clock_drift", "cannot be moved to another time"),
         ("saturation", "clipped"),
         ("cross_talk", "neighbour"),
         ("coloured_noise", "noise"),

@@ -452,7 +452,7 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
 ) -> None:
     assert _run_diagnosis(parts).force_model is None
     parts.seen.clear()
-    worse = ForceError(8.1, 7.0)
+    worse = ForceError(8.2, 7.0)
     monkeypatch.setattr(_procedure, "force_error", lambda fine, model: worse if len(model.parts) else ForceError(8, 9))
     told = _run_diagnosis(parts)
     assert told.force_model == "with offset"
@@ -478,10 +478,10 @@ def test_what_no_compensator_takes_off_is_said_where_the_extended_model_compensa
     assert model is parts.found.fit.model
     assert step_s == 0.05
     parts.seen.clear()
-    worse = ForceError(8.1, 7.0)
+    worse = ForceError(8.2, 7.0)
     monkeypatch.setattr(_procedure, "force_error", lambda fine, model: worse if len(model.parts) else ForceError(8, 9))
     (_, said) = _run_diagnosis(parts).limits
-    assert "gives a worse force: on what was fitted it is off by 8.1 N, the baseline by 8 N" in said
+    assert "gives a worse force: on what was fitted it is off by 8.2 N, the baseline by 8 N" in said
 
 
 def test_what_does_most_by_itself_is_named_though_others_undo_it(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -116,7 +116,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     )
     monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
-    monkeypatch.setattr(_inference, "folds_of", lambda sessions: ["fold"] * told.folds)
+    monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
     monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
     monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)

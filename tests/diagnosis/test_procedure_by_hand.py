@@ -223,15 +223,15 @@ def test_what_was_taken_out_again_is_said_once() -> None:
     found.refused = ("linear_leak", "delay", "linear_leak")
     (said,) = refusals_of(found)
     assert said == (
-        "tried and taken out again, since they predict fitted recordings that are left out in turn worse: linear leak,"
-        " delay"
+        "tried and taken out again, not borne out by fitted recordings or load cycles that are left out in turn, or too"
+        " small there for the loads that are held out: linear leak, delay"
     )
     found.undone = ("rate_gain", "delay")
     undone = "these effects largely cancel one another, so that none is named: rate gain, delay"
     assert refusals_of(found) == [undone, said]
     found.undone, found.refused = (), ("flexible_lag", "linear_leak")
     (said,) = refusals_of(found)
-    assert said.endswith(" worse: lag of free form, linear leak")
+    assert said.endswith(" held out: lag of free form, linear leak")
     found.can_validate = False
     (said,) = refusals_of(found)
     assert "no cause can be told" in said

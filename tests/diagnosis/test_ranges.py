@@ -153,3 +153,22 @@ def test_loads_held_out_go_beyond_those_fitted_by_a_quarter(
     scale = full_scale([fitted], usable[:1], Thresholds())
     told = beyond(prepare([fitted, held_out], usable, [False, True], scale, 1, Thresholds()), scale, Thresholds())
     assert told == (None if said is None else f"the held-out loads {said}")
+
+
+def test_what_held_out_loads_do_that_fitted_ones_lack_is_said() -> None:
+    corners = np.array([0.0, 3.0, 5.0, 15.0, 17.0, 20.0])
+    held = np.resize(np.interp(np.arange(0.0, 20.0, 0.02), corners, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]), TIME_S.size)
+    pressed, resting = (
+        Recording.from_arrays(time_s=TIME_S, force_n=800.0 * load, pressure_mbar=GAIN_MBAR_PER_N * load)
+        for load in (TRIANGLE, held)
+    )
+    usable, scale = [np.ones(TIME_S.size, dtype=bool)] * 2, full_scale([pressed], [pressed.load.present], Thresholds())
+
+    def told(*recordings: Recording) -> str | None:
+        sessions = prepare(recordings, usable, [False, True], scale, 1, Thresholds())
+        return beyond(sessions, scale, Thresholds())
+
+    assert str(told(pressed, resting)).endswith(
+        "what was fitted lacks loads held for some seconds, at several levels, rests without load between loads"
+    )
+    assert told(resting, pressed) is None

@@ -142,7 +142,7 @@ def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
         bent = MODEL.with_part("flexible_curve", slopes)
         seen = replace(one, reading=bent.simulate(one.conditions) + noise)
         plain, extended = (force_error([seen], model) for model in (MODEL, bent))
-        assert undoes(extended, plain) is is_run
+        assert undoes(extended, plain, STANDARD) is is_run
         said = force_of(plain, extended, STANDARD)
         assert (said is None) is is_run
         assert is_run or "compensates by the baseline, and its twin simulates with the effects" in str(said)
@@ -153,14 +153,20 @@ def test_a_force_that_is_worse_on_what_is_held_out_alone_is_said_and_decides_not
     held_out_n: float, is_said: bool
 ) -> None:
     extended = ForceError(8.9, held_out_n)
-    assert undoes(extended, ForceError(9.0, 9.0))
+    assert undoes(extended, ForceError(9.0, 9.0), STANDARD)
     assert (": compensate by the baseline" in str(force_of(ForceError(9.0, 9.0), extended, STANDARD))) is is_said
+
+
+def test_a_force_that_is_hardly_worse_decides_nothing() -> None:
+    plain, most = ForceError(9.0, 9.0), 9.0 * (1.0 + STANDARD.standing)
+    assert undoes(ForceError(0.999 * most, 8.0), plain, STANDARD)
+    assert not undoes(ForceError(1.001 * most, 8.0), plain, STANDARD)
 
 
 def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:
     late = MODEL.with_part("delay", np.array([0.2])).with_part("dead_band", np.array([0.05, 0.2, 0.0]))
     (said,) = not_undone_of(late, 0.02)
-    late_by = "no compensator takes off the delay, since undoing it takes readings that have not come yet"
+    late_by = "no compensator takes off the delay, since a stream of readings cannot be moved to another time"
     assert said.startswith(late_by)
     (said,) = not_undone_of(MODEL.with_part("clock_drift", np.array([0.004])), 0.02)
     assert said.startswith("no compensator takes off the clock drift, since ")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 from told_evidence import WAVE, session_of
 
@@ -32,7 +31,7 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
                 values[k] = shape if law.name == "dead_band" else 0.5 * (parameter.lower + parameter.upper)
         return SimpleNamespace(model=model.with_part(law, values), cost=cost, law=law.name)
 
-    monkeypatch.setattr(_laws, "_begun", curved)
+    monkeypatch.setattr(_laws, "fit_with", curved)
     monkeypatch.setattr(_laws, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model, cost=NOTHING_COST))
     return told
 
@@ -107,27 +106,6 @@ def test_only_memoryless_laws_are_tried(costs: dict[str, tuple[float, float]]) -
         if not law.is_memoryless:
             costs[law.name] = (FLEXIBLE_COST, USUAL)
     assert _law_of() is None
-
-
-def test_a_curve_is_begun_from_every_shape_at_every_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So that a corner below the least load, or a bend beyond the largest, is come upon."""
-    begun: list[tuple[float, float]] = []
-
-    def fitted(likelihood: Any, model: ExtendedModel, steps: int, rows: Any = None) -> Any:
-        begun.append((float(model.parts[-1].values[0]), float(model.parts[-1].values[1])))
-        return SimpleNamespace(model=model, cost=abs(model.parts[-1].values[0] - 0.05), steps=steps)
-
-    monkeypatch.setattr(_laws, "fit", fitted)
-    law = effect("dead_band")
-    unlogged: Any = SimpleNamespace(sessions=[])
-    found: Any = _laws._begun(law, MODEL, unlogged)
-    sizes = {size for size, _ in begun}
-    assert {shape for _, shape in begun} == {one["softness"] for one in law.shapes}
-    assert len(sizes) == 3
-    assert max(sizes) > 5.0 * min(sizes)
-    best = min(sizes, key=lambda size: abs(size - 0.05))
-    assert found.model.parts[-1].values[0] == best
-    assert np.isfinite(found.cost)
 
 
 def test_a_curve_that_gave_way_to_a_law_does_not_come_back_as_another_curve() -> None:

@@ -26,7 +26,7 @@ class Delay(Effect):
     }
     is_latency = True
     branch = "delay"
-    why_not_undone = "undoing it takes readings that have not come yet: shift whole recordings instead"
+    why_not_undone = "a stream of readings cannot be moved to another time: shift whole recordings instead"
 
     def late_s(self, values: Array, time_s: float) -> float:
         """Its one value."""
