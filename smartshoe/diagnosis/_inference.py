@@ -1,7 +1,7 @@
 """Which effects the data holds: search over a linearised model and fits of the real one, in turn.
 
 What is held out for judging is not looked at here. Validation is within the fitted recordings: each is left out in turn
-(or blocks of its cycles, where there is one), and an effect that makes any of them worse is taken out again.
+(or blocks of their cycles, where there are one or two), and an effect that makes any of them worse is taken out again.
 """
 
 from __future__ import annotations

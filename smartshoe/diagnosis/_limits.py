@@ -65,6 +65,11 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
             f"{told} fits best with its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it turns into an"
             " effect of another kind, so that it is not named"
         )
+    if model.relaxing_share < 0.0 and part.name in dict(arms_of(model)):
+        return (
+            f"{told} fits, but only beside a baseline that falls in holds, as air that cools or leaves does: it may be"
+            " the wall's own relaxation, so that it is not named"
+        )
     if is_stretched(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
         return (
             f"{told} fits, but only with the wall's relaxation at the end of its range, where no wall's is: one"

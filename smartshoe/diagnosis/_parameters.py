@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from smartshoe.diagnosis._likelihood import Fit
@@ -44,7 +46,8 @@ def _parameter(fit: Fit, k: int, scale: Scale) -> Parameter:
     """The parameter at ``k`` in theta, in units; its interval within its bounds."""
     parameter, value = fit.model.parameters[k][1], fit.model.theta[k]
     factor, unit = _scaled(parameter, scale, fit.model.gain)
-    sd = float(np.sqrt(max(fit.covariance[k, k], 0.0)))
+    variance = float(fit.covariance[k, k])
+    sd = math.sqrt(variance) if variance > 0.0 else math.inf  # what nothing in the data depends on may be anything
     low, high = max(value - NORMAL_95 * sd, parameter.lower), min(value + NORMAL_95 * sd, parameter.upper)
     return in_unit(float(value), sd, (float(low), float(high)), factor, unit)
 

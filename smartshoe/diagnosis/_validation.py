@@ -21,7 +21,7 @@ OWN_STEPS = 2  # of an effect's own parameters, from where all recordings have t
 
 
 class LeftOut:
-    """Each fitted recording in turn, predicted by fits to the others; of a single one, its load cycles in blocks.
+    """Each fitted recording in turn, predicted by fits to the others; of one or two, their load cycles in blocks.
 
     Many recordings are left out in groups, so that six fits do; the errors are still those of each recording.
     A fit begins where that of all of them ended, so that few steps lead to its end.

@@ -54,6 +54,14 @@ def test_an_interval_stays_within_what_is_possible() -> None:
     assert leak.ci95[1] == pytest.approx(leak.value + 1.96 * leak.sd, rel=1e-3)
 
 
+def test_what_nothing_in_the_data_depends_on_may_be_anything() -> None:
+    """A share lost below zero, of readings that never are: not known to be none."""
+    sessions, _ = sessions_of(recording(seed=1))
+    model = MODEL.with_part(effect("saturation"), np.array([0.3, 0.8, 0.05, 0.0]))
+    rail = parameters_of(fit(likelihood_of(sessions), model, 0), "saturation", Scale(800.0, 140.0, MILLIBAR))["rail"]
+    assert (rail.value, rail.ci95, rail.to_dict()["sd"]) == (0.0, (0.0, 1.0), None)
+
+
 # -- arms and laws ------------------------------------------------------------------------------------------------
 def test_an_arm_of_an_effect_that_creeps_may_be_the_baselines() -> None:
     model = replace(MODEL, relaxing_share=-0.02).with_part(effect("second_relaxation"), np.array([0.1, 5.0]))

@@ -127,6 +127,19 @@ def test_a_second_arm_is_not_named_beside_a_first_as_no_wall_has_one(arm: dict[s
     assert said("second_relaxation", replace(MODEL, **inside)) is None  # type: ignore[arg-type]
 
 
+def test_an_arm_that_creeps_beside_a_baseline_that_falls_may_be_the_walls_own() -> None:
+    """Of two exponentials the wall's is the one that creeps; what falls is air's."""
+    falling = replace(MODEL, relaxing_share=-0.15)
+    for name, values, is_told in (
+        ("second_relaxation", [0.1, 0.3], True), ("second_relaxation", [-0.1, 0.3], False),
+        ("linear_leak", [0.1], False),
+    ):  # fmt: skip
+        said = other_kind_of(_named(name), falling.with_part(name, np.array(values)), STANDARD)
+        assert (said is not None) is is_told
+        assert other_kind_of(_named(name), MODEL.with_part(name, np.array(values)), STANDARD) is None
+        assert said is None or said.startswith("second relaxation fits, but only beside a baseline that falls in holds")
+
+
 def test_a_block_that_follows_what_no_law_does_is_said_and_not_named_but_by_a_law_in_its_place() -> None:
     block: Any = SimpleNamespace(effect=effect("sensor_lag"), member=SimpleNamespace(name="flexible_lag"), by=None)
 
