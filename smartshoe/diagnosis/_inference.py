@@ -1,7 +1,7 @@
 """Which effects the data holds: search over a linearised model and fits of the real one, in turn.
 
 What is held out for judging is not looked at here. Validation is within the fitted recordings: each is left out in turn
-(or blocks of their cycles, where there are one or two), and an effect that makes any of them worse is taken out again.
+(or blocks of its cycles, where there is one), and an effect that makes any of them worse is taken out again.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def infer(
     given, evidence, best = searched(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
     # Within one, nothing validates anything.
-    can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions, thresholds)) > 1
+    can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, plain, likelihood, (), screening, likeness, (), can_validate)

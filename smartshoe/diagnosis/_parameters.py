@@ -47,7 +47,7 @@ def _parameter(fit: Fit, k: int, scale: Scale) -> Parameter:
     parameter, value = fit.model.parameters[k][1], fit.model.theta[k]
     factor, unit = _scaled(parameter, scale, fit.model.gain)
     variance = float(fit.covariance[k, k])
-    sd = math.sqrt(variance) if variance > 0.0 else math.inf  # what nothing in the data depends on may be anything
+    sd = math.sqrt(max(variance, 0.0)) if variance else math.inf  # what no reading depends on may be anything
     low, high = max(value - NORMAL_95 * sd, parameter.lower), min(value + NORMAL_95 * sd, parameter.upper)
     return in_unit(float(value), sd, (float(low), float(high)), factor, unit)
 

@@ -21,7 +21,7 @@ OWN_STEPS = 2  # of an effect's own parameters, from where all recordings have t
 
 
 class LeftOut:
-    """Each fitted recording in turn, predicted by fits to the others; of one or two, their load cycles in blocks.
+    """Each fitted recording in turn, predicted by fits to the others; of a single one, its load cycles in blocks.
 
     Many recordings are left out in groups, so that six fits do; the errors are still those of each recording.
     A fit begins where that of all of them ended, so that few steps lead to its end.
@@ -31,8 +31,11 @@ class LeftOut:
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
         self.sessions, self.thresholds = sessions, thresholds
-        self._folds = folds_of(sessions, thresholds)
-        self._rest = [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in self._folds]
+        self._folds, self._mixed = folds_of(sessions), mixed_folds_of(sessions, thresholds)
+        self._rest, self._mixed_rest = (
+            [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in folds]
+            for folds in (self._folds, self._mixed)
+        )
         self._errors: dict[ExtendedModel, Array] = {}
 
     def errors(self, model: ExtendedModel) -> Array:
@@ -40,7 +43,8 @@ class LeftOut:
         if model not in self._errors:
             start = within_bounds(model)
             rows = self._rows_of(start)
-            self._errors[model] = self._squares([fit(rest, start, FEW_STEPS, rows(rest)).model for rest in self._rest])
+            models = [fit(rest, start, FEW_STEPS, rows(rest)).model for rest in self._mixed_rest]
+            self._errors[model] = _squares(self._mixed, models)
         return self._errors[model]
 
     def following(self, found: Fit) -> Fit:
@@ -57,7 +61,7 @@ class LeftOut:
             for name in failing:
                 own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in self._rest]
                 less[name] = fit(found.likelihood, start.without(name), beside=found.cost)
-                gains[name] = self._squares([less[name].model] * len(own)) - self._squares(own)
+                gains[name] = _squares(self._folds, [less[name].model] * len(own)) - _squares(self._folds, own)
             failing = [name for name in failing if _in_standard_errors(gains[name]) < self.thresholds.validated]
             if failing:
                 worst = min(failing, key=lambda name: float(gains[name].sum()))
@@ -69,19 +73,6 @@ class LeftOut:
         """What all fits begin with, of those recordings that one of them is fitted to."""
         rows = {id(one.conditions): rows_of(start, one) for one in self.sessions if one.fitted.any()}
         return lambda rest: [rows[id(one.conditions)] for one in rest.sessions]
-
-    def _squares(self, models: Sequence[ExtendedModel]) -> Array:
-        """(recordings or blocks,) squared errors of what each fold leaves out, by its model.
-
-        What is left out together shares a fit, whose own error moves their gains in the second order only: each of them
-        counts in a standard error.
-        """
-        left = [
-            residual_of(session, model)[mask]
-            for fold, model in zip(self._folds, models, strict=True)
-            for session, mask in fold.left_out
-        ]
-        return np.array([float(one @ one) for one in left])
 
     def stands(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
         """Whether ``model`` does away with enough of the plain model's squared error where recordings are left out.
@@ -105,20 +96,41 @@ class _Fold:
     left_out: list[tuple[Session, Mask]]
 
 
-def folds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
-    """What is left out in turn: recordings, or cycles of a single one where they are fitted.
+def _squares(folds: Sequence[_Fold], models: Sequence[ExtendedModel]) -> Array:
+    """(recordings or blocks,) squared errors of what each fold leaves out, by its model.
 
-    Of two recordings, each of several load cycles, thirds of both: neither need hold what the other shows, a rate or a
-    peak, so that the one would have to foretell what only the other can tell.
+    What is left out together shares a fit, whose own error moves their gains in the second order only: each of them
+    counts in a standard error.
+    """
+    left = [
+        residual_of(session, model)[mask]
+        for fold, model in zip(folds, models, strict=True)
+        for session, mask in fold.left_out
+    ]
+    return np.array([float(one @ one) for one in left])
+
+
+def mixed_folds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
+    """As `folds_of`; but of two recordings, each of several load cycles, the same third of both is left out.
+
+    Neither need hold what the other shows, a rate or a peak: a whole model of the one would have to foretell what only
+    the other can tell.
+    """
+    fitted = [session for session in sessions if session.fitted.any()]
+    several = thresholds.held_out_every
+    if len(fitted) == 2 and all(load_cycles([one], thresholds) >= several for one in fitted):
+        return _blocks_of(fitted, several)
+    return folds_of(sessions)
+
+
+def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
+    """What is left out in turn: recordings, or cycles of a single one where they are fitted.
 
     Many recordings are dealt out to groups, there and back. Neighbours, which a loading rate or a day often has in
     common, come into different groups, and so do those of a protocol that comes round with every sixth: no group takes
     all of a kind away.
     """
     fitted = [session for session in sessions if session.fitted.any()]
-    several = thresholds.held_out_every
-    if len(fitted) == 2 and all(load_cycles([one], thresholds) >= several for one in fitted):
-        return _blocks_of(fitted, several)
     if len(fitted) > 1:
         turns = [*range(MOST_FOLDS), *reversed(range(MOST_FOLDS))]
         groups = [k if len(fitted) <= MOST_ALONE else turns[k % len(turns)] for k in range(len(fitted))]
