@@ -15,6 +15,7 @@ from smartshoe.arrays import Array
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import robust_sd
 
+LATER = 9  # samples within which a reading is seen to follow, a resolution
 FEW_TAPS = 300  # of a window: with more, blocks in the frequency domain take less time than sums
 
 
@@ -30,6 +31,29 @@ def noise_sd(signal: Array, thresholds: Thresholds) -> float:
     sd = robust_sd(third)
     inside = third <= largest_of_noise(third.size, thresholds) * sd
     return float(np.sqrt(np.mean(third[inside] ** 2) / 20.0))
+
+
+def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float:
+    """Share of what is taken for a load's noise that its ``reading`` (n,) follows at once or some samples later.
+
+    That is no noise: a shaker, a vehicle or a person who sways moves a load as fast. Of the variance of third
+    differences without the largest; 0 where it is not nearly all (``same``), or where too few are left to tell.
+    """
+    moved, read = np.diff(load, 3), np.diff(reading, 3)
+    if moved.size < thresholds.least_samples:
+        return 0.0
+    at = np.arange(LATER, moved.size)
+    inside = np.abs(moved) <= largest_of_noise(moved.size, thresholds) * robust_sd(np.abs(moved))
+    at = at[np.lib.stride_tricks.sliding_window_view(inside, LATER + 1).all(axis=1)]
+    if at.size < thresholds.least_samples:
+        return 0.0
+    taps = np.stack([moved[at - late] for late in range(LATER + 1)])
+    gram, cross, whole = taps @ taps.T, taps @ read[at], float(read[at] @ read[at])
+    if whole == 0.0:
+        return 0.0
+    share = float(cross @ np.linalg.lstsq(gram, cross, rcond=1e-9)[0]) / whole
+    share = 1.0 - (1.0 - share) * at.size / max(at.size - LATER - 1, 1)
+    return share if share > 1.0 - thresholds.same else 0.0
 
 
 def without_noise(load: Array, step_s: float, sd: float, thresholds: Thresholds) -> tuple[Array, float]:

@@ -76,7 +76,8 @@ class Excitation:
             )
         if "rests" not in self.present:
             said.append(
-                "the unit is never seen at rest without load: zero, tare and what lies near zero load cannot be judged"
+                "the unit is never seen at rest without load: zero, tare and what lies near zero load are told by the"
+                " model alone"
             )
         if self.goes_with_the_clock:
             said.append(
@@ -96,15 +97,16 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     sessions = [one for one in sessions if not one.held_out.all()]
     each = [list(_rises(session, thresholds)) for session in sessions]
     rises = [rise for own in each for rise in own]
+    rated = [rise for rise in rises if rise.is_rated]
     alike = float(np.log1p(thresholds.same))
-    kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rises)
+    kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rated)
     hold_s = max(
         (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
     )
     rests_s = [[n * session.conditions.step_s for n in _runs(_rested(session, thresholds))] for session in sessions]
     # Where a ramp begins and ends is smeared by its window, and found to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
-    rates = _distinct_rates([(rise.rate, rise.samples) for rise in rises], thresholds.same, ends)
+    rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
     rest_s = max((rest for own in rests_s for rest in own), default=0.0)
     pauses = [rest for own in rests_s for rest in own[1:-1]]
@@ -112,7 +114,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     found = {
         "rates": len(rates) > 1,
         "peaks": len(peaks) > 1,
-        "steps": any(rise.rate * thresholds.echo_s > thresholds.same for rise in rises),
+        "steps": any(rise.rate * thresholds.echo_s > thresholds.same for rise in rated),
         "holds": hold_s >= thresholds.hold_s,
         "rests": rest_s >= thresholds.settled_s,
         "idle": rest_s >= thresholds.idle_s,
@@ -130,13 +132,15 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
 class _Rise(NamedTuple):
     """A rise of the load: ``rate`` in full scales a second over its middle half of ``samples``, ``peak`` it ends at.
 
-    Where the load's window is longer than two samples, it counts those that it tells apart.
+    Where the load's window is longer than two samples, it counts those that it tells apart. ``is_rated``: of so many
+    samples that one more makes no other rate.
     """
 
     rate: float
     samples: float
     peak: float
     is_minor: bool
+    is_rated: bool = True
 
 
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
@@ -148,11 +152,10 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
             continue
         part = (load[first : last + 1] - load[first]) / rise
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
-        if samples * thresholds.same < 1.0 and session.thinned == 1:
-            continue  # a sample more or less makes another rate of it
+        is_rated = samples * thresholds.same >= 1.0 or session.thinned > 1  # else one sample makes another rate of it
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
         above = float(load[first]) - float(load.min()) > thresholds.clear * thresholds.cycle * span
-        yield _Rise(rate, samples * _windows(session), float(load[last]), above)
+        yield _Rise(rate, samples * _windows(session), float(load[last]), above, is_rated)
 
 
 def _windows(session: Session) -> float:

@@ -221,7 +221,7 @@ def are_told(state: State, found: _Gained, gained: _Gained) -> bool:
     if not is_simpler and thresholds.clear * after**2 > before**2:
         return False
     before, after = (
-        float(LeftOut(some, gained.evidence.noise_sd, one, thresholds).errors(one).sum())
+        float(LeftOut(some, gained.evidence.noise_sd, one, thresholds, is_apart=True).errors(one).sum())
         for some, one in ((sessions, without), (gained.sessions, model))
     )
     return thresholds.clear * after <= before
@@ -238,7 +238,7 @@ def foretells(
     """
     if not any(one.gain_changes or one.zero_changes for one in gained):
         return error_of(sessions, model) < error_of(sessions, plain)
-    return LeftOut(sessions, state.evidence.noise_sd, model, state.thresholds).stands(model, plain)
+    return LeftOut(sessions, state.evidence.noise_sd, model, state.thresholds, is_apart=True).stands(model, plain)
 
 
 def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain, ...]:

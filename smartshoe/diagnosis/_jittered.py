@@ -6,13 +6,14 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from smartshoe.arrays import Array
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import timing_jitter
 
 # A resolution: a ramp shorter than the jitter seems steeper than it is read, and settles from the second pass on.
 PASSES = 3
 
 
-def as_sampled(load: Array, reading: Array, step_s: float) -> Array:
+def as_sampled(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> Array:
     """``load`` (n,) on the mean of the clock that ``reading`` (n,) was sampled by; both in shares of full scale.
 
     A sample that is taken early or late by a random time with standard deviation s reads, on the mean, what a Gaussian
@@ -21,11 +22,17 @@ def as_sampled(load: Array, reading: Array, step_s: float) -> Array:
     """
     seen = load
     for _ in range(PASSES):
-        sd = jitter_s(seen, reading, step_s) / step_s
-        if sd == 0.0:
+        sd_s = jitter_s(seen, reading, step_s)
+        if not 0.0 < sd_s <= thresholds.echo_s:  # what is later than any echo is no jitter of a clock that can be used
             return load
-        seen = np.asarray(gaussian_filter1d(load, sd, mode="nearest"))
-    return seen
+        seen = np.asarray(gaussian_filter1d(load, sd_s / step_s, mode="nearest"))
+    return seen if _left_by(seen, reading) < _left_by(load, reading) else load
+
+
+def _left_by(load: Array, reading: Array) -> float:
+    """Sum of the squares of what a gain and an offset leave of ``reading`` (n,)."""
+    a, b = load - load.mean(), reading - reading.mean()
+    return float(b @ b - (a @ b) ** 2 / (a @ a))
 
 
 def jitter_s(load: Array, reading: Array, step_s: float) -> float:

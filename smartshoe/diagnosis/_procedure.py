@@ -29,7 +29,7 @@ from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import beyond
-from smartshoe.diagnosis._residual_structure import ResidualStructure, residual_structure
+from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
 from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
 from smartshoe.diagnosis._session import Scale, Session, pastless
 from smartshoe.diagnosis._settling import Progress
@@ -192,7 +192,7 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
-    elsewhere = off_elsewhere(sessions, residuals, within.size, thresholds)
+    elsewhere = off_elsewhere(fine, off, max(within.size, beyond_noise(fine, off, thresholds)), thresholds)
     known = known_error(integrity.faults, sessions, scale)
     # Beside causes what is left is weighed against what was wrong.
     is_shown = found.can_validate and (after.is_tested or bool(causes))

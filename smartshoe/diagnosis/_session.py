@@ -7,6 +7,7 @@ mostly gone; and a fit costs a fraction.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
-from smartshoe.diagnosis._denoise import noise_sd, without_noise
+from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled
 from smartshoe.errors import NotIdentifiableError, UnitError
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -154,13 +155,13 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
 
     Of quick steps between long holds, which take next to no time, what is clear of that many samples is enough.
     """
-    factors = []
+    finest = []  # steps in samples, not rounded, at which the fastest ramp keeps its shape
     for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
         step_s = recording.sample_time_s
         load = recording.force_n / scale.load_n
         window = max(1, round(0.05 / step_s))
         if load.size <= 2 * window:
-            factors.append(1)
+            finest.append(1.0)
             continue
         slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
         moved = [
@@ -171,10 +172,13 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
         stepped = max((abs(one.rate_n_per_s) for one in moved), default=0.0)
         fastest = max(float(np.percentile(slope, 99.5)), stepped / thresholds.clear)
         ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
-        factors.append(max(1, int(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)))  # time stamps are rounded
+        finest.append(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)  # time stamps are rounded
     total = sum(len(recording) for recording in recordings)
-    shape = min(factors)
-    return max(shape, min(-(-total // MOST_SAMPLES), round(MOST_COARSENED * shape)))
+    shape = max(1, int(min(finest)))
+    # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
+    kept = int(MOST_COARSENED * min(*finest, shape)) or round(MOST_COARSENED * shape)
+    coarsest = max(kept, -(-total // round(MOST_COARSENED * MOST_SAMPLES)))
+    return max(shape, min(-(-total // MOST_SAMPLES), coarsest))
 
 
 def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:
@@ -337,15 +341,15 @@ def _session(
         gap_ends=tuple(
             int(end) // factor
             for begin, end in zip(*runs_of(~known), strict=True)
-            if begin > 0 and end < known.size and (end - begin) * step_s > thresholds.hold_s
+            if begin > 0 and end < known.size and (end - begin) * step_s > thresholds.settled_s
         ),
     )
 
 
 def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> Quiet:
-    raw = noise_sd(load, thresholds)
+    raw = noise_sd(load, thresholds) * math.sqrt(max(1.0 - followed_share(load, reading, thresholds), 0.0))
     quiet, left = without_noise(load, step_s, raw, thresholds)
-    return Quiet(as_sampled(quiet, reading, step_s), raw, left)
+    return Quiet(as_sampled(quiet, reading, step_s, thresholds), raw, left)
 
 
 def begins_unloaded(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> bool:

@@ -25,27 +25,39 @@ class LeftOut:
 
     Many recordings are left out in groups, so that six fits do; the errors are still those of each recording.
     A fit begins where that of all of them ended, so that few steps lead to its end.
+
+    Of two recordings, each of several load cycles, a model may also foresee the same third of both: neither need hold
+    what the other shows, a rate or a peak, so that the one would have to foretell what only the other can tell. Not
+    where ``is_apart``, since what differs between recordings is asked for.
     """
 
     def __init__(
-        self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
+        self,
+        sessions: Sequence[Session],
+        noise_sd: float,
+        like: ExtendedModel,
+        thresholds: Thresholds,
+        *,
+        is_apart: bool = False,
     ) -> None:
         self.sessions, self.thresholds = sessions, thresholds
-        self._folds, self._mixed = folds_of(sessions), mixed_folds_of(sessions, thresholds)
-        self._rest, self._mixed_rest = (
-            [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in folds]
-            for folds in (self._folds, self._mixed)
-        )
-        self._errors: dict[ExtendedModel, Array] = {}
+        thirds = [] if is_apart else thirds_of(sessions, thresholds)
+        self._ways = [
+            (folds, [Likelihood(fold.rest, noise_sd, like, thresholds) for fold in folds])
+            for folds in (folds_of(sessions), thirds)
+            if folds
+        ]
+        self._errors: dict[tuple[ExtendedModel, int], Array] = {}
 
-    def errors(self, model: ExtendedModel) -> Array:
-        """(recordings or blocks,) squared errors of what is left out; cached."""
-        if model not in self._errors:
-            start = within_bounds(model)
+    def errors(self, model: ExtendedModel, way: int = -1) -> Array:
+        """(recordings or blocks,) squared errors of what is left out, one ``way`` or the other; cached."""
+        way %= len(self._ways)
+        if (model, way) not in self._errors:
+            (folds, rests), start = self._ways[way], within_bounds(model)
             rows = self._rows_of(start)
-            models = [fit(rest, start, FEW_STEPS, rows(rest)).model for rest in self._mixed_rest]
-            self._errors[model] = _squares(self._mixed, models)
-        return self._errors[model]
+            models = [fit(rest, start, FEW_STEPS, rows(rest)).model for rest in rests]
+            self._errors[model, way] = _squares(folds, models)
+        return self._errors[model, way]
 
     def following(self, found: Fit) -> Fit:
         """``found``, fitted again without the effects that are not the same in what is left out.
@@ -54,14 +66,15 @@ class LeftOut:
         over a fit without it, must lie above zero by most of a standard error. Of several of which it does not, and
         which may stand in for one another, that one goes that gains least.
         """
+        folds, rests = self._ways[0]
         failing = list(found.model.names)
         while failing:
             start = within_bounds(found.model)
             rows, gains, less = self._rows_of(start), {}, {}
             for name in failing:
-                own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in self._rest]
+                own = [fit(rest, start, OWN_STEPS, rows(rest), name).model for rest in rests]
                 less[name] = fit(found.likelihood, start.without(name), beside=found.cost)
-                gains[name] = _squares(self._folds, [less[name].model] * len(own)) - _squares(self._folds, own)
+                gains[name] = _squares(folds, [less[name].model] * len(own)) - _squares(folds, own)
             failing = [name for name in failing if _in_standard_errors(gains[name]) < self.thresholds.validated]
             if failing:
                 worst = min(failing, key=lambda name: float(gains[name].sum()))
@@ -81,11 +94,14 @@ class LeftOut:
         chance, or only these loads, does not. Where it follows what was fitted as nearly as a law does, the former is
         enough: fewer recordings may not hold all that an effect needs, and what is wrong follows all of them less well.
         """
-        left_out = 1.0 - float(self.errors(model).sum()) / max(float(self.errors(plain).sum()), 1e-300)
         fitted = 1.0 - (error_of(self.sessions, model) / max(error_of(self.sessions, plain), 1e-300)) ** 2
         given = self.thresholds
         nearly = (1.0 - given.same) * fitted if fitted < 1.0 - given.law_departure**2 else 0.0
-        return left_out >= max(given.foreseen, nearly)
+        left_out = (
+            1.0 - float(self.errors(model, way).sum()) / max(float(self.errors(plain, way).sum()), 1e-300)
+            for way in range(len(self._ways))
+        )
+        return any(share >= max(given.foreseen, nearly) for share in left_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +126,13 @@ def _squares(folds: Sequence[_Fold], models: Sequence[ExtendedModel]) -> Array:
     return np.array([float(one @ one) for one in left])
 
 
-def mixed_folds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
-    """As `folds_of`; but of two recordings, each of several load cycles, the same third of both is left out.
-
-    Neither need hold what the other shows, a rate or a peak: a whole model of the one would have to foretell what only
-    the other can tell.
-    """
+def thirds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
+    """Of two recordings, each of several load cycles, the same third of both in turn; nothing of any others."""
     fitted = [session for session in sessions if session.fitted.any()]
     several = thresholds.held_out_every
     if len(fitted) == 2 and all(load_cycles([one], thresholds) >= several for one in fitted):
         return _blocks_of(fitted, several)
-    return folds_of(sessions)
+    return []
 
 
 def folds_of(sessions: Sequence[Session]) -> list[_Fold]:

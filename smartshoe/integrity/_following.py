@@ -28,10 +28,11 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         follows = view.thresholds.follows
         if view.thresholds.clear * (1.0 - share) <= view.thresholds.same or (share >= follows and moves_with > 0.0):
             return
-        fastest_s, *_, slowest_s = view.thresholds.memory_s
+        memory_s = view.thresholds.memory_s
         says = (
             f"the reading does not follow the load: load explains {100 * max(share, 0.0):.0f} % of its variance, a"
-            f" curve and relaxations of {fastest_s:g} to {slowest_s:g} s allowed; is this the unit that was pressed?"
+            f" curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed; is this the unit that was"
+            " pressed?"
         )
     yield Finding("does_not_follow_load", whole, says, "fatal", True, says)
 

@@ -115,6 +115,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
         sizes={"linear_leak": 0.1, "delay": 0.3},
         not_undone=[],
         unproven=0.0,
+        beyond=0.0,
         judged=1.0,
         wall_ratio=None,
     )
@@ -156,6 +157,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("names_in", "names")
     answer("not_explained_of", "left")
     answer("off_elsewhere", 0.0)
+    answer("beyond_noise", lambda *_: made.beyond)
     answer("left_where_judged", lambda *_: made.judged)
     answer("not_shown_to_be_noise", lambda *_: made.unproven)
     answer("load_cycles", 9)
@@ -224,6 +226,14 @@ def test_the_sentence_is_told_what_is_in_the_model_and_what_is_left(parts: Any) 
     given, named = parts.seen["sentence_of"]
     assert given == ("explained", "names", BEFORE, AFTER, "left", STANDARD)
     assert named == {"worse": False, "withheld": False}
+
+
+def test_what_is_off_elsewhere_is_held_against_what_was_fitted_at_the_same_rate(parts: Any) -> None:
+    """A hum stands in both; thinned, it stands in neither."""
+    for parts.beyond, within in ((0.0, 0.07), (0.09, 0.09)):
+        parts.seen.clear()
+        _run_diagnosis(parts)
+        assert parts.seen["off_elsewhere"][0] == ([FINE], [f"{FINE} 2"], within, STANDARD)
 
 
 def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explained(parts: Any) -> None:

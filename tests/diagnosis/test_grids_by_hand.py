@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._denoise import noise_sd, without_noise
+from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled, jitter_s
 from smartshoe.diagnosis._session import Scale, Session, kernel, prepare, smoothed
 from smartshoe.integrity.thresholds import largest_of_noise
@@ -128,7 +129,8 @@ def test_a_gauge_that_reads_nothing_tells_that_a_tare_is_a_rest() -> None:
 def test_a_load_is_without_its_noise_and_level_at_rest_and_what_is_left_is_said(factor: int) -> None:
     rng = np.random.default_rng(5)
     load = _levels(0.0, 1.0, 0.0, 0.6, 0.0) + 1e-3 * rng.standard_normal(801)
-    session = _prepared(_pressed(load), factor=factor)
+    read = load - 1e-3 * np.random.default_rng(6).standard_normal(801)  # which does not follow the load's noise
+    session = _prepared(_pressed(load, read), factor=factor)
     raw = noise_sd(load, STANDARD)
     quiet, left = without_noise(load, STEP_S, raw, STANDARD)
     assert session.quiet.raw == pytest.approx(raw)
@@ -145,6 +147,23 @@ def test_a_load_is_without_its_noise_and_level_at_rest_and_what_is_left_is_said(
         if near.size > 10:
             level[near] = quiet[near].mean()
     assert session.conditions.load == pytest.approx(smoothed(level, weights, factor), abs=1e-12)
+
+
+@pytest.mark.parametrize("late", [0, 3])
+def test_what_a_reading_follows_is_no_noise_of_its_load(late: int) -> None:
+    """A shaker moves a load as fast as noise does, and is read, or some samples later."""
+    rng = np.random.default_rng(7)
+    shaken = 0.5 + 0.1 * rng.standard_normal(4000)
+    reading = np.roll(0.8 * shaken, late) + 0.01 * rng.standard_normal(4000)
+    # Of the reading's variance the noise is a share of (0.01/0.08)^2.
+    assert followed_share(shaken, reading, STANDARD) == pytest.approx(1.0 / (1.0 + 0.125**2), abs=0.01)
+    session = _prepared(_pressed(shaken, reading))
+    assert session.quiet.raw == pytest.approx(0.0125, rel=0.1)  # in shares of the load: what the reading's own hides
+    assert noise_sd(shaken, STANDARD) > 0.09
+    for other, share in ((rng.standard_normal(4000), 0.0), (shaken + 0.3 * rng.standard_normal(4000), 0.0)):
+        assert followed_share(shaken, other, STANDARD) == share  # none of it, or not nearly all
+    assert followed_share(shaken[:90], reading[:90], STANDARD) == 0.0
+    assert followed_share(shaken, np.ones(4000), STANDARD) == 0.0
 
 
 def test_of_a_long_load_every_so_many_samples_tell_the_lowest() -> None:
@@ -177,7 +196,9 @@ def test_a_load_is_smoothed_by_the_jitter_of_what_it_was_smoothed_to() -> None:
         sd = jitter_s(seen, reading, 0.02) / 0.02
         assert sd > 1.0
         seen = gaussian_filter1d(load, sd, mode="nearest")
-    assert as_sampled(load, reading, 0.02) == pytest.approx(seen)
+    assert as_sampled(load, reading, 0.02, STANDARD) == pytest.approx(seen)
     assert jitter_s(0.0 * load, reading, 0.02) == 0.0
+    # What is later than any echo is no jitter, and what does not fit better is none either.
+    assert as_sampled(load, reading, 0.02, replace(STANDARD, echo_s=0.02)) is load
     # Whatever the gain between them.
     assert jitter_s(load, 7.0 * reading, 0.02) == pytest.approx(jitter_s(load, reading, 0.02))

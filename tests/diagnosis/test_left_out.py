@@ -129,10 +129,10 @@ def test_what_follows_as_a_law_does_needs_to_foresee_less(monkeypatch: pytest.Mo
     assert shares[0] > 1.0 - STANDARD.law_departure**2 > shares[1] > STANDARD.foreseen
     for foreseen, stand in ((STANDARD.foreseen + 0.01, (True, False)), (STANDARD.foreseen - 0.01, (False, False))):
         monkeypatch.setattr(
-            left_out, "errors", lambda one, left=1.0 - foreseen: np.array([1.0 if one is plain else left])
+            left_out, "errors", lambda one, way, left=1.0 - foreseen: np.array([1.0 if one is plain else left])
         )
         assert (left_out.stands(law, plain), left_out.stands(half, plain)) == stand
-    monkeypatch.setattr(left_out, "errors", lambda one: np.array([1.0 if one is plain else 1.0 - shares[1]]))
+    monkeypatch.setattr(left_out, "errors", lambda one, way: np.array([1.0 if one is plain else 1.0 - shares[1]]))
     assert left_out.stands(half, plain)
 
 

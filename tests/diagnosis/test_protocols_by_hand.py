@@ -161,7 +161,13 @@ def test_a_step_within_a_sample_took_half_of_one() -> None:
         ramp = course((20, 0.0), (steps, 1.0), (20, 1.0), (20, 0.0), (20, 0.0))
         (thinned,) = _rises(_session(ramp), STANDARD)
         assert thinned.samples == steps // 2 + steps % 2
-        assert bool(list(_rises(_session(ramp, thinned=1), STANDARD))) is is_told
+        (whole,) = _rises(_session(ramp, thinned=1), STANDARD)
+        assert (thinned.is_rated, whole.is_rated, whole.peak) == (
+            True,
+            is_told,
+            pytest.approx(1.0),
+        )  # a peak all the same
+        assert len(_shown(_session(ramp, thinned=1)).rates_per_s) == is_told
 
 
 def test_samples_that_a_loads_window_makes_one_are_counted_as_one() -> None:

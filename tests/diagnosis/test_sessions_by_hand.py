@@ -148,10 +148,18 @@ def test_the_fastest_ramp_keeps_so_many_samples() -> None:
 
 @pytest.mark.parametrize(("count", "factor"), [(12_000, 1), (12_001, 2), (60_001, 6), (100_000, 6)])
 def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(count: int, factor: int) -> None:
-    load = np.resize(course((10, 1.0), (10, 0.0)), count)
+    load = np.resize(course((40, 1.0), (40, 0.0)), count)
     assert thinning([_run(load)], SCALE, STANDARD) == factor
     half = count // 2
     assert thinning([_run(load[:half]), _run(load[half:])], SCALE, STANDARD) == factor
+
+
+@pytest.mark.parametrize(("samples", "factor"), [(3, 6), (6, 1), (10, 2), (15, 3), (40, 6)])
+def test_of_a_ramp_of_few_samples_a_sixth_part_of_what_keeps_its_shape_stays(samples: int, factor: int) -> None:
+    """Four samples from 10 to 90 % of it, where the logger saw as many: here of some 45,000."""
+    load = np.resize(course((samples, 1.0), (samples, 0.0)), 45_000 // samples * samples)
+    most = -(-load.size // 12_000)
+    assert thinning([_run(load)], SCALE, STANDARD) == min(factor, most)
 
 
 @pytest.mark.parametrize("low", [0.9, 0.5, 0.1, 0.0])
