@@ -64,13 +64,15 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
             tried.append(fit_with(law, one.without.model, found.likelihood, (other.shape or {},)))
     if not tried:
         return
-    score = evidence_about(found.model, sessions, evidence)[1].score
+    about, own = evidence_about(found.model, sessions, evidence)
     changed = []
     for fitted in tried:
-        about, best = evidence_about(fitted.model, sessions, evidence)
-        if score - best.score >= evidence.odds:
-            changed.append(State(about.given, about, best, fitted))
-    yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
+        score = evidence_about(fitted.model, sessions, evidence, about.given)[1].score
+        if own.score - score >= evidence.odds:
+            changed.append((score, fitted))
+    for _, fitted in sorted(changed, key=lambda one: one[0])[:SWAPS]:
+        anew, best = evidence_about(fitted.model, sessions, evidence)
+        yield State(anew.given, anew, best, fitted)
 
 
 def _nearest_of_another_kind(member: Member, model: ExtendedModel) -> Alternative | None:

@@ -67,8 +67,9 @@ def next_experiment(
     margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
     peak_n = found.fit.model.full_scale_load_n
     noise_sd = found.likelihood.noise_sd
+    finest = min(sessions, key=lambda one: one.conditions.step_s)
     expected = {
-        name: expected_margin(truth, other, made(peak_n), noise_sd, sessions[0]) for name, made in EXPERIMENTS.items()
+        name: expected_margin(truth, other, made(peak_n), noise_sd, finest) for name, made in EXPERIMENTS.items()
     }
     best = max(expected, key=lambda name: expected[name])
     names = (cause.name, *cause.equivalents)

@@ -46,10 +46,10 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     count = held_out.count(False)
     scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
     held = held_out if any(held_out) else None
-    factor = thinning(clocks.recordings[:count], scale, thresholds)
+    factors = thinning(clocks.recordings[:count], scale, thresholds)
     sessions = [
         replace(one, index=clocks.places[one.index])
-        for one in prepare(clocks.recordings, clocks.usable, held, scale, factor, thresholds)
+        for one in prepare(clocks.recordings, clocks.usable, held, scale, factors, thresholds)
     ]
     start = baseline_of(sessions, scale)
     if clocks.parts:  # against a load of another clock no relaxation is found

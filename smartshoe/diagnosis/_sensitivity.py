@@ -145,6 +145,11 @@ class Linearised:
         """At how many points of its shapes each effect stands."""
         return Counter(one.name for one in self.candidates)
 
+    @property
+    def places(self) -> dict[tuple[str, tuple[float, ...]], tuple[int, ...]]:
+        """Where the strengths' columns of what is not in the model stand, by effect and shape."""
+        return {_place(one): one.columns for one in self.candidates[len(self.model.parts) :]}
+
     @cached_property
     def nuisances(self) -> tuple[Array, ...]:
         """(n, k) a session: what is its own."""
@@ -238,8 +243,10 @@ def cosines(inner: Array) -> Array:
     return np.asarray(inner / np.outer(norm, norm))
 
 
-def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> Linearised:
-    """The columns about ``model``."""
+def linearised(
+    model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, beside: Linearised | None = None
+) -> Linearised:
+    """The columns about ``model``; ``beside``: those about a model nearby, which serve for what is in neither."""
     fitted = tuple(session for session in sessions if session.fitted.any())
     inside = {part.name: part for part in model.parts}
     outside = [e for e in available(fitted, thresholds) if e.name not in inside]
@@ -257,20 +264,30 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
             own = tuple(range(place, place + strengths))
             candidates.append(Candidate(effect, shape, own, apart[effect.name]))
             place += strengths
-    beyond = [model.extended_by(one.effect, one.effect.start(one.shape)) for one in candidates[len(model.parts) :]]
+    known = {} if beside is None else beside.places
+    kept = [one for one in candidates[len(model.parts) :] if _place(one) in known]
+    beyond = [
+        (one, model.extended_by(one.effect, one.effect.start(one.shape)))
+        for one in candidates[len(model.parts) :]
+        if _place(one) not in known
+    ]
     less = [model.without(part.name) for part in model.parts]
     rows = []
-    for session in fitted:
+    for k, session in enumerate(fitted):
         trace = model.trace(session.conditions)
         reading, slopes = model.sensitivities(session.conditions, trace)
         columns = np.empty((reading.size, place), order="F")
         columns[:, 0] = session.reading - reading
         columns[:, 1:4] = slopes[:, :3]
-        for k, without in enumerate(less, start=4):
-            columns[:, k] = reading - without.simulate(session.conditions)
-            columns[:, 0] += columns[:, k]
-        for by, added in zip(beyond, candidates[len(less) :], strict=True):
+        for column, without in enumerate(less, start=4):
+            columns[:, column] = reading - without.simulate(session.conditions)
+            columns[:, 0] += columns[:, column]
+        for added, by in beyond:
             columns[:, list(added.columns)] = model.column_of(by, session.conditions, trace)
+        for one in kept:
+            assert beside is not None
+            of = list(known[_place(one)])
+            columns[:, list(one.columns)] = beside.rows[k][:, of] * beside.scales[of]
         rows.append(columns)
     power = np.sum([_power(where(one.fitted, part)) for part, one in zip(rows, fitted, strict=True)], axis=0)
     _refuse_endless(power, candidates)
@@ -289,6 +306,10 @@ def linearised(model: ExtendedModel, sessions: Sequence[Session], thresholds: Th
         tuple(candidates),
         thresholds,
     )
+
+
+def _place(one: Candidate) -> tuple[str, tuple[float, ...]]:
+    return one.name, tuple(one.shape.values())
 
 
 def _refuse_endless(power: Array, candidates: Sequence[Candidate]) -> None:

@@ -150,10 +150,11 @@ def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
     return np.asarray(load_n <= low + thresholds.standing * (high - low))
 
 
-def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> int:
-    """By how much the samples may be thinned so that the fastest ramp keeps its shape.
+def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> list[int]:
+    """By how much the samples of each recording may be thinned so that the fastest ramp of all keeps its shape.
 
-    Of quick steps between long holds, which take next to no time, what is clear of that many samples is enough.
+    Where that leaves more than so many, further, down to what a recording's own fastest ramp needs at least. Of quick
+    steps between long holds, which take next to no time, what is clear of that many samples is enough.
     """
     finest = []  # steps in samples, not rounded, at which the fastest ramp keeps its shape
     for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
@@ -175,10 +176,13 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
         finest.append(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)  # time stamps are rounded
     total = sum(len(recording) for recording in recordings)
     shape = max(1, int(min(finest)))
-    # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
-    kept = int(MOST_COARSENED * min(*finest, shape)) or round(MOST_COARSENED * shape)
-    coarsest = max(kept, -(-total // round(MOST_COARSENED * MOST_SAMPLES)))
-    return max(shape, min(-(-total // MOST_SAMPLES), coarsest))
+    wanted, most = -(-total // MOST_SAMPLES), -(-total // round(MOST_COARSENED * MOST_SAMPLES))
+    factors = []
+    for steps in finest:
+        # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
+        kept = int(MOST_COARSENED * min(steps, max(1, int(steps)))) or round(MOST_COARSENED)
+        factors.append(max(shape, min(wanted, max(kept, most))))
+    return factors
 
 
 def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:
@@ -193,16 +197,21 @@ def prepare(
     usable: Sequence[Mask],
     held_out: Sequence[bool] | None,
     scale: Scale,
-    factor: int,
+    factor: int | Sequence[int],
     thresholds: Thresholds,
 ) -> list[Session]:
-    """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out."""
+    """The sessions, thinned by ``factor``; ``held_out`` a recording, or None to hold every third load cycle out.
+
+    ``factor``: one of all, or one each of the first of them; of those beyond the least.
+    """
+    factors = [factor] if isinstance(factor, int) else [*factor]
+    factors += [min(factors)] * (len(recordings) - len(factors))
     made: dict[int, Session] = {}
     left_behind: dict[str, dict[str, float]] = {}
     for index in _by_continuation(recordings):
         recording = recordings[index]
         before = left_behind.get(recording.metadata.get("continues", ""), {})
-        made[index] = _session(recording, index, usable[index], scale, factor, before, thresholds)
+        made[index] = _session(recording, index, usable[index], scale, factors[index], before, thresholds)
         left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
     sessions = _on_one_scale([made[index] for index in range(len(recordings))])
     if held_out is not None:

@@ -88,9 +88,15 @@ def searched(
     return given, evidence, search(evidence, first.members, banned)
 
 
-def evidence_about(model: ExtendedModel, sessions: Sequence[Session], other: Evidence) -> tuple[Evidence, Posterior]:
-    """The evidence about a model, under the noise that the ``other`` one has, and the model's own set in it."""
-    evidence = Evidence(linearised(model, sessions, other.thresholds), other.noise_sd)
+def evidence_about(
+    model: ExtendedModel, sessions: Sequence[Session], other: Evidence, beside: Linearised | None = None
+) -> tuple[Evidence, Posterior]:
+    """The evidence about a model, under the noise that the ``other`` one has, and the model's own set in it.
+
+    ``beside``: columns about a model nearby. What is in neither counts as no more than an imperfection, for which they
+    serve.
+    """
+    evidence = Evidence(linearised(model, sessions, other.thresholds, beside), other.noise_sd)
     return evidence, evidence.posterior(_set_of(model, evidence.given))
 
 

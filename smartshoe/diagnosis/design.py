@@ -114,11 +114,11 @@ def design(
     recordings = [_commanded(protocol, unit, peak_n, sample_rate_hz) for protocol in protocols]
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     usable = [np.ones(len(one), dtype=bool) for one in recordings]
-    factor = thinning(recordings, scale, limits)
-    sessions = prepare(recordings, usable, [False] * len(recordings), scale, factor, limits)
+    factors = thinning(recordings, scale, limits)
+    sessions = prepare(recordings, usable, [False] * len(recordings), scale, factors, limits)
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.
-    sd = 0.01 * noise_percent / math.sqrt(max(factor, 1))
+    sd = 0.01 * noise_percent / math.sqrt(min(factors))
     return _compared(columns, sd, 0.01 * strength_percent, limits)
 
 

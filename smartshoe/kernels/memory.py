@@ -417,14 +417,16 @@ def tanh(x):  # type: ignore[no-untyped-def]
 def softness(x, power, corner):  # type: ignore[no-untyped-def]
     """Share of the softening that is there at x = (M^2 - u^2)/wide below the largest, tanh(x^power), and its slope.
 
-    A power that is no 1 has its corner at the largest load rounded by EASED, which leaves ``corner``, EASED^power.
+    Last, by how much the slope's logarithm falls with x. A power that is no 1 has its corner at the largest load
+    rounded by EASED, which leaves ``corner``, EASED^power.
     """
     if power == 1.0:
         bend = tanh(x)
-        return bend, 1.0 - bend * bend
-    rooted = (x + EASED) ** power
-    bend = tanh(rooted - corner)
-    return bend, (1.0 - bend * bend) * power * rooted / (x + EASED)
+        return bend, 1.0 - bend * bend, 2.0 * bend
+    at = x + EASED
+    rooted = at**power
+    bend, steep = tanh(rooted - corner), power * rooted / at
+    return bend, (1.0 - bend * bend) * steep, 2.0 * bend * steep + (1.0 - power) / at
 
 
 @njit(cache=True)

@@ -14,6 +14,7 @@ from numba import njit
 from smartshoe.kernels.memory import EASED, first_loading, newton, rise, softness
 
 CLOSE = 1e-8  # of full scale: a step of Newton's that is less leaves about its square
+ALIKE = 0.05  # of its logarithm: over a step that turns a curvature by less it is the same
 STEPS = 30
 
 
@@ -68,9 +69,6 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
     `softness` of ``power``, wide = ``width`` + ``widening`` M^2; M is the largest phi so far, ``largest`` before the
     record, and counts less ``dead_zone``; r is `rise`.
     """
-    # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that. A root has
-    # no such bound near its corner: a step of CLOSE is the last there.
-    bound = strength / width * (3.0 + 2.0 / width) if power == 1.0 else 1e-10 / (CLOSE * CLOSE)
     arm = held = 0.0
     u, q, phi, known, slope, corner = 0.0, 0.0, 0.0, 0.0, 1.0, EASED**power
     most, more, per_wide, top = 0.0, 1.0, 1.0 / width, 0.0
@@ -91,15 +89,24 @@ def softened(load, strength, width, widening, raised, power, largest, dead_zone,
             if f <= 0.0:
                 lost = min(strength * softness(top * per_wide, power, corner)[0], 0.95)  # more leaves nothing to pull
                 low, high = given / (1.0 - lost + beside), straight
-            u = min(max(u + (f - known) / slope, low), high)
+            u, moved = min(max(u + (f - known) / slope, low), high), math.inf
             for _ in range(STEPS):
-                bend, steep = softness(max(top - u * u, 0.0) * per_wide, power, corner)
+                bend, steep, falls = softness(max(top - u * u, 0.0) * per_wide, power, corner)
                 slope = 1.0 - strength * bend + beside
-                off = u * slope - given
+                off, turn, turns = u * slope - given, u * u * per_wide, 0.0
                 if bend > 0.0:
-                    slope += 2.0 * strength * per_wide * u * u * steep
+                    slope += 2.0 * strength * turn * steep
+                    turns = strength * per_wide * steep * abs(u) * (3.0 + 2.0 * turn * falls)
+                was = u
                 u, low, high, step = newton(u, off, slope, low, high)
-                if bound * step * step <= 1e-10:
+                if abs(step) > 0.5 * moved:  # to and fro across the corner
+                    u, step = 0.5 * (low + high), math.inf
+                moved = abs(step)
+                # A step leaves an error of its square times half the curvature where that is the same all along it.
+                # Beyond the corner nothing tells what the curvature is before it.
+                if abs(step) <= CLOSE:
+                    break
+                if bend > 0.0 and turns * step * step <= 5e-11 * slope and abs(was * step) * per_wide * falls <= ALIKE:
                     break
             slope /= more
         largest = max(largest, f - arm * u)

@@ -265,10 +265,16 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     """Of those that are worth another fit the likeliest three, the best first."""
     scores = {"found": 100.0}
     asked: list[str] = []
+    anew: list[str] = []
 
-    def about(model: Any, sessions: Any, evidence: Any) -> Any:
-        asked.append(model if isinstance(model, str) else "found")
-        return SimpleNamespace(given=f"given {asked[-1]}"), SimpleNamespace(score=scores.get(asked[-1], 100.0))
+    def about(model: Any, sessions: Any, evidence: Any, beside: Any = None) -> Any:
+        name = model if isinstance(model, str) else "found"
+        if beside is None and name != "found":  # linearised anew, and for all that it is
+            anew.append(name)
+        else:
+            assert beside == (None if name == "found" else "given found")
+            asked.append(name)
+        return SimpleNamespace(given=f"given {name}"), SimpleNamespace(score=scores.get(name, 100.0))
 
     def with_law(law: Any, model: Any, likelihood: Any, shapes: Any) -> Any:
         assert shapes == ({"at": 3.0},)
@@ -281,7 +287,10 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
 
     def told(*members: Any) -> list[str]:
         asked.clear()
-        return [state.fit.model for state in likelier(found, evidence, members, [])]  # type: ignore[misc]
+        anew.clear()
+        states = [*likelier(found, evidence, members, [])]
+        assert [state.given for state in states] == [f"given {name}" for name in anew]
+        return [state.fit.model for state in states]  # type: ignore[misc]
 
     assert told() == told(_weighed("leak")) == []
     assert asked == []  # nothing to be weighed

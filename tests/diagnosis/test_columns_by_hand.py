@@ -294,6 +294,26 @@ def test_what_the_arm_may_hold_after_a_gap_is_of_the_largest_load(share: float) 
     assert found == pytest.approx(np.diag([0.0, past, 1.0, STANDARD.strength_sd**-2, gap, gap]))
 
 
+def test_columns_of_a_model_nearby_serve_for_what_is_in_neither() -> None:
+    model = MODEL.with_part("dead_band", np.array([0.05, 0.3, 0.1])).with_part("delay", np.array([0.12]))
+    other = MODEL.with_part("delay", np.array([0.11])).with_part("saturation")
+    sessions = _sessions(model, sizes=(150, 120))
+    by, anew = linearised(other, sessions, STANDARD), linearised(model, sessions, STANDARD)
+    found = linearised(model, sessions, STANDARD, by)
+    told, expected = ([(one.name, one.shape, one.columns) for one in each.candidates] for each in (found, anew))
+    assert (told, found.own, found.model) == (expected, anew.own, model)
+    assert "saturation" in {one.name for one in found.candidates}  # it is in one of them
+    for rows, whole, known in zip(found.rows, anew.rows, by.rows, strict=True):
+        assert rows[:, :6] * found.scales[:6] == pytest.approx(whole[:, :6] * anew.scales[:6], abs=1e-12)
+        for one in found.candidates[2:]:
+            columns = list(one.columns)
+            exact = whole[:, columns] * anew.scales[columns]
+            place = by.places.get((one.name, tuple(one.shape.values())))
+            if place is not None:
+                exact = known[:, list(place)] * by.scales[list(place)]
+            assert rows[:, columns] * found.scales[columns] == pytest.approx(exact, abs=1e-12)
+
+
 def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     model = MODEL.with_part("dead_band", np.array([0.05, 0.3, 0.1])).with_part("delay", np.array([0.12]))
     sessions = _sessions(model, sizes=(150, 120))

@@ -231,7 +231,7 @@ def _next(
     zero_changes: tuple[ZeroChange, ...] = (),
 ) -> Any:
     def margin(truth: Any, rival: Any, protocol: Any, noise_sd: float, like: Any) -> float:
-        assert (truth.model.names, rival, noise_sd, like) == (("linear_leak", "dead_band"), "other", 0.01, "session")
+        assert (truth.model.names, rival, noise_sd, like.name) == (("linear_leak", "dead_band"), "other", 0.01, "fine")
         return margins.get(protocol.name, 0.0)
 
     monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, name, rival: "other")
@@ -247,7 +247,11 @@ def _next(
         own_gains=own_gains, zero_changes=zero_changes,
     )  # fmt: skip
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
-    return next_experiment(found, causes, ["session"], excitation, open_=open_)  # type: ignore[list-item]
+    sessions: list[Any] = [
+        SimpleNamespace(name=name, conditions=SimpleNamespace(step_s=step_s))
+        for name, step_s in (("coarse", 0.05), ("fine", 0.02), ("coarser", 0.1))
+    ]
+    return next_experiment(found, causes, sessions, excitation, open_=open_)
 
 
 def test_the_largest_doubtful_cause_is_parted_by_what_parts_it_best(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -359,7 +363,7 @@ def test_a_law_that_a_block_stands_for_is_parted_from_its_rival_in_the_blocks_pl
         seen.clear()
         told = next_experiment(
             found, [_cause(law, 0.02, (rival,), part="flexible_curve")],
-            [SimpleNamespace(recording=SimpleNamespace(channels=()))],
+            [SimpleNamespace(recording=SimpleNamespace(channels=()), conditions=SimpleNamespace(step_s=0.1))],
             Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD), open_=False,
         )  # fmt: skip
         assert told is not None

@@ -134,24 +134,24 @@ def test_the_fastest_ramp_keeps_so_many_samples() -> None:
     for ramp_s, factor in ((2.41, 4), (2.99, 4), (3.01, 5), (0.5, 1), (0.61, 1), (1.21, 2)):
         steps = round(ramp_s / STEP_S * 1e3) / 1e3
         load = np.minimum(np.arange(800) / steps, 1.0)
-        assert thinning([_run(load)], SCALE, STANDARD) == factor
+        assert thinning([_run(load)], SCALE, STANDARD) == [factor]
     # Of more than one that of the fastest; of one of a few samples none is taken away.
     slow, fast = (_run(np.minimum(np.arange(800) / n, 1.0)) for n in (300, 100))
-    assert thinning([slow, fast], SCALE, STANDARD) == thinning([fast], SCALE, STANDARD) == 3
+    assert thinning([slow, fast], SCALE, STANDARD) == 2 * thinning([fast], SCALE, STANDARD) == [3, 3]
     # Of a fiftieth of a second in a sample a window is two; of a load that never moves the whole of 9.6 s is one.
-    assert thinning([slow, _run(np.linspace(0.0, 1.0, 4))], SCALE, STANDARD) == 1
-    assert thinning([_run(np.linspace(0.0, 1.0, 5))], SCALE, STANDARD) == 1
-    assert thinning([_run(np.full(481, 0.5), np.linspace(0.0, 1.0, 481))], SCALE, STANDARD) == 20
+    assert thinning([slow, _run(np.linspace(0.0, 1.0, 4))], SCALE, STANDARD) == [1, 1]
+    assert thinning([_run(np.linspace(0.0, 1.0, 5))], SCALE, STANDARD) == [1]
+    assert thinning([_run(np.full(481, 0.5), np.linspace(0.0, 1.0, 481))], SCALE, STANDARD) == [20]
     falling = _run(1.0 - np.minimum(np.arange(800) / 155.0, 1.0))
-    assert thinning([falling], SCALE, STANDARD) == 5
+    assert thinning([falling], SCALE, STANDARD) == [5]
 
 
 @pytest.mark.parametrize(("count", "factor"), [(12_000, 1), (12_001, 2), (60_001, 6), (100_000, 6)])
 def test_long_records_are_thinned_to_twelve_thousand_samples_by_six_at_most(count: int, factor: int) -> None:
     load = np.resize(course((40, 1.0), (40, 0.0)), count)
-    assert thinning([_run(load)], SCALE, STANDARD) == factor
+    assert thinning([_run(load)], SCALE, STANDARD) == [factor]
     half = count // 2
-    assert thinning([_run(load[:half]), _run(load[half:])], SCALE, STANDARD) == factor
+    assert thinning([_run(load[:half]), _run(load[half:])], SCALE, STANDARD) == [factor, factor]
 
 
 @pytest.mark.parametrize(("samples", "factor"), [(3, 6), (6, 1), (10, 2), (15, 3), (40, 6)])
@@ -159,7 +159,7 @@ def test_of_a_ramp_of_few_samples_a_sixth_part_of_what_keeps_its_shape_stays(sam
     """Four samples from 10 to 90 % of it, where the logger saw as many: here of some 45,000."""
     load = np.resize(course((samples, 1.0), (samples, 0.0)), 45_000 // samples * samples)
     most = -(-load.size // 12_000)
-    assert thinning([_run(load)], SCALE, STANDARD) == min(factor, most)
+    assert thinning([_run(load)], SCALE, STANDARD) == [min(factor, most)]
 
 
 @pytest.mark.parametrize("low", [0.9, 0.5, 0.1, 0.0])
@@ -168,10 +168,20 @@ def test_a_ramp_keeps_its_samples_whatever_part_of_the_full_scale_it_spans(low: 
     time_s = np.arange(0.0, 80.0, 0.01)
     part = low + (1.0 - low) * np.abs((time_s / 4.0 + 1.0) % 2.0 - 1.0)
     pressed = _run(part, step_s=0.01)
-    assert thinning([pressed], SCALE, STANDARD) == 13
+    assert thinning([pressed], SCALE, STANDARD) == [13]
     # A load that stands still beside it has no ramp, however its noise slopes.
     still = _run(0.5 + 1e-3 * (1.0 - low) * np.random.default_rng(1).standard_normal(8000), step_s=0.01)
-    assert thinning([pressed, still], SCALE, STANDARD) == 13
+    assert thinning([pressed, still], SCALE, STANDARD) == [13, 13]
+
+
+def test_each_recording_is_thinned_further_by_its_own_ramps_only() -> None:
+    """Of 60,000 samples: down to four on a step of 10, though a slow recording beside it may lose four of five."""
+    steps, slow = (_run(np.resize(course((n, 1.0), (n, 0.0)), 30_000)) for n in (10, 60))
+    assert thinning([steps], SCALE, STANDARD) == [2]
+    assert thinning([steps, slow], SCALE, STANDARD) == thinning([slow, steps], SCALE, STANDARD)[::-1] == [2, 5]
+    every = [np.ones(30_000, dtype=bool)] * 3
+    sessions = prepare([steps, slow, slow], every, [False, False, True], SCALE, [2, 5], STANDARD)
+    assert [one.thinned for one in sessions] == [2, 5, 2]
 
 
 def test_what_is_held_out_thins_nothing() -> None:

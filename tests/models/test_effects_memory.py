@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 from test_effects_wall import soft_by_twin
@@ -189,6 +189,8 @@ def test_a_damaged_wall_is_straight_below_its_largest_load_and_bends_beyond() ->
     widening=st.floats(0.0, 3.0), power=st.sampled_from([1.0, 0.5, 0.8]), before=st.floats(0.0, 1.5),
     loads=st.lists(st.floats(-0.5, 1.5), min_size=2, max_size=6), noise=st.sampled_from([0.0, 1e-3]),
 )  # fmt: skip
+@example(1.0, 0.5, 0.0, 0.0, 0.5, 0.5, [-0.5, 0.0], 0.0)  # Newton's steps go to and fro across the corner
+@example(0.625, 1.5, 0.0, 0.0, 1.0, 1.5, [0.5, 0.0], 0.0)  # a last step as large as may be
 @settings(max_examples=40)
 def test_softened_rubber_bears_the_load_to_the_last_digit(
     gained: float,
