@@ -58,8 +58,8 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
         if not one.effect.is_flexible:  # a block has been weighed against its laws
             tried += [a.fit for a in one.laws if a.fit is not None and a.margin < most]
         other = _nearest_of_another_kind(one, found.model)
-        if other is not None and one.departed > 1.0 and one.size > evidence.thresholds.tolerable:
-            # What departs by more than equations do may be of another kind.
+        if other is not None and (one.departed > 1.0 or one.is_ended) and one.size > evidence.thresholds.tolerable:
+            # What departs by more than equations do, or lies where its kind ends, may be of another kind.
             law = catalogue()[str(other.effect)]
             tried.append(fit_with(law, one.without.model, found.likelihood, (other.shape or {},)))
     if not tried:

@@ -250,7 +250,8 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
 
 
 def _weighed(
-    name: str, *laws: tuple[str, float], nothing: float = 50.0, departed: float = 0.5, size: float = 0.01
+    name: str, *laws: tuple[str, float], nothing: float = 50.0, departed: float = 0.5, size: float = 0.01,
+    is_ended: bool = False,
 ) -> Any:
     fits: dict[str, Any] = {law: SimpleNamespace(model=f"{law} for {name}") for law, _ in laws}
     made = tuple(Alternative(law, margin, fits[law]) for law, margin in laws)
@@ -258,6 +259,7 @@ def _weighed(
     return SimpleNamespace(
         name=name, fall=100.0, departed=departed, laws=made, alternatives=(Alternative(None, nothing), *others),
         without=SimpleNamespace(model=f"without {name}"), size=size, effect=SimpleNamespace(is_flexible=False),
+        is_ended=is_ended,
     )  # fmt: skip
 
 
@@ -306,11 +308,14 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     assert told(*members) == ["near for leak"]
     scores["without lag"] = 80.0
     assert told(*members) == ["without lag", "near for leak"]
-    # One whose equation is far from what it follows, and which is large, may be of another kind: the nearest effect
-    # that is neither there nor tried.
+    # One whose equation is far from what it follows, or which lies where its kind ends, may be of another kind where it
+    # is large: the nearest effect that is neither there nor tried.
     other = "dead_band without leak"
-    for departed, size, is_tried in ((1.0, 0.01, False), (1.01, STANDARD.tolerable, False), (1.01, 0.01, True)):
-        assert told(_weighed("leak", ("near", 99.0), departed=departed, size=size)) == []
+    for departed, is_ended, size, is_tried in (
+        (1.0, False, 0.01, False), (1.01, False, STANDARD.tolerable, False), (1.01, False, 0.01, True),
+        (0.0, True, STANDARD.tolerable, False), (0.0, True, 0.01, True),
+    ):  # fmt: skip
+        assert told(_weighed("leak", ("near", 99.0), departed=departed, size=size, is_ended=is_ended)) == []
         assert (asked == ["found", other]) is is_tried
     scores |= {other: 70.0, "near for lag": 60.0}
     more = _weighed("leak", ("near", 99.0), departed=2.0), _weighed("lag", ("near", 1.0))
