@@ -250,7 +250,11 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
 
 
 def _weighed(
-    name: str, *laws: tuple[str, float], nothing: float = 50.0, departed: float = 0.5, size: float = 0.01,
+    name: str,
+    *laws: tuple[str, float],
+    nothing: float = 50.0,
+    departed: float = 0.5,
+    size: float = 0.01,
     is_ended: bool = False,
 ) -> Any:
     fits: dict[str, Any] = {law: SimpleNamespace(model=f"{law} for {name}") for law, _ in laws}
