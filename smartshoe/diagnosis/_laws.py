@@ -67,12 +67,12 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
     about, own = evidence_about(found.model, sessions, evidence)
     changed = []
     for fitted in tried:
-        score = evidence_about(fitted.model, sessions, evidence, about.given)[1].score
-        if own.score - score >= evidence.odds:
-            changed.append((score, fitted))
-    for _, fitted in sorted(changed, key=lambda one: one[0])[:SWAPS]:
+        if evidence_about(fitted.model, sessions, evidence, about.given)[1].score >= own.score:
+            continue  # roughly, and most are far from it
         anew, best = evidence_about(fitted.model, sessions, evidence)
-        yield State(anew.given, anew, best, fitted)
+        if own.score - best.score >= evidence.odds:
+            changed.append(State(anew.given, anew, best, fitted))
+    yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
 
 
 def _nearest_of_another_kind(member: Member, model: ExtendedModel) -> Alternative | None:

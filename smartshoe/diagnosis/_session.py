@@ -153,8 +153,9 @@ def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
 def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> list[int]:
     """By how much the samples of each recording may be thinned so that the fastest ramp of all keeps its shape.
 
-    Where that leaves more than so many, further, down to what a recording's own fastest ramp needs at least. Of quick
-    steps between long holds, which take next to no time, what is clear of that many samples is enough.
+    Where that leaves more than so many, further, down to what the fastest ramp needs at least: that of all recordings,
+    or its own where one may lose clearly more than they. Of quick steps between long holds, which take next to no
+    time, what is clear of that many samples is enough.
     """
     finest = []  # steps in samples, not rounded, at which the fastest ramp keeps its shape
     for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
@@ -182,7 +183,8 @@ def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Threshol
         # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
         kept = int(MOST_COARSENED * min(steps, max(1, int(steps)))) or round(MOST_COARSENED)
         factors.append(max(shape, min(wanted, max(kept, most))))
-    return factors
+    alike = min(factors)
+    return [one if one >= thresholds.clear * alike else alike for one in factors]
 
 
 def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:

@@ -174,11 +174,14 @@ def test_a_ramp_keeps_its_samples_whatever_part_of_the_full_scale_it_spans(low: 
     assert thinning([pressed, still], SCALE, STANDARD) == [13, 13]
 
 
-def test_each_recording_is_thinned_further_by_its_own_ramps_only() -> None:
+def test_a_recording_that_may_lose_twice_as_many_is_thinned_by_its_own_ramps() -> None:
     """Of 60,000 samples: down to four on a step of 10, though a slow recording beside it may lose four of five."""
     steps, slow = (_run(np.resize(course((n, 1.0), (n, 0.0)), 30_000)) for n in (10, 60))
     assert thinning([steps], SCALE, STANDARD) == [2]
     assert thinning([steps, slow], SCALE, STANDARD) == thinning([slow, steps], SCALE, STANDARD)[::-1] == [2, 5]
+    for n, factor in ((15, 2), (20, 4)):  # of less than twice as many more there is no need
+        other = _run(np.resize(course((n, 1.0), (n, 0.0)), 30_000))
+        assert thinning([steps, other], SCALE, STANDARD) == [2, factor]
     every = [np.ones(30_000, dtype=bool)] * 3
     sessions = prepare([steps, slow, slow], every, [False, False, True], SCALE, [2, 5], STANDARD)
     assert [one.thinned for one in sessions] == [2, 5, 2]
