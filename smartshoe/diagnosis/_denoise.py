@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import oaconvolve
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Mask
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.noise import robust_sd
 
@@ -27,10 +27,13 @@ def noise_sd(signal: Array, thresholds: Thresholds) -> float:
     """
     if signal.size < 10:
         return 0.0
-    third = np.abs(np.diff(signal, 3))
-    sd = robust_sd(third)
-    inside = third <= largest_of_noise(third.size, thresholds) * sd
-    return float(np.sqrt(np.mean(third[inside] ** 2) / 20.0))
+    third = np.diff(signal, 3)
+    return float(np.sqrt(np.mean(third[_are_of_noise(third, thresholds)] ** 2) / 20.0))
+
+
+def _are_of_noise(third: Array, thresholds: Thresholds) -> Mask:
+    """(n,) which ``third`` differences are no larger than those of white noise: corners' are."""
+    return np.asarray(np.abs(third) <= largest_of_noise(third.size, thresholds) * robust_sd(third))
 
 
 def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float:
@@ -43,7 +46,7 @@ def followed_share(load: Array, reading: Array, thresholds: Thresholds) -> float
     if moved.size < thresholds.least_samples:
         return 0.0
     at = np.arange(LATER, moved.size)
-    inside = np.abs(moved) <= largest_of_noise(moved.size, thresholds) * robust_sd(np.abs(moved))
+    inside = _are_of_noise(moved, thresholds)
     at = at[np.lib.stride_tricks.sliding_window_view(inside, LATER + 1).all(axis=1)]
     if at.size < thresholds.least_samples:
         return 0.0

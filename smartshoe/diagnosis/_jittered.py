@@ -26,13 +26,8 @@ def as_sampled(load: Array, reading: Array, step_s: float, thresholds: Threshold
         if not 0.0 < sd_s <= thresholds.echo_s:  # what is later than any echo is no jitter of a clock that can be used
             return load
         seen = np.asarray(gaussian_filter1d(load, sd_s / step_s, mode="nearest"))
-    return seen if _left_by(seen, reading) < _left_by(load, reading) else load
-
-
-def _left_by(load: Array, reading: Array) -> float:
-    """Sum of the squares of what a gain and an offset leave of ``reading`` (n,)."""
-    a, b = load - load.mean(), reading - reading.mean()
-    return float(b @ b - (a @ b) ** 2 / (a @ a))
+    before, after = (abs(float(np.corrcoef(one, reading)[0, 1])) for one in (load, seen))
+    return seen if after > before else load
 
 
 def jitter_s(load: Array, reading: Array, step_s: float) -> float:
