@@ -11,7 +11,8 @@ from smartshoe.calibration._core_inverse import CoreInverse
 from smartshoe.calibration._filter import ForceFilter
 from smartshoe.calibration._noise_limit import MOST, NoiseLimit, noise_gain
 from smartshoe.errors import UsageError
-from smartshoe.models.effects.effect import CStep, Inverse
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, SIGMAS
+from smartshoe.models.effects.effect import CStep, Inverse, Surroundings
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel, Part
 from smartshoe.units import Unit, declared, find_unit
@@ -53,6 +54,7 @@ class ExtendedCompensator(ForceFilter):
         self.core = CoreInverse(model.core, self.step_s)
         self._blocks: list[tuple[str, Inverse]] = []
         self._passed_over: dict[str, str] = {}
+        self._noise = model.noise / model.gain  # of the signal, as far as it is undone
         leaks = (part for part in model.parts if part.effect.is_leak)
         self._cautions = {part.name: LEAK_CAUTION for part in leaks if not part.effect.is_null(part.values)}
         for part in reversed(model.chain):
@@ -68,7 +70,8 @@ class ExtendedCompensator(ForceFilter):
     def _undo(self, part: Part) -> None:
         # A tone's phase belongs to the session it was fitted on, so that noise is never taken off.
         arm = Arm(self.model.relaxing_share, self.model.relaxation_rate_per_s)
-        inverse = part.effect.inverse_beside(arm, part.values, self.step_s) if part.effect.is_physical else None
+        chain = Surroundings(arm, max(LEAST_DEAD_ZONE, SIGMAS * self._noise))
+        inverse = part.effect.inverse_within(chain, part.values, self.step_s) if part.effect.is_physical else None
         if inverse is None:
             self._passed_over[part.name] = _why_not(part)
             return
@@ -76,6 +79,7 @@ class ExtendedCompensator(ForceFilter):
         if not part.effect.is_latency:
             return
         raised = noise_gain(inverse)
+        self._noise *= min(raised, MOST)
         if raised <= MOST:
             self._cautions[part.name] = f"undoing it raises fast noise of the readings {raised:.3g} times"
             return
@@ -88,6 +92,7 @@ class ExtendedCompensator(ForceFilter):
 
     def _undo_core(self) -> None:
         self._blocks.append(("core", self.core))
+        self._noise *= 1.0 + max(self.model.relaxing_share, 0.0)  # what a sudden load reads less than a held one
         if not self.core.is_exact:
             self._cautions["baseline"] = (
                 f"{self.sample_rate_hz:g} Hz is coarse for this relaxation: the bilinear transform stands in for the"

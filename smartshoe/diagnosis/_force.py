@@ -1,4 +1,4 @@
-"""The force that a model's inverse gives back, and which of two models a unit is compensated by."""
+"""The force that a model's inverse gives back, and which effects of a unit's model are undone for it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._settling import listed
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -24,36 +25,77 @@ class ForceError:
 
 def force_error(fine: Sequence[Session], model: ExtendedModel) -> ForceError:
     """Of ``model`` run backwards over what was fitted, and over what is held out."""
-    off = [_off_n(session, model) for session in fine]
-    fitted = [one[session.fitted] for one, session in zip(off, fine, strict=True)]
-    judged = [one[session.judged] for one, session in zip(off, fine, strict=True)]
-    return ForceError(_rms(fitted), _rms(judged))
+    return ForceError(*(_rms_n(fine, model, [getattr(one, part) for one in fine]) for part in ("fitted", "judged")))
 
 
-def undoes(extended: ForceError, plain: ForceError, thresholds: Thresholds) -> bool:
-    """Whether the extended model's inverse gives the load of what was fitted back hardly worse than the plain one's.
+@dataclass(frozen=True, eq=False)
+class Compensation:
+    """What a unit is compensated by: ``model``, run backwards, with its ``error``.
 
-    A curve that hardly rises, or a gain that nearly vanishes, follows the reading and tells no load: its inverse makes
-    more of all that is left.
+    ``model`` is the extended one, but for effects (``passed_over``) whose undoing does more harm than good, or the
+    plain one. ``before`` is the plain one's error, ``whole`` that of the extended one with all its effects.
     """
-    return not extended.fitted_n > (1.0 + thresholds.standing) * plain.fitted_n
+
+    model: ExtendedModel
+    error: ForceError
+    before: ForceError
+    whole: ForceError
+    passed_over: tuple[str, ...] = ()
+    is_plain: bool = False
 
 
-def force_of(plain: ForceError, extended: ForceError, thresholds: Thresholds) -> str | None:
-    """What is said of an extended model that gives the load back worse than the plain one does."""
-    if not undoes(extended, plain, thresholds):
-        return (
+def compensation(
+    fine: Sequence[Session], extended: ExtendedModel, plain: ExtendedModel, thresholds: Thresholds
+) -> Compensation:
+    """The model whose inverse gives back the load of what was fitted best.
+
+    To undo a lag, a gain that goes by the rate or a curve that hardly rises makes more of the reading's ``noise``, and
+    of all else that is left of it. Where that is so, an effect is undone only if the force is not nearer to the load
+    without. Where the plain model's is nearer all the same, it is the one.
+    """
+    before, whole = force_error(fine, plain), force_error(fine, extended)
+    seen, alike = [one.fitted for one in fine], 1.0 + thresholds.same
+    model, least = extended, whole.fitted_n
+    made_of_it = extended.noise / extended.gain * extended.full_scale_load_n
+    while model.parts and least > alike * made_of_it:
+        others = [model.without(name) for name in model.names]
+        off_n = [_rms_n(fine, other, seen) for other in others]
+        best = min(range(len(off_n)), key=off_n.__getitem__)
+        if not alike * off_n[best] < least:
+            break
+        model, least = others[best], off_n[best]
+    is_nearer = bool(model.parts) and least <= (1.0 + thresholds.standing) * before.fitted_n
+    if extended.parts and not is_nearer:
+        return Compensation(plain, before, before, whole, extended.names, is_plain=True)
+    if model is extended:
+        return Compensation(extended, whole, before, whole)
+    passed_over = tuple(name for name in extended.names if name not in model.names)
+    return Compensation(model, force_error(fine, model), before, whole, passed_over)
+
+
+def force_of(found: Compensation, thresholds: Thresholds) -> list[str]:
+    """What is said of an extended model that gives the load back worse than the plain one does, or than a part does."""
+    said = []
+    if found.is_plain:
+        said.append(
             "the extended model fits the reading but gives a worse force: on what was fitted it is off by"
-            f" {extended.fitted_n:.3g} N, the baseline by {plain.fitted_n:.3g} N; so the calibration compensates by the"
-            " baseline, and its twin simulates with the effects"
+            f" {found.whole.fitted_n:.3g} N, the baseline by {found.before.fitted_n:.3g} N; so the calibration"
+            " compensates by the baseline, and its twin simulates with the effects"
         )
-    if extended.held_out_n > (1.0 + thresholds.standing) * plain.held_out_n:
-        return (
+    elif found.passed_over:
+        said.append(
+            f"the calibration does not undo {listed(found.passed_over)}, which would make more of the noise than it"
+            f" takes off: on what was fitted the force is off by {found.error.fitted_n:.3g} N without, by"
+            f" {found.whole.fitted_n:.3g} N with, by {found.before.fitted_n:.3g} N by the baseline; its twin simulates"
+            " with all effects"
+        )
+    if found.error.held_out_n > (1.0 + thresholds.standing) * found.before.held_out_n:
+        said.append(
             "the force that the extended model gives back is worse than the baseline's on held-out data"
-            f" ({plain.held_out_n:.3g} to {extended.held_out_n:.3g} N), since undoing its effects amplifies what is"
-            " left: compensate by the baseline"
+            f" ({found.before.held_out_n:.3g} to {found.error.held_out_n:.3g} N), since undoing its effects amplifies"
+            " what is left: compensate by the baseline"
         )
-    return None
+    return said
 
 
 def not_undone_of(model: ExtendedModel, step_s: float) -> list[str]:
@@ -72,6 +114,8 @@ def _off_n(session: Session, model: ExtendedModel) -> Array:
     return force_n - session.conditions.load * model.full_scale_load_n
 
 
-def _rms(parts: Sequence[Array]) -> float:
+def _rms_n(fine: Sequence[Session], model: ExtendedModel, seen: Sequence[Mask]) -> float:
+    """Root mean square of `_off_n` where ``seen``; NaN where nothing is."""
+    parts = [_off_n(one, model)[mask] for one, mask in zip(fine, seen, strict=True) if mask.any()]
     count = sum(one.size for one in parts)
     return math.sqrt(sum(float(one @ one) for one in parts) / count) if count else math.nan

@@ -174,27 +174,35 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     fitted = _fitted(gained.sessions)
     if len(fitted) > MOST_FOLDS:
         return gained
-    model, zero_sd = state.given.model, state.thresholds.strength_sd
-    steps = []
-    for one in fitted:
-        by = np.full(one.reading.size, zero_sd) if of_zero else one.own_gain_sd * model.simulate(one.conditions)
-        steps.append(StepColumns.of(one, by, _moments_of(one)))
+    model, zero_sd = state.given.model, state.thresholds.strength_sd if of_zero else 0.0
+    moved = [
+        np.full(one.reading.size, zero_sd) if of_zero else one.own_gain_sd * model.simulate(one.conditions)
+        for one in fitted
+    ]
+
+    def falls_at(moments: Sequence[Index]) -> Array:
+        steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
+        return gained.evidence.falls_beside(gained.kept, steps)
+
     for _ in range(MOST_CHANGES * len(fitted)):
-        falls = gained.evidence.falls_beside(gained.kept, steps)
+        falls = falls_at([_moments_of(one) for one in fitted])
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
         one = _fitted(gained.sessions)[k]
-        changed = _changed(one, int(_moments_of(one)[j]), of_zero=of_zero)
+        # Between the moments beside it, so that what changes once is not told as two changes around it.
+        around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
+        close = falls_at([around if other is fitted[k] else around[:0] for other in fitted])
+        changed = _changed(one, int(around[np.argmax(close)]), zero_sd)
         sessions = [changed if other is one else other for other in gained.sessions]
         gained = _Gained.of(state, sessions, gained.evidence.noise_sd)
     return gained
 
 
-def _changed(session: Session, at: int, *, of_zero: bool) -> Session:
-    """A session with another gain, or zero, from a sample on."""
-    if of_zero:
-        return replace(session, zero_changes=tuple(sorted({*session.zero_changes, at})))
+def _changed(session: Session, at: int, zero_sd: float) -> Session:
+    """A session with another gain, or a zero that lies beside by so much, from a sample on."""
+    if zero_sd:
+        return replace(session, zero_changes=tuple(sorted({*session.zero_changes, at})), zero_sd=zero_sd)
     return replace(session, gain_changes=tuple(sorted({*session.gain_changes, at})))
 
 
@@ -253,7 +261,7 @@ def gains_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[OwnGain
 def zero_changes_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[ZeroChange, ...]:
     """Where the zero of a fitted recording changes: when, and by what, the largest first."""
     found = (
-        ZeroChange(one.recording.name, _time_s(one, at), float(share))
+        ZeroChange(one.recording.name, _time_s(one, at), one.zero_sd * float(share))
         for one, _, steps in _own_of_each(sessions, model)
         for at, share in zip(one.zero_changes, steps, strict=True)
     )

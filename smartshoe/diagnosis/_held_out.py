@@ -24,18 +24,18 @@ LEAST = float(np.finfo(float).tiny)  # squared error, so that none has a logarit
 
 
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
-    """Offset and initial state (2,) of a recording under ``model``, and what they add to its reading (n,).
+    """Offset and initial state of a recording under ``model``, and what they add to its reading (n,).
 
-    The initial state is bounded by what an arm can hold: its share of the whole load. After them its own gains
-    and the changes of its zero, if any.
+    (2 + k,): after them its own gains, the changes of its zero and its states after long gaps, if any. A state is
+    bounded by what an arm can hold: its share of the whole load.
     """
     mask = session.fitted if session.fitted.any() else session.usable
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
     seen = columns[mask]
-    held = max(abs(model.relaxing_share * model.gain), 1e-6)
     variance = float(np.var(residual[mask])) if mask.any() else 0.0
-    more = [variance] * (columns.shape[1] - 2)
-    inner = seen.T @ seen + np.diag([1e-9, variance / held**2 + 1e-9, *more])
+    of_state = variance / max(abs(model.relaxing_share * model.gain), 1e-6) ** 2 + 1e-9
+    own = [variance] * (len(session.gain_parts) + len(session.zero_changes))
+    inner = seen.T @ seen + np.diag([1e-9, of_state, *own, *[of_state] * len(session.gap_ends)])
     found = np.asarray(np.linalg.solve(inner, seen.T @ residual[mask]), dtype=np.float64)
     return found, columns @ found
 

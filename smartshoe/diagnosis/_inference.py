@@ -29,7 +29,7 @@ from smartshoe.diagnosis._gains_and_zeros import (
 )
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._laws import likelier, with_laws
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
 from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
@@ -91,7 +91,7 @@ def infer(
     can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
-        return Inference(plain, plain, likelihood, (), screening, likeness, (), can_validate)
+        return Inference(plain, weighed(likelihood, plain.model), likelihood, (), screening, likeness, (), can_validate)
     begun = State(given, evidence, best, plain)
     if is_stretched(plain.model):
         begun = simpler(with_a_latency(begun, sessions), begun, sessions)
@@ -109,7 +109,7 @@ def infer(
             beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
         if foretells(beside.fit.model, plain.model, state, sessions, gained):
             return replace(beside, baseline=plain)
-        return replace(beside, baseline=plain, fit=plain, members=(), alone=None)
+        return replace(beside, baseline=plain, fit=weighed(beside.likelihood, plain.model), members=(), alone=None)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
@@ -185,7 +185,7 @@ class _Judged:
         candidates, own = self.evidence.given.candidates, plain.model.names
         best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
         refused = (*self.refused, *(name for name in self.fit.model.names if name not in own))
-        return replace(self, fit=plain, best=best, refused=refused, undone=())
+        return replace(self, fit=weighed(self.likelihood, plain.model), best=best, refused=refused, undone=())
 
     def members(self) -> tuple[Member, ...]:
         """Each effect weighed against its alternatives."""
@@ -228,7 +228,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
         refused.append(worst)
         extra.remove(worst)
         extended = less[worst]
-    extended = extended if extra else plain
+    extended = extended if extra else weighed(likelihood, plain.model)  # the plain fit knows another noise
     kept = extended.model.names
     if refused and kept:
         evidence, best = evidence_about(extended.model, sessions, evidence)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from smartshoe.diagnosis._evidence import Evidence
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
 from smartshoe.diagnosis._members import Alternative, Member, fit_with
 from smartshoe.diagnosis._search import SWAPS
 from smartshoe.diagnosis._sensitivity import Candidate, available
@@ -91,7 +91,7 @@ def _law_of(
         if is_curve and part.effect.is_memoryless:
             bare = bare.without(part.name)
     nothing = fit(likelihood, bare, FEW_STEPS)
-    flexible = likelihood.cost(about)
+    flexible = weighed(likelihood, about).cost
     explained = min(nothing.cost, likelihood.cost(plain)) - flexible
     misses: list[tuple[float, Fit]] = []
     for law in available(likelihood.sessions, thresholds):

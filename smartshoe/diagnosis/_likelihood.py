@@ -146,6 +146,11 @@ class Fit:
         return np.asarray(_inverse(inner) * np.outer(scale, scale))
 
 
+def weighed(likelihood: Likelihood, model: ExtendedModel) -> Fit:
+    """``model`` as it is, priors included."""
+    return fit(likelihood, model, 0)
+
+
 def within_bounds(model: ExtendedModel) -> ExtendedModel:
     """``model`` with every parameter within its bounds."""
     bounds = [(one.lower, one.upper) for _, one in model.parameters]

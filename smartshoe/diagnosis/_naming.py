@@ -104,7 +104,9 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
     others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
-    kin = tuple(name for name in others if name != nearest.name)
+    # One that follows less than half of it is none that it may be.
+    ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
+    kin = tuple(name for name in others if name != nearest.name and name not in ruled_out)
     # Of a family of one law nothing follows better or worse than another.
     lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
     kind = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)

@@ -11,7 +11,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
 from smartshoe.diagnosis._characteristic import characteristic_of
-from smartshoe.diagnosis._force import force_error, force_of, not_undone_of, undoes
+from smartshoe.diagnosis._force import compensation, force_of, not_undone_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
@@ -192,6 +192,7 @@ def _diagnosed(
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
+    extended = replace(extended, noise=fitted_rms(fine, off))
     elsewhere = off_elsewhere(fine, off, max(within.size, beyond_noise(fine, off, thresholds)), thresholds)
     known = known_error(integrity.faults, sessions, scale)
     # Beside causes what is left is weighed against what was wrong.
@@ -204,16 +205,15 @@ def _diagnosed(
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, named.zeros, sessions, scale)
-    structure = min(max(after.rms, elsewhere, unproven), left_where_judged(fine, off, thresholds))
+    judged = left_where_judged(fine, off, thresholds)
+    structure = judged if unproven else min(max(after.rms, elsewhere), judged)
     noise_variance = max(best.rmse**2 - structure**2, 0.0)
     explained = verdict in ("adequate", "explained") or after.is_noise
     noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
     parameters, covariance = joint_parameters(found.fit, scale)
-    plain_force, force = (force_error(fine, model) for model in (found.baseline.model, extended))
-    by_extended = undoes(force, plain_force, thresholds)
-    told_force = force_of(plain_force, force, thresholds)
+    force = compensation(fine, extended, found.baseline.model, thresholds)
     ways = beyond(sessions, scale, thresholds) if won.is_loss or elsewhere else None
     return Diagnosis(
         verdict,
@@ -233,8 +233,8 @@ def _diagnosed(
         causes=tuple(causes),
         minor=minor,
         data_faults=(*integrity.faults, *noise),
-        baseline=_goodness(baseline, plain_force.held_out_n, before, scale),
-        extended=_goodness(best, (force if by_extended else plain_force).held_out_n, after, scale),
+        baseline=_goodness(baseline, force.before.held_out_n, before, scale),
+        extended=_goodness(best, force.error.held_out_n, after, scale),
         gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
@@ -246,7 +246,8 @@ def _diagnosed(
             *given.limits,
             *([worse_of(won, ways)] if won.is_loss else []),
             *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
-            *([told_force] if told_force else not_undone_of(extended, fine[0].conditions.step_s)),
+            *force_of(force, thresholds),
+            *not_undone_of(force.model, fine[0].conditions.step_s),
             *named.limits,
             *(
                 said
@@ -265,7 +266,7 @@ def _diagnosed(
         likeness=found.likeness,
         model=with_zero,
         baseline_model=found.baseline.model,
-        force_model=None if by_extended else _with_offset(found.baseline.model, named.zeros, sessions, scale),
+        force_model=_with_offset(force.model, named.zeros, sessions, scale) if force.passed_over else None,
         parameters=parameters,
         covariance=covariance,
         traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),

@@ -90,14 +90,14 @@ def logged_channels(sessions: Sequence[Session]) -> set[str]:
 
 
 def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) -> Array:
-    """(n, 2): one, and exp(-p t), the memory that the unit brings along from before the recording.
+    """(n, 2 + k): one, and exp(-p t), the memory that the unit brings along from before the recording.
 
     After them, for each gain of its own: by how much that moves what a model has ``read`` (n,); from each moment on at
-    which its zero changes, one; and after each long gap a memory again, of a load that nobody knows.
+    which its zero changes, by how much it may; and after each long gap a memory again, of a load that nobody knows.
     """
     time_s = session.conditions.time_s
     own = [session.own_gain_sd * read * part for part in session.gain_parts]
-    steps = [np.arange(time_s.size) >= at for at in session.zero_changes]
+    steps = [session.zero_sd * (np.arange(time_s.size) >= at) for at in session.zero_changes]
     after = [np.pad(np.exp(-pole_per_s * (time_s[at:] - time_s[at])), (at, 0)) for at in session.gap_ends]
     more = [*own, *steps, *after]
     columns = np.empty((time_s.size, 2 + len(more)), order="F")
@@ -109,7 +109,7 @@ def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) ->
 
 
 def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
-    """(2, 2) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
+    """(2 + k, 2 + k) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
 
     A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
     rest still carries some of what went before. One more row for each gain of its own, each change of its zero, and
@@ -118,9 +118,9 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
     sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    steps = [thresholds.strength_sd**-2] * len(session.zero_changes)
+    own = [1.0] * (len(session.gain_parts) + len(session.zero_changes))
     gaps = [1.0 / max(held * float(np.max(session.conditions.load)), 1e-6) ** 2] * len(session.gap_ends)
-    return np.diag([0.0, 1.0 / sd**2, *[1.0] * len(session.gain_parts), *steps, *gaps])
+    return np.diag([0.0, 1.0 / sd**2, *own, *gaps])
 
 
 @dataclass(frozen=True, eq=False)

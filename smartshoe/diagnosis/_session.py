@@ -70,8 +70,8 @@ class Session:
     ``resting`` (n,) True where the unit carries no load. ``index`` of the recording; ``thinned`` by that factor.
     ``quiet`` is the load at the full rate. ``own_gain_sd``: standard deviation, as a share, by which the gain of one
     recording lies beside that of all; 0 where they share one. ``gain_changes``: the samples from which on it is
-    another, in order; ``zero_changes`` those from which on its reading without load is. ``gap_ends``: the first samples
-    after gaps in which the load is not known for so long that the wall may have crept.
+    another, in order; ``zero_changes`` those from which on its reading without load is, by ``zero_sd`` of full scale.
+    ``gap_ends``: the first samples after gaps in which the load is not known for so long that the wall may have crept.
     """
 
     recording: Recording
@@ -87,6 +87,7 @@ class Session:
     own_gain_sd: float = 0.0
     gain_changes: tuple[int, ...] = ()
     zero_changes: tuple[int, ...] = ()
+    zero_sd: float = 0.0
     gap_ends: tuple[int, ...] = ()
 
     @property

@@ -25,6 +25,8 @@ class StepColumns:
 
     def products(self, columns: Array) -> Array:
         """(m, k) inner products with columns (n, m)."""
+        if not self.starts.size:
+            return np.zeros((columns.shape[1], 0))
         parts = [columns[a:b].T @ self.by[a:b] for a, b in pairwise((*self.starts, self.by.size))]
         return np.asarray(np.cumsum(np.stack(parts[::-1], axis=1), axis=1)[:, ::-1])
 

@@ -241,23 +241,32 @@ def sense_of_motion(load, width, fade, state, out):  # type: ignore[no-untyped-d
 def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out (1 - strength (1 - s)/2) = ``signal`` (n,), s the sense of the backlash of out.
 
+    Within the dead zone the sense is as it was; a signal beyond what that gives is sought beyond its end. Where
+    unloading has more gain, a load that turns raises the signal like one that goes on: the signal's next fall tells.
     ``state`` (2,) as in `sense_of_motion`.
     """
     last, sense = state
     for k in range(signal.size):
         y = signal[k]
-        low, high = min(y, y / (1.0 - strength)), max(y, y / (1.0 - strength))
-        now, cleaned = sense, last
-        for _ in range(_BISECTIONS):
-            f = 0.5 * (low + high)
-            cleaned = f if last >= NO_LOAD else min(max(last, f - dead_zone), f + dead_zone)
-            now = _sense(sense, 0.0 if last >= NO_LOAD else cleaned - last, width, fade)
-            if f * (1.0 - 0.5 * strength * (1.0 - now)) < y:
-                low = f
-            else:
-                high = f
-        last, sense = cleaned, now
-        out[k] = 0.5 * (low + high)
+        now = _sense(sense, 0.0, width, fade)
+        f = y / (1.0 - 0.5 * strength * (1.0 - now))
+        if last >= NO_LOAD:
+            last = f
+        elif abs(f - last) > dead_zone:
+            end = last + math.copysign(dead_zone, f - last)
+            whole = y / (1.0 - strength)
+            far = max(y, whole) if f > last else min(y, whole)
+            near, rises = end, f > last
+            for _ in range(_BISECTIONS):
+                f = 0.5 * (near + far)
+                now = _sense(sense, f - end, width, fade)
+                if (f * (1.0 - 0.5 * strength * (1.0 - now)) < y) == rises:
+                    near = f
+                else:
+                    far = f
+            last += f - end
+        sense = now
+        out[k] = f
     state[0], state[1] = last, sense
 
 

@@ -49,7 +49,8 @@ class ExtendedModel:
 
     ``gain`` is the reading of a held full-scale load as a share of ``full_scale_reading`` (in ``reading_unit``);
     ``relaxing_share`` kappa and ``relaxation_rate_per_s`` a give p/f = (s + a)/((1 + kappa) s + a). ``wall_ratio`` is
-    N of `smartshoe.models.core`, which matters for leaks and heat only.
+    N of `smartshoe.models.core`, which matters for leaks and heat only. ``noise`` is the rms, a share of
+    ``full_scale_reading``, of what readings hold besides: its inverse remembers no reversal that may be of it.
     """
 
     gain: float
@@ -60,6 +61,7 @@ class ExtendedModel:
     reading_unit: str
     parts: tuple[Part, ...] = ()
     wall_ratio: float = USUAL_WALL_RATIO
+    noise: float = 0.0
 
     # -- parameters as one vector ------------------------------------------------------------------------------
     @cached_property
@@ -240,6 +242,7 @@ class ExtendedModel:
             "full_scale_reading": self.full_scale_reading,
             "reading_unit": self.reading_unit,
             "wall_ratio": self.wall_ratio,
+            "noise": self.noise,
             "effects": {
                 part.name: {p.name: float(v) for p, v in zip(part.effect.parameters, part.values, strict=True)}
                 for part in self.parts

@@ -55,7 +55,7 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
         cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
-        own_gain_sd=0.0, gain_parts=(), zero_changes=(), gap_ends=(), thinned=1, resting=load <= 0.0,
+        own_gain_sd=0.0, gain_parts=(), zero_changes=(), zero_sd=0.0, gap_ends=(), thinned=1, resting=load <= 0.0,
     )  # fmt: skip
 
 
@@ -270,13 +270,14 @@ def test_after_each_long_gap_the_arm_holds_what_nobody_knows_and_forgets_it_by_i
     assert nuisances(session, 0.3).shape == (60, 2)
     session.gap_ends = (20, 45)
     first = np.arange(60) < 30
-    session.own_gain_sd, session.gain_parts, session.zero_changes = 0.03, (first, ~first), (50,)
+    session.own_gain_sd, session.gain_parts = 0.03, (first, ~first)
+    session.zero_changes, session.zero_sd = (50,), 0.02
     read = np.linspace(1.0, 2.0, 60)
     found = nuisances(session, 0.3, read)
     for k in range(60):
         after = [math.exp(-0.3 * STEP_S * (k - end)) if k >= end else 0.0 for end in (20, 45)]
         gains = [0.03 * read[k] * one for one in (k < 30, k >= 30)]
-        assert found[k] == pytest.approx([1.0, math.exp(-0.3 * STEP_S * k), *gains, float(k >= 50), *after])
+        assert found[k] == pytest.approx([1.0, math.exp(-0.3 * STEP_S * k), *gains, 0.02 * (k >= 50), *after])
 
 
 @pytest.mark.parametrize("share", [0.2, -0.2, 0.0])
@@ -291,7 +292,7 @@ def test_what_the_arm_may_hold_after_a_gap_is_of_the_largest_load(share: float) 
     every = np.ones(5, dtype=bool)
     session.own_gain_sd, session.gain_parts, session.zero_changes = 0.03, (every,), (3,)
     found = nuisance_precision(session, replace(MODEL, relaxing_share=share), STANDARD)
-    assert found == pytest.approx(np.diag([0.0, past, 1.0, STANDARD.strength_sd**-2, gap, gap]))
+    assert found == pytest.approx(np.diag([0.0, past, 1.0, 1.0, gap, gap]))
 
 
 def test_columns_of_a_model_nearby_serve_for_what_is_in_neither() -> None:

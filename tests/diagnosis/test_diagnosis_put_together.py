@@ -13,7 +13,7 @@ from test_procedure_by_hand import AFTER, BEFORE, LOAD, MODEL, SCALE, STANDARD, 
 
 from smartshoe import Recording
 from smartshoe.diagnosis import _procedure, _withheld
-from smartshoe.diagnosis._force import ForceError
+from smartshoe.diagnosis._force import Compensation, ForceError
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._prepared import prepared
 from smartshoe.diagnosis._procedure import _diagnosed
@@ -27,6 +27,7 @@ FAULT: Any = SimpleNamespace(kind="gaps", recording=0, error=0.0)
 SCREENED = ("delay", "flexible_lag", "linear_leak", "dead_band", "rate_gain", "warm_up")
 SCREENING = tuple((name, float(k)) for k, name in enumerate(SCREENED))
 FINE: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.05))
+PLAIN_N, EXTENDED_N = ForceError(8.0, 9.0), ForceError(6.0, 7.0)
 
 
 def test_recordings_are_prepared_with_what_is_held_out_and_what_is_said_beforehand() -> None:
@@ -150,7 +151,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
     answer("wall_ratio_of", lambda *_: made.wall_ratio)
     answer("not_undone_of", lambda *_: list(made.not_undone))
-    answer("force_error", lambda fine, model: ForceError(*((6.0, 7.0) if len(model.parts) else (8.0, 9.0))))
+    answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N))
     answer("next_experiment", "next")
     answer("_trace", "trace")
     answer("sentence_of", "sentence")
@@ -453,8 +454,8 @@ def test_no_more_can_be_explained_than_is_left_beyond_noise_where_it_is_judged(p
         assert (sessions, residuals, thresholds) == ([FINE], [f"{FINE} 2"], STANDARD)  # at full rate
     parts.seen.clear()
     parts.judged = 1.0
-    told = _run_diagnosis(parts)  # nothing shows that 0.05 is noise
-    assert told.explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - 0.05**2) / 0.04))
+    told = _run_diagnosis(parts)  # nothing shows that any of it is noise
+    assert told.explainable_percent == 100.0
 
 
 def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what_was_fitted(
@@ -462,8 +463,8 @@ def test_a_calibration_compensates_by_the_model_that_gives_back_the_load_of_what
 ) -> None:
     assert _run_diagnosis(parts).force_model is None
     parts.seen.clear()
-    worse = ForceError(8.2, 7.0)
-    monkeypatch.setattr(_procedure, "force_error", lambda fine, model: worse if len(model.parts) else ForceError(8, 9))
+    by_plain = Compensation(MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), ("linear_leak", "delay"), is_plain=True)
+    monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
     told = _run_diagnosis(parts)
     assert told.force_model == "with offset"
     assert parts.seen["_with_offset"][0][0] is MODEL  # the plain one's
@@ -475,7 +476,7 @@ def test_a_wall_as_no_wall_is_is_said_of_the_extended_model(parts: Any) -> None:
     parts.wall_ratio = "no such wall"
     assert _run_diagnosis(parts).limits == ("limit", "no such wall")
     (model, sessions, thresholds), _ = parts.seen["wall_ratio_of"]
-    assert model is parts.found.fit.model
+    assert (model.names, model.noise) == (parts.found.fit.model.names, 1.0)  # what is left of the reading
     assert ([one.name for one in sessions], thresholds) == (["held", "fitted"], STANDARD)
 
 
@@ -485,13 +486,15 @@ def test_what_no_compensator_takes_off_is_said_where_the_extended_model_compensa
     parts.not_undone = ["not undone"]
     assert _run_diagnosis(parts).limits == ("limit", "not undone")
     (model, step_s), _ = parts.seen["not_undone_of"]
-    assert model is parts.found.fit.model
+    assert model.names == parts.found.fit.model.names
     assert step_s == 0.05
     parts.seen.clear()
-    worse = ForceError(8.2, 7.0)
-    monkeypatch.setattr(_procedure, "force_error", lambda fine, model: worse if len(model.parts) else ForceError(8, 9))
-    (_, said) = _run_diagnosis(parts).limits
+    by_plain = Compensation(MODEL, PLAIN_N, PLAIN_N, ForceError(8.2, 7.0), ("linear_leak", "delay"), is_plain=True)
+    monkeypatch.setattr(_procedure, "compensation", lambda *_: by_plain)
+    (_, said, _) = _run_diagnosis(parts).limits
     assert "gives a worse force: on what was fitted it is off by 8.2 N, the baseline by 8 N" in said
+    (model, _), _ = parts.seen["not_undone_of"]
+    assert model is MODEL
 
 
 def test_what_does_most_by_itself_is_named_though_others_undo_it(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:

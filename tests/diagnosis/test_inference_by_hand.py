@@ -118,6 +118,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
+    monkeypatch.setattr(_inference, "weighed", lambda *given: plain)
     monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
     monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
@@ -450,6 +451,7 @@ class _Judge:
                 model=model, how=steps, cost=self.costs.get(model.names, 0.0)
             ),
         )
+        monkeypatch.setattr(_inference, "weighed", lambda *given: self.plain)
         monkeypatch.setattr(_inference, "cancelling", lambda *given: self.undone.pop() if self.undone else [])
         monkeypatch.setattr(_inference, "begun_with", lambda one, model, likelihood: self.model(*model.names, one.name))
         monkeypatch.setattr(_inference, "extrapolating", lambda *given: self.beyond.pop() if self.beyond else None)

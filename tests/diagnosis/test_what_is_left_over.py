@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from test_diagnosis_parts import MODEL, recording, sessions_of
 
-from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._force import ForceError, force_error, force_of, not_undone_of, undoes
+from smartshoe.diagnosis import Thresholds, _force
+from smartshoe.diagnosis._force import Compensation, ForceError, compensation, force_error, force_of, not_undone_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, gauss_markov_of
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
@@ -141,11 +141,29 @@ def test_a_curve_that_hardly_rises_is_not_run_backwards(one: Session) -> None:
     for slopes, is_run in ((np.linspace(0.0, -0.94, 6), False), (np.linspace(0.0, -0.3, 6), True)):
         bent = MODEL.with_part("flexible_curve", slopes)
         seen = replace(one, reading=bent.simulate(one.conditions) + noise)
-        plain, extended = (force_error([seen], model) for model in (MODEL, bent))
-        assert undoes(extended, plain, STANDARD) is is_run
-        said = force_of(plain, extended, STANDARD)
-        assert (said is None) is is_run
-        assert is_run or "compensates by the baseline, and its twin simulates with the effects" in str(said)
+        found = compensation([seen], replace(bent, noise=0.08), MODEL, STANDARD)
+        assert found.model is MODEL or is_run
+        assert found.is_plain is not is_run
+        assert (found.before, found.whole) == tuple(force_error([seen], model) for model in (MODEL, bent))
+        said = force_of(found, STANDARD)
+        assert (said == []) is is_run
+        assert is_run or "compensates by the baseline, and its twin simulates with the effects" in said[0]
+
+
+def test_a_lag_is_not_undone_where_that_makes_more_of_the_noise_than_it_takes_off(one: Session) -> None:
+    """The curve beside it is; of less noise both are."""
+    bent = MODEL.with_part("gas_compression", np.array([0.4])).with_part("sensor_lag", np.array([0.1, 0.0]))
+    for noise, left in ((0.03, ("sensor_lag",)), (0.003, ())):
+        read = bent.simulate(one.conditions) + noise * np.random.default_rng(1).standard_normal(one.reading.size)
+        seen = replace(one, reading=read)
+        found = compensation([seen], replace(bent, noise=noise), MODEL, STANDARD)
+        assert found.passed_over == left
+        assert {*found.model.names} == {*bent.names} - {*left}
+        assert found.error.fitted_n == pytest.approx(force_error([seen], found.model).fitted_n)
+        assert found.error.fitted_n < found.before.fitted_n
+        said = force_of(found, STANDARD)
+        assert bool(said) is bool(left)
+        assert not left or said[0].startswith("the calibration does not undo sensor lag, which would make more of")
 
 
 @pytest.mark.parametrize(("held_out_n", "is_said"), [(9.1, False), (9.3, True), (np.nan, False)])
@@ -153,14 +171,19 @@ def test_a_force_that_is_worse_on_what_is_held_out_alone_is_said_and_decides_not
     held_out_n: float, is_said: bool
 ) -> None:
     extended = ForceError(8.9, held_out_n)
-    assert undoes(extended, ForceError(9.0, 9.0), STANDARD)
-    assert (": compensate by the baseline" in str(force_of(ForceError(9.0, 9.0), extended, STANDARD))) is is_said
+    found = Compensation(MODEL, extended, ForceError(9.0, 9.0), extended)
+    assert (": compensate by the baseline" in str(force_of(found, STANDARD))) is is_said
 
 
-def test_a_force_that_is_hardly_worse_decides_nothing() -> None:
-    plain, most = ForceError(9.0, 9.0), 9.0 * (1.0 + STANDARD.standing)
-    assert undoes(ForceError(0.999 * most, 8.0), plain, STANDARD)
-    assert not undoes(ForceError(1.001 * most, 8.0), plain, STANDARD)
+@pytest.mark.parametrize(("more", "is_plain"), [(0.999, False), (1.001, True), (np.nan, True)])
+def test_a_force_that_is_hardly_worse_decides_nothing(
+    one: Session, monkeypatch: pytest.MonkeyPatch, more: float, is_plain: bool
+) -> None:
+    bent, most = MODEL.with_part("gas_compression", np.array([0.1])), 9.0 * (1.0 + STANDARD.standing)
+    errors = {len(MODEL.parts): ForceError(9.0, 9.0), len(bent.parts): ForceError(more * most, 8.0)}
+    monkeypatch.setattr(_force, "force_error", lambda fine, model: errors[len(model.parts)])
+    monkeypatch.setattr(_force, "_rms_n", lambda *_: 9.0)
+    assert compensation([one], bent, MODEL, STANDARD).is_plain is is_plain
 
 
 def test_what_no_compensator_takes_off_is_said_with_the_reason() -> None:

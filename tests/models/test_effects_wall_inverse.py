@@ -14,8 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, SIGMAS
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect
+from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect, Surroundings
+from smartshoe.models.elements import Arm
 
 EXACT = (
     "gas_compression", "wall_hardening", "contact_area", "orifice_leak", "permanent_set", "mullins_softening",
@@ -87,6 +89,44 @@ def test_dead_band_gives_back_every_load_that_it_lets_through(seed: int) -> None
     through = given_.load > 1.5 * values[0]
     assert np.max(np.abs(back - given_.load)[through]) <= 1e-9
     assert np.max(np.abs(back - given_.load)) <= values[0]
+
+
+@given(seed=seeds, gained=st.floats(0.01, 0.2), turn=st.floats(0.001, 0.02))
+def test_where_unloading_gains_a_load_comes_back_once_it_has_turned(seed: int, gained: float, turn: float) -> None:
+    """As the load turns two loads give one reading; the next sample that goes on tells which it is."""
+    made, given_ = effect("load_unload_asymmetry"), loading(seed)
+    values = np.array([-gained, turn])
+    back = made.inverse(values, STEP_S)
+    assert back is not None
+    left = back.push(made.apply(given_.load, given_, values), given_.time_s) - given_.load
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(given_.load)))])
+    last = np.maximum.accumulate(np.where(np.abs(np.diff(given_.load, 2, append=[0.0, 0.0])) > 1e-9, way, 0.0))
+    gone = way - last > 10.0 * turn + 4.0 * LEAST_DEAD_ZONE + gained * given_.load
+    assert np.max(np.abs(left), where=gone, initial=0.0) <= 1e-3 * gained
+    assert np.max(np.abs(left)) <= gained
+
+
+@given(seed=seeds)
+@settings(max_examples=10)
+def test_memory_takes_no_noise_for_a_load_that_turns(seed: int) -> None:
+    """Of readings with noise the inverse that knows its size comes near the load, and one that does not far less so."""
+    noise = 0.003 * np.random.default_rng(seed).standard_normal(5_000)
+    time_s = np.arange(noise.size) * STEP_S
+    given_ = Conditions(
+        time_s, np.interp(time_s, [0.0, 20.0, 40.0, 60.0, 80.0, 100.0], [0.1, 0.9, 0.9, 0.2, 0.2, 0.9]), STEP_S
+    )
+    for name, values in (
+        ("load_unload_asymmetry", np.array([-0.08, 0.005])),
+        ("bouc_wen_hysteresis", np.array([0.02, 0.03, 1.0, 0.0, 0.0])),
+    ):
+        made = effect(name)
+        read = made.apply(given_.load, given_, values) + noise
+        off = []
+        for zone in (LEAST_DEAD_ZONE, SIGMAS * 0.003):
+            back = made.inverse_within(Surroundings(Arm(0.1, 0.2), zone), values, STEP_S)
+            assert back is not None
+            off.append(float(np.std(back.push(read, time_s) - given_.load - noise)))
+        assert off[1] < 0.5 * off[0]
 
 
 @given(seed=seeds, rate_per_s=st.floats(0.06, 1.0))

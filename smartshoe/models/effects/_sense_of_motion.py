@@ -8,7 +8,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
+from smartshoe.models.effects._wall_memory import NO_LOAD, Undone, cleaned_load
 from smartshoe.models.effects.effect import Conditions
 
 
@@ -29,49 +29,53 @@ def _sense(conditions: Conditions, turn: float, fade: float) -> Array:
     return out
 
 
-def undone_by_sense(lost: float, turn: float, fade: float) -> Undone:
+def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> Undone:
     """The load whose own sense gives the output, by bisection; exact for a load without noise."""
     from smartshoe.kernels.memory import sense_undone
 
     def body(of: Mapping[str, str]) -> str:
-        zone = c_number(LEAST_DEAD_ZONE)
-        return f"""{{
-    const double other = x / {c_number(1.0 - lost)};
-    double low = x < other ? x : other, high = x < other ? other : x;
-    double v = x, sense = {of["sense"]}, cleaned = {of["last"]};
-    int k;
-    for (k = 0; k <= 50; k++) {{
-        double move = 0.0, turned, total;
-        v = 0.5 * (low + high);
-        cleaned = v;
-        sense = {of["sense"]};
-        if ({of["last"]} < {NO_LOAD}) {{
-            cleaned = {of["last"]};
-            cleaned = cleaned < v - {zone} ? v - {zone} : cleaned;
-            cleaned = cleaned > v + {zone} ? v + {zone} : cleaned;
-            move = cleaned - {of["last"]};
-        }}
-        turned = (move < 0.0 ? -move : move) / {c_number(turn)};
+        zone = c_number(dead_zone)
+
+        def turned(by: str) -> str:
+            """Lines that turn the sense over by a move."""
+            return f"""turned = ({by} < 0.0 ? -({by}) : {by}) / {c_number(turn)};
         total = turned + {c_number(fade)};
         if (total > 0.0) {{
-            const double end = (move < 0.0 ? -turned : turned) / total;
-            sense = end + (sense - end) * exp(-total);
-        }}
-        if (k == 50) {{
-            break;
-        }}
-        if (v * (1.0 - {c_number(0.5 * lost)} * (1.0 - sense)) < x) {{
-            low = v;
-        }} else {{
-            high = v;
-        }}
+            const double at = ({by} < 0.0 ? -turned : turned) / total;
+            sense = at + ({of["sense"]} - at) * exp(-total);
+        }}"""
+
+        return f"""{{
+    double v, turned, total, sense = {of["sense"]};
+    {{
+        {turned("0.0")}
     }}
-    x = v;
+    v = x / (1.0 - {c_number(0.5 * lost)} * (1.0 - sense));
+    if ({of["last"]} >= {NO_LOAD}) {{
+        {of["last"]} = v;
+    }} else if (fabs(v - {of["last"]}) > {zone}) {{
+        const int rises = v > {of["last"]};
+        const double end = rises ? {of["last"]} + {zone} : {of["last"]} - {zone};
+        const double whole = x / {c_number(1.0 - lost)};
+        double near = end, far = (x > whole) == rises ? x : whole;
+        int k;
+        for (k = 0; k < 50; k++) {{
+            v = 0.5 * (near + far);
+            sense = {of["sense"]};
+            {turned("(v - end)")}
+            if ((v * (1.0 - {c_number(0.5 * lost)} * (1.0 - sense)) < x) == rises) {{
+                near = v;
+            }} else {{
+                far = v;
+            }}
+        }}
+        {of["last"]} += v - end;
+    }}
     {of["sense"]} = sense;
-    {of["last"]} = cleaned;
+    x = v;
 }}"""
 
-    return Undone(sense_undone, (lost, turn, fade, LEAST_DEAD_ZONE), _start(fade), ("last", "sense"), body)
+    return Undone(sense_undone, (lost, turn, fade, dead_zone), _start(fade), ("last", "sense"), body)
 
 
 def _start(fade: float) -> Array:

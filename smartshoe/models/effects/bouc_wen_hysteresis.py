@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned, dead_zone
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
 from smartshoe.models.effects.exposure import by
 
 WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
@@ -56,7 +56,7 @@ class BoucWenHysteresis(Effect):
         bouc_wen(load, *_branch(values), np.array(START), out)
         return signal - float(values[0]) * np.clip(1.0 - float(values[4]) * load, 0.0, 1.0) * out
 
-    def inverse(self, values: Array, step_s: float) -> Inverse:
+    def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """The load whose friction gives the output, by bisection; exact for a load without noise.
 
         There is one such load where friction turns over less fast than load: half_height (1 + turn) < width.
@@ -69,12 +69,16 @@ class BoucWenHysteresis(Effect):
         def body(of: Mapping[str, str]) -> str:
             return _C_BODY.format(
                 **of, points=z.size, z=_row(z), slope=_row(slope), last_point=z.size - 1, no_load=NO_LOAD,
-                strength=c_number(strength), fading=c_number(fading), zone=c_number(LEAST_DEAD_ZONE),
+                strength=c_number(strength), fading=c_number(fading), zone=c_number(dead_zone),
                 per_load=c_number(per_load),
             )  # fmt: skip
 
-        constants = (strength, fading, per_load, z, slope, LEAST_DEAD_ZONE)
+        constants = (strength, fading, per_load, z, slope, dead_zone)
         return Undone(bouc_wen_undone, constants, np.array(START), ("last", "value", "direction", "place"), body)
+
+    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+        """The same, of what is clear of the chain's noise."""
+        return self.inverse(values, step_s, chain.dead_zone)
 
 
 START = (NO_LOAD, 0.0, 0.0, 0.0)

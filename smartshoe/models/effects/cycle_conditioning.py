@@ -9,7 +9,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETTLED, Undone, cleaned_load
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
 from smartshoe.models.effects.exposure import by
 
 LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
@@ -56,12 +56,11 @@ class CycleConditioning(Effect):
         count = (1.0 - by_way) * done**stretch + by_way * gone
         return signal * (1.0 - gained * np.expm1(-count))
 
-    def inverse(self, values: Array, step_s: float) -> Inverse:
+    def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """Divide by the gain so far, counting cycles and way of what comes out; exact but for what counts as noise."""
         from smartshoe.kernels.memory import CYCLE_ENDS, conditioned_undone
 
         gained, per_cycle, by_way, stretch = float(values[0]), 1.0 / float(values[1]), *map(float, values[2:])
-        width = LEAST_DEAD_ZONE
 
         def body(of: Mapping[str, str]) -> str:
             count, trough, peak, place, gone = (of[name] for name in MEMBERS)
@@ -74,8 +73,8 @@ class CycleConditioning(Effect):
         if ({place} >= {NO_LOAD}) {{
             z = x;
         }} else {{
-            z = {place} < x - {c_number(width)} ? x - {c_number(width)} : {place};
-            z = z > x + {c_number(width)} ? x + {c_number(width)} : z;
+            z = {place} < x - {c_number(dead_zone)} ? x - {c_number(dead_zone)} : {place};
+            z = z > x + {c_number(dead_zone)} ? x + {c_number(dead_zone)} : z;
             moved = {gone} + 0.5 * fabs(z - {place});
         }}
         x = given / (1.0 - {c_number(gained)} * expm1(-(counted + {c_number(by_way * per_cycle)} * moved)));
@@ -109,8 +108,12 @@ class CycleConditioning(Effect):
 }}"""
 
         start = np.array([0.0, NO_LOAD, NO_LOAD, NO_LOAD, 0.0])
-        constants = (gained, per_cycle, by_way, stretch, LEAST_HEIGHT, width, MOST_ROUNDS, SETTLED)
+        constants = (gained, per_cycle, by_way, stretch, LEAST_HEIGHT, dead_zone, MOST_ROUNDS, SETTLED)
         return Undone(conditioned_undone, constants, start, MEMBERS, body)
+
+    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+        """The same, of what is clear of the chain's noise."""
+        return self.inverse(values, step_s, chain.dead_zone)
 
 
 def half_way(conditions: Conditions) -> Array:

@@ -162,6 +162,18 @@ class CStep:
     body: str
 
 
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What an inverse may know of the chain that it stands in.
+
+    ``arm`` is the baseline's; ``dead_zone`` half the swing of what comes in, a share of full scale, that memory must
+    not take for a reversal.
+    """
+
+    arm: Arm
+    dead_zone: float
+
+
 class Effect(ABC):
     """One effect of the catalogue; a subclass a file, one instance a class.
 
@@ -221,8 +233,8 @@ class Effect(ABC):
         """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""
         return None
 
-    def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse | None:
-        """The same in a chain whose wall has the relaxing ``arm``, for a spring that bends beside it."""
+    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse | None:
+        """The same in a chain, for what bends beside its arm, or must not remember its noise."""
         return self.inverse(values, step_s)
 
     @property

@@ -12,9 +12,8 @@ from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_loop import arm_beside, most_beside
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, dead_zone
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
 from smartshoe.models.effects.exposure import by
-from smartshoe.models.elements import Arm
 
 
 class MullinsSoftening(Effect):
@@ -68,16 +67,19 @@ class MullinsSoftening(Effect):
         softened(np.ascontiguousarray(signal), *given, out)
         return out
 
-    def inverse_beside(self, arm: Arm, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
-        return BesideArm(_undone(*_amounts(values, arm.share)), arm, step_s)
+        spring = _undone(*_amounts(values, chain.arm.share), dead_zone=chain.dead_zone)
+        return BesideArm(spring, chain.arm, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
         return _undone(*_amounts(values))
 
 
-def _undone(strength: float, width: float, widening: float, raised: float, power: float) -> Undone:
+def _undone(
+    strength: float, width: float, widening: float, raised: float, power: float, dead_zone: float = LEAST_DEAD_ZONE
+) -> Undone:
     """The inverse, of `_amounts`."""
     from smartshoe.kernels.memory import CLOSE, EASED, STEPS, softened_undone
 
@@ -112,12 +114,12 @@ def _undone(strength: float, width: float, widening: float, raised: float, power
             }}
         }}
     }}
-    if (x - {c_number(LEAST_DEAD_ZONE)} > {most}) {{
-        {most} = x - {c_number(LEAST_DEAD_ZONE)};
+    if (x - {c_number(dead_zone)} > {most}) {{
+        {most} = x - {c_number(dead_zone)};
     }}
 }}"""
 
-    constants = (strength, width, widening, raised, power, LEAST_DEAD_ZONE)
+    constants = (strength, width, widening, raised, power, dead_zone)
     return Undone(softened_undone, constants, np.zeros(1), ("largest",), body)
 
 

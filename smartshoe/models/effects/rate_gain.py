@@ -10,7 +10,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
 from smartshoe.models.effects.exposure import by
 
 HALF_WINDOW_S = 0.04
@@ -49,7 +49,7 @@ class RateGain(Effect):
         factor: Array = 1.0 - gain * SLOW_PER_S**exponent + gain * np.exp((0.5 * exponent) * square)
         return signal * np.maximum(factor, LEAST_GAIN)
 
-    def inverse(self, values: Array, step_s: float) -> Inverse:
+    def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """Divide by the gain at the output's own smoothed rate: exact on ramps, late by the window after corners."""
         from smartshoe.kernels.memory import rate_undone
 
@@ -57,7 +57,7 @@ class RateGain(Effect):
         keep = math.exp(-step_s / HALF_WINDOW_S)
 
         def body(of: Mapping[str, str]) -> str:
-            zone = c_number(LEAST_DEAD_ZONE)
+            zone = c_number(dead_zone)
             return f"""{{
     double cleaned = {of["last"]}, moved = 0.0, ratio = 1.0;
     int k;
@@ -79,8 +79,12 @@ class RateGain(Effect):
     x /= ratio;
 }}"""
 
-        constants = (gain, exponent, LEAST_GAIN, SLOW_PER_S, LEAST_DEAD_ZONE, step_s, keep)
+        constants = (gain, exponent, LEAST_GAIN, SLOW_PER_S, dead_zone, step_s, keep)
         return Undone(rate_undone, constants, np.array([NO_LOAD, 0.0]), ("last", "rate"), body)
+
+    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+        """The same, of what is clear of the chain's noise."""
+        return self.inverse(values, step_s, chain.dead_zone)
 
 
 def _rate(conditions: Conditions) -> Array:
