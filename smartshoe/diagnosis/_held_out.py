@@ -106,8 +106,8 @@ def errors(sessions: Sequence[Session], model: ExtendedModel) -> Errors:
 class Gain:
     """Errors before and after in ``unit``, and by how many percent the error falls, with its 95 % interval.
 
-    Of one cycle, of which there is none, the interval is the gain itself. ``is_loss``: that the error grows, by what is
-    material, beyond chance, and over more than a few cycles.
+    Of one cycle, of which there is none, the interval is the gain itself. ``is_certain``: that the error falls, or
+    grows, beyond chance and over more than a few cycles; ``is_loss``: that it grows so, by what is material.
     """
 
     rmse_before: float
@@ -116,6 +116,12 @@ class Gain:
     gain_percent: float
     ci95: tuple[float, float]
     is_loss: bool = False
+    is_certain: bool = False
+
+    def certain_fall(self, scale: Scale) -> float:
+        """Rms, a share of full scale, of what is done away with for certain; 0 where nothing is."""
+        square = self.rmse_before**2 - self.rmse_after**2
+        return math.sqrt(square) / abs(scale.reading) if self.is_certain and square > 0.0 else 0.0
 
     def to_dict(self) -> dict[str, object]:
         """The contract's ``held_out``."""
@@ -148,8 +154,9 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | N
         low, high = total - reach, total + reach
     ci95 = float(_percent(high)), float(_percent(low))
     grows = after.rmse - before.rmse > decided.material
-    is_loss = bool(grows and ci95[1] < 0.0 and n >= decided.few)
-    return Gain(before.rmse * span, after.rmse * span, unit, float(_percent(total)), ci95, is_loss)
+    is_certain = n >= decided.few and ci95[0] * ci95[1] > 0.0
+    is_loss = bool(grows and ci95[1] < 0.0 and is_certain)
+    return Gain(before.rmse * span, after.rmse * span, unit, float(_percent(total)), ci95, is_loss, is_certain)
 
 
 def _log_ratio(before: Array | float, after: Array | float) -> Array:

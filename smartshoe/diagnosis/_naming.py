@@ -79,13 +79,17 @@ def names_of(
         return larger
     if larger:
         largest = max(larger, key=lambda one: one.member.size)
-        kind = probability_of_kind(largest.member, left, thresholds)
-        if kind > thresholds.equivalent_odds * (1.0 - kind):
+        if _may_be(probability_of_kind(largest.member, left, thresholds), thresholds):
             return (_doubted(largest),)
     if alone is None:
         return ()
-    by_itself = (one for one in likely if one.member.effect.kind == alone.kind)
+    by_itself = (one for one in likely if one.member.effect.kind == alone.kind and _may_be(one.kind, thresholds))
     return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
+
+
+def _may_be(probability: float, thresholds: Thresholds) -> bool:
+    """Whether what has this probability cannot be ruled out."""
+    return probability > thresholds.equivalent_odds * (1.0 - probability)
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
@@ -95,7 +99,7 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     if by is not None and by.margin <= thresholds.departure**2 * one.fall:
         # The block is how that law departs: the others are weighed against it.
         followed = catalogue()[str(by.effect)]
-        kin = _kin_of(followed)
+        kin = _kin_of(followed) or tuple(str(a.effect) for a in one.laws if a is not by)  # of a curve, any other one
         beside = tuple(replace(a, margin=a.margin - by.margin) for a in one.laws if a.effect in kin)
         as_law = replace(one, laws=beside, fall=one.fall - by.margin)
         return Name(one, followed, kind, *probability_of_law(as_law, thresholds), False, is_sure, by)
@@ -104,11 +108,12 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
         return Name(one, one.effect, kind, law, equivalents, is_sure=is_sure)
     nearest = _nearest_of_kind(one) if by is None else catalogue()[str(by.effect)]
     others = dict.fromkeys((*_kin_of(nearest), *(str(a.effect) for a in one.laws)))  # of a curve any other one
+    others.pop(nearest.name, None)
     # One that follows less than half of it is none that it may be.
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
-    kin = tuple(name for name in others if name != nearest.name and name not in ruled_out)
+    kin = tuple(name for name in others if name not in ruled_out)
     # Of a family of one law nothing follows better or worse than another.
-    lawless = probability_of_kind(one, left, thresholds, lawless=bool(kin))
+    lawless = probability_of_kind(one, left, thresholds, lawless=bool(others))
     kind = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
     return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 

@@ -201,7 +201,9 @@ def _diagnosed(
     verdict: Verdict = "unexplained"
     if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         follows = all(name.is_sure and not name.kind_only for name in named.names)
-        besides = max(elsewhere, unproven, named.nameless if named.nameless > thresholds.tolerable else 0.0)
+        # What is followed is there, though of no kind with a name, or where too little is left to test for more.
+        gained = 0.0 if causes else won.certain_fall(scale)
+        besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > thresholds.tolerable))
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, named.zeros, sessions, scale)

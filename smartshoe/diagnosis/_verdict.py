@@ -45,7 +45,8 @@ def verdict_of(
     """What is left, against what was wrong ``before`` and what is tolerable.
 
     ``worse``: that the extension is so, for certain, on what is held out: whatever it follows, it explains a part.
-    ``elsewhere``: `off_elsewhere`, or what an effect moves that is followed, but of no kind that has a name.
+    ``elsewhere``: `off_elsewhere`, or what an effect moves that is followed, but of no kind that has a name, or what
+    effects without names do away with.
 
     ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
 

@@ -23,8 +23,8 @@ LOOPS = (("play_hysteresis", PLAY), ("play_hysteresis", STOPS), ("bouc_wen_hyste
 MEMORIES = (
     *LOOPS,
     ("load_unload_asymmetry", np.array([0.02, 0.005])),
-    ("mullins_softening", np.array([0.03, 0.3, 0.0, 0.0, 1.0])),
-    ("mullins_softening", np.array([0.03, 0.3, 0.7, 1.0, 0.6])),
+    ("mullins_softening", np.array([0.03, 0.3, 0.0, 0.0, 1.0, 0.0])),
+    ("mullins_softening", np.array([0.03, 0.3, 0.7, 1.0, 0.6, 0.3])),
     ("cycle_conditioning", np.array([0.03, 3.0, 0.0, 1.0])),
     ("cycle_conditioning", np.array([0.03, 3.0, 0.4, 0.5])),
 )
@@ -161,7 +161,7 @@ def test_size_grows_with_rate_in_both_directions() -> None:
 
 
 def test_only_the_first_loading_to_a_level_is_stiff() -> None:
-    values = np.array([0.05, 0.3, 0.0, 0.0, 1.0])
+    values = np.array([0.05, 0.3, 0.0, 0.0, 1.0, 0.0])
     load = between([0.5, 0.0, 0.5, 1.0, 0.0, 1.0], 500)
     out = run("mullins_softening", values, load)
     assert out[250] == pytest.approx(load[250], abs=1e-12)  # virgin
@@ -172,7 +172,7 @@ def test_only_the_first_loading_to_a_level_is_stiff() -> None:
 
 
 def test_a_damaged_wall_is_straight_below_its_largest_load_and_bends_beyond() -> None:
-    values = np.array([0.05, 0.3, 1.0, 0.0, 1.0])
+    values = np.array([0.05, 0.3, 1.0, 0.0, 1.0, 0.0])
     load = between([0.5, 0.0, 0.5, 1.0, 0.0], 500)
     out = run("mullins_softening", values, load)
     gain = out / np.where(load == 0.0, np.inf, load)
@@ -204,7 +204,7 @@ def test_softened_rubber_bears_the_load_to_the_last_digit(
 ) -> None:
     """The kernel against bisection, sample by sample: steep bends, jumps, pulls, whatever came before."""
     load = between(loads, 15) + noise * np.random.default_rng(1).standard_normal(15 * len(loads) + 1)
-    values = np.array([gained, width, at_once, widening, power])
+    values = np.array([gained, width, at_once, widening, power, 0.0])
     out = run("mullins_softening", values, load, noise, largest_load=before)
     zone = dead_zone(Conditions(np.zeros(1), load, STEP_S, noise))
     below, raised = (1.0 - at_once) * gained, at_once * gained / np.tanh(0.75 / width)
@@ -233,7 +233,7 @@ def test_softened_rubber_bears_the_load_to_the_last_digit(
 def test_by_the_root_of_the_distance_a_wall_is_soft_at_once() -> None:
     """Beatty and Krishnaswamy: a little below its largest load it has lost much of what it will ever lose."""
     load = between([1.0, 0.0, 1.0], 1000)
-    by_energy, by_root = (run("mullins_softening", np.array([0.05, 1.0, 0.0, 0.0, p]), load) for p in (1.0, 0.5))
+    by_energy, by_root = (run("mullins_softening", np.array([0.05, 1.0, 0.0, 0.0, p, 0.0]), load) for p in (1.0, 0.5))
     at = 1050  # at 0.95 of full scale, back from it
     assert by_root[at] / load[at] - 1.0 > 2.0 * (by_energy[at] / load[at] - 1.0)
     assert by_root[1500] == pytest.approx(by_energy[1500], abs=1e-3)  # "gained" is of half of full scale, of either
@@ -249,8 +249,8 @@ def test_cycles_are_counted_whatever_their_rate_and_height_and_ripples_are_not()
 @pytest.mark.parametrize(
     ("name", "values", "key"),
     [
-        ("mullins_softening", np.array([0.05, 0.3, 0.0, 0.5, 0.7]), "largest_load"),
-        ("mullins_softening", np.array([0.05, 0.3, 1.0, 0.0, 1.0]), "largest_load"),
+        ("mullins_softening", np.array([0.05, 0.3, 0.0, 0.5, 0.7, 0.5]), "largest_load"),
+        ("mullins_softening", np.array([0.05, 0.3, 1.0, 0.0, 1.0, 0.0]), "largest_load"),
         ("cycle_conditioning", np.array([0.05, 3.0, 0.0, 1.0]), "cycles"),
         ("cycle_conditioning", np.array([0.05, 3.0, 1.0, 1.0]), "way"),
         ("permanent_set", np.array([1e-3, 1.0]), "dose"),

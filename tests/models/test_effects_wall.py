@@ -271,6 +271,8 @@ def test_a_spring_that_bends_in_the_loop_keeps_the_balance(
     # takes the load for straight lines and the block the deformation: rates above 5/s would show the difference.
     made, given_ = effect(name), conditions(corners(seed)).within(share, rate_per_s)
     values = drawn(made, seed)
+    if name == "mullins_softening":
+        values[5] = 0.0  # of the spring alone
     core = Core([Arm(share, rate_per_s)])
     inverse = made.inverse(values, STEP_S)
     assert inverse is not None
@@ -289,7 +291,7 @@ def test_a_spring_that_bends_in_the_loop_keeps_the_balance(
 
 def _softened(trial: float, most: float, values: Array) -> float:
     """phi of a deformation where ``most`` is the largest so far, by a plain search for the root."""
-    gained, width, at_once, widening, power = values
+    gained, width, at_once, widening, power = values[:5]
     below, wide = (1.0 - at_once) * gained, width + widening * most**2
 
     def rise(largest: float) -> float:
@@ -318,6 +320,7 @@ def test_springs_beside_the_arm_are_those_of_a_plain_search_for_the_root(
     values = drawn(made, seed)
     if name == "mullins_softening":
         values[3] = 3.0 * np.random.default_rng(seed).random()
+    beside = share * (1.0 - values[5]) if name == "mullins_softening" else share
     decay, now, before = hold_coefficients(rate_per_s * STEP_S)
     wanted = np.empty(given_.load.size)
     u = q = largest = 0.0
@@ -337,10 +340,10 @@ def test_springs_beside_the_arm_are_those_of_a_plain_search_for_the_root(
                 return pressure * (1.0 + wall / (1.0 + values[0] * pressure)) / (1.0 + wall / (1.0 + values[0]))
             return _softened(trial, most, values)
 
-        found = brentq(lambda v: spring(v) + share * (v - lagged(v)) - force, -0.5, 1.05, xtol=1e-14)  # noqa: B023
+        found = brentq(lambda v: spring(v) + beside * (v - lagged(v)) - force, -0.5, 1.05, xtol=1e-14)  # noqa: B023
         q, u = lagged(found), found
         largest = max(largest, spring(found))
-        bent = found / (1.0 + values[0] * (1.0 - found)) if name == "gas_compression" else found + share * (found - q)
+        bent = found / (1.0 + values[0] * (1.0 - found)) if name == "gas_compression" else found + beside * (found - q)
         wanted[k] = bent
     assert np.max(np.abs(made.apply(given_.load, given_, values) - wanted)) < 1e-9
 
@@ -355,8 +358,20 @@ def test_softened_rubber_beside_any_arm_stays_within_bounds(
 ) -> None:
     """A fit tries arms that push, and ones that bear most of the load: what it then finds is finite, if it is wrong."""
     given_ = conditions(corners(seed)).within(share, 0.3)
-    out = effect("mullins_softening").apply(given_.load, given_, np.array([1.0, width, at_once, widening, power]))
+    out = effect("mullins_softening").apply(given_.load, given_, np.array([1.0, width, at_once, widening, power, 0.0]))
     assert np.max(np.abs(out)) < 1e3 * np.max(np.abs(given_.load))
+
+
+@given(seed=seeds, share=st.floats(0.0, 0.5))
+@settings(max_examples=8)
+def test_a_wall_that_softens_as_a_whole_does_so_before_its_arm_relaxes(seed: int, share: float) -> None:
+    """What softens is then as if no arm were beside it, and the arm's part of it relaxes as ever."""
+    made, alone = effect("mullins_softening"), conditions(corners(seed), noise=0.002, seed=seed)
+    values = drawn(made, seed)
+    values[5] = 1.0
+    np.testing.assert_allclose(
+        made.apply(alone.load, alone.within(share, 0.3), values), made.apply(alone.load, alone, values), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", ["gas_compression", "mullins_softening", "wall_hardening"])
@@ -386,13 +401,14 @@ def test_beside_an_arm_that_pushes_no_gas_is_asked_for_less_than_a_vacuum() -> N
 
 
 @pytest.mark.parametrize("power", [1.0, 0.5])
+@pytest.mark.parametrize("of_arm", [0.0, 0.5])
 @pytest.mark.parametrize("share", [-0.1, -0.3, -0.6])
-def test_a_softened_wall_beside_an_arm_that_pushes_is_undone(share: float, power: float) -> None:
+def test_a_softened_wall_beside_an_arm_that_pushes_is_undone(share: float, of_arm: float, power: float) -> None:
     made, step_s = effect("mullins_softening"), 0.002
     time_s = step_s * np.arange(20001)
     load = np.interp(time_s, [0.0, 10.0, 20.0, 30.0, 40.0], [0.0, 0.6, 0.1, 1.0, 0.2])
     beside = Conditions(time_s, load, step_s).within(share, 0.23)
-    values = np.array([0.8, 0.5, 0.3, 0.0, power])
+    values = np.array([0.8, 0.5, 0.3, 0.0, power, of_arm])
     back = made.inverse_within(Surroundings(Arm(share, 0.23), 1e-3), values, step_s)
     back.reset()
     assert back.push(made.apply(load, beside, values), time_s) == pytest.approx(load, abs=2e-3)

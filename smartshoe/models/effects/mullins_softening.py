@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +24,9 @@ class MullinsSoftening(Effect):
     Mars 2004 and finite-element codes have it; by the root of the distance, Beatty and Krishnaswamy 2000), a makes the
     wall softer by what it has borne, the first loading included (damage, Simo 1987): ``at_once`` is the share of the
     latter.
-    ``gained`` is what the gain rises at half of full scale after full scale, for a share of 0.
+    ``gained`` is what the gain rises at half of full scale after full scale, for a share of 0. Of the arm that relaxes
+    beside the spring ``of_arm`` softens with it, as where a material softens as a whole (Simo 1987), and the rest does
+    not.
     """
 
     name, family, stage, place = "mullins_softening", "softening", "wall", "wall"
@@ -42,10 +45,13 @@ class MullinsSoftening(Effect):
                         absent=0.0, natural="lower"),
         EffectParameter("power", "1", "of the distance to M^2: 1 by energy, 0.5 by its root", None, 0.5, 1.0, 0.75,
                         absent=1.0, natural="both"),
+        EffectParameter("of_arm", "1", "share of the relaxing arm that softens with the spring", None, 0.0, 1.0, 0.5,
+                        absent=0.0, natural="both"),
     )  # fmt: skip
     shapes = tuple(
-        {"width": width, "at_once": at_once, "widening": 0.0, "power": 1.0}
+        {"width": width, "at_once": at_once, "widening": 0.0, "power": 1.0, "of_arm": of_arm}
         for width, at_once in ((0.1, 0.0), (0.5, 0.0), (0.5, 1.0))
+        for of_arm in (0.0, 1.0)
     )
     exposed_by = by("peaks", "repeats")
     separated_by = {
@@ -62,15 +68,16 @@ class MullinsSoftening(Effect):
         if values[0] == 0.0:
             return signal.copy()
         before, out = float(conditions.before.get("largest_load", 0.0)), np.empty(signal.size)
-        arm = arm_beside(conditions)
-        given = *_amounts(values, arm[0]), before, dead_zone(conditions), *arm
+        share, decay, now, earlier = arm_beside(conditions)
+        share *= 1.0 - float(values[5])
+        given = *_amounts(values, share), before, dead_zone(conditions), share, decay, now, earlier
         softened(np.ascontiguousarray(signal), *given, out)
         return out
 
     def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
-        spring = _undone(*_amounts(values, chain.arm.share), dead_zone=chain.dead_zone)
-        return BesideArm(spring, chain.arm, step_s)
+        beside = replace(chain.arm, share=chain.arm.share * (1.0 - float(values[5])))
+        return BesideArm(_undone(*_amounts(values, beside.share), dead_zone=chain.dead_zone), beside, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
@@ -130,7 +137,7 @@ def _amounts(values: Array, share: float = 0.0) -> tuple[float, float, float, fl
     """
     from smartshoe.kernels.memory import EASED, softness
 
-    gained, width, at_once, widening, power = (float(value) for value in values)
+    gained, width, at_once, widening, power = (float(value) for value in values[:5])
     below = (1.0 - at_once) * gained
     lost = below / (1.0 + below) / softness(0.75 / (width + widening), power, EASED**power)[0]
     raised = min(at_once * gained / math.tanh(0.75 / width), most_beside(share))
