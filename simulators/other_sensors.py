@@ -306,6 +306,12 @@ def _beside_another(history: LoadHistory) -> Array:
     return 0.05 * history.load_n + 0.006 * history.late(history.load_n, 2.0) + 0.004 * other_n + history.noise(0.004)
 
 
+def _broken_in(history: LoadHistory) -> Array:
+    below_n = np.maximum.accumulate(history.load_n) - history.load_n
+    softened_n = history.load_n * (1.1 - 0.1 * np.exp(-below_n / 6.0))
+    return 0.05 * softened_n + 0.004 * history.late(softened_n, 3.0) + history.noise(0.0002)
+
+
 CURVE = "static_curve"
 OTHER_SENSORS = {
     "polymer_film": OtherSensor(_film, presses(90, 100, 40), "pressure_v", 0.02, {CURVE}, {"relaxation"}),
@@ -329,6 +335,8 @@ OTHER_SENSORS = {
     ),
     "sticky": OtherSensor(_sticky, presses(90, 50, 20), "pressure_v", 0.01, {"asymmetry"}),
     "curing": OtherSensor(_curing, presses(300, 50, 20), "pressure_v", 0.01, {"gain_drift"}, {"softening"}),
+    # All of it softens, what relaxes too.
+    "broken_in": OtherSensor(_broken_in, presses(120, 50, 20), "pressure_v", 0.01, {"softening"}),
     "with_play": OtherSensor(_with_play, presses(90, 50, 20), "pressure_v", 0.01, {"hysteresis"}, {"timing"}),
     "slow": OtherSensor(_slow, presses(90, 100, 40), "pressure_v", 0.02, {"timing"}),
     "leaking": OtherSensor(
