@@ -53,15 +53,15 @@ def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
     covariance = slope @ fit.covariance @ slope.T
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     spread = _spread_of_output(fit)
-    _require_determined(where, fit, values, sd, spread)
-    intervals = [(value - quantile * d, value + quantile * d) for value, d in zip(values, sd, strict=True)]
+    cost = fit.cost if fit.estimator == "output_error" else _plain_cost(fit)
+    _require_determined(where, fit, values, sd, cost / spread if spread > 0 else 0.0)
+    intervals = np.stack([values - quantile * sd, values + quantile * sd], axis=1)
     if sd[0] > CURVED * values[0] and fit.evaluation is not None:
-        intervals = [
-            profile_interval(problem, theta, fit.evaluation, fit.variance, quantile, _function(fit, choice, index))
-            if sd[index] > 0
-            else interval
-            for index, interval in enumerate(intervals)
-        ]
+        for place in np.flatnonzero(sd > 0):
+            function = _function(fit, choice, int(place))
+            intervals[place] = profile_interval(problem, theta, fit.evaluation, fit.variance, quantile, function)
+        if np.isinf(intervals[0]).all():
+            raise _open_relaxation(where, values[0])
         notes.append("the pole is poorly determined: its intervals are those of the likelihood profile")
     unit_text = f"N/{choice.reading_unit.symbol}"
     units = ("1/s", unit_text, f"N/({choice.reading_unit.symbol} s)", "1", "1", "s")
@@ -81,11 +81,16 @@ def conclude(fit: ParameterFit, choice: Choice, where: str) -> Identification:
         delay_sd = float(np.sqrt(max(fit.covariance[problem.delay_at, problem.delay_at], 0.0)))
         if abs(delay_s) > 0.98 * LARGEST_DELAY_S:
             notes.append(f"the delay ran to its limit of {LARGEST_DELAY_S:g} s: check that the logs start together")
-    if values[4] < 0:
-        notes.append("k2 is negative: the reading leads the load, which no standard linear solid does")
+    if values[2] * scale < 0:
+        notes.append(
+            "the reading falls as the load rises: a1, b0 and b1 hold as they are, k1 and k2 are springs only where the"
+            " reading or the load is turned"
+        )
+    if values[4] * values[2] * scale < 0:  # of a reading that falls with the load the spring and the gain are negative
+        which = "negative" if values[4] < 0 else "positive beside a negative gain"
+        notes.append(f"k2 is {which}: the reading leads the load, which no standard linear solid does")
     used = [experiment for experiment in experiments if experiment.mask.any()]
     loads = [masked(experiment.load_n, experiment.mask) for experiment in used]
-    cost = fit.cost if fit.estimator == "output_error" else _plain_cost(fit)
     return Identification(
         unit=choice.unit,
         direction=settings.direction,
@@ -218,17 +223,24 @@ def _plain_cost(fit: ParameterFit) -> float:
     return sum(float(error @ error) for error in errors)
 
 
-def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array, spread: float) -> None:
-    """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself."""
+def _require_determined(where: str, fit: ParameterFit, values: Array, sd: Array, left: float) -> None:
+    """Refuse what the data leave open: a gain or a pole whose error bar is as large as itself, a fit that does nothing.
+
+    ``left``: of the output's variance the model's error, from 1 on no better than a mean, whatever the fit minimised.
+    """
     gain_sd = float(np.sqrt(max(fit.covariance[fit.problem.shape_size - 1, fit.problem.shape_size - 1], 0.0)))
     loose = gain_sd > WORST_RELATIVE_GAIN_SD * abs(fit.theta[fit.problem.shape_size - 1])
-    if values[2] == 0.0 or (fit.cost > 0.5 * spread and (fit.degenerate or loose)):
+    if values[2] == 0.0 or left >= 1.0 or (left > 0.5 and (fit.degenerate or loose)):
         raise NotIdentifiableError(
             f"{where}: the reading does not follow the load, so that no gain can be found: record a load that rises and"
             " falls well above the noise"
         )
     if fit.degenerate or not np.isfinite(sd).all() or sd[0] > WORST_RELATIVE_SD * values[0]:
-        raise NotIdentifiableError(
-            f"{where}: the relaxation (a1 = {values[0]:.3g} 1/s) cannot be determined from these data:"
-            " record more triangles, at several rates, with rests between"
-        )
+        raise _open_relaxation(where, values[0])
+
+
+def _open_relaxation(where: str, a1: float) -> NotIdentifiableError:
+    return NotIdentifiableError(
+        f"{where}: the relaxation (a1 = {a1:.3g} 1/s) cannot be determined from these data:"
+        " record more triangles, at several rates, with rests between"
+    )

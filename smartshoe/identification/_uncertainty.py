@@ -46,7 +46,8 @@ def profile_interval(
 
     The likelihood-profile interval (Venzon and Moolgavkar 1988, Applied Statistics 37, 87-94), found by the largest
     step that the local quadratic allows, renewed until it stands on the region's border. Infinite where the border is
-    not reached.
+    not reached. Where the search went beyond it and did not settle on it, as about a delay, whose cost is no smooth
+    function between samples, the furthest that it went, so that the interval is rather too wide.
     """
     ends = [
         _profile_end(problem, theta, seen, seen.cost + quantile**2 * variance, function, sign) for sign in (-1.0, 1.0)
@@ -58,7 +59,7 @@ def _profile_end(
     problem: PredictionError, theta: Array, seen: Evaluation, ceiling: float, function: Function, sign: float
 ) -> float:
     at, now = theta, seen
-    allowed = ceiling - seen.cost
+    allowed, furthest_beyond = ceiling - seen.cost, -np.inf
     for _ in range(PROFILE_ITERATIONS):
         value, gradient = function(at)
         centre = solve_normal(now.normal, now.gradient)
@@ -75,8 +76,10 @@ def _profile_end(
             return sign * np.inf
         moved = abs(function(following)[0] - value)
         at, now = following, seen_there
+        if now.cost > ceiling:
+            furthest_beyond = max(furthest_beyond, sign * function(at)[0])
         if moved <= 1e-6 * abs(value) or (
             moved <= 1e-3 * abs(function(at)[0] - function(theta)[0]) and abs(now.cost - ceiling) < 0.01 * allowed
         ):
             return function(at)[0]
-    return sign * np.inf
+    return sign * (furthest_beyond if furthest_beyond >= sign * function(at)[0] else np.inf)

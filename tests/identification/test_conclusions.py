@@ -194,6 +194,13 @@ def test_a_reading_that_leads_is_told(pair: list[Experiment], p1: float, is_told
     assert ("k2 is negative" in _notes(pair, theta=_with(1, p1))) is is_told
 
 
+def test_springs_of_a_reading_that_falls_are_told_to_be_none(pair: list[Experiment]) -> None:
+    """The gain's sign is no lead: turned as a whole, the reading lags as it did."""
+    upright, turned = _notes(pair), _notes(pair, theta=np.array([np.log(0.25), -1.6, -1.5, 0.1, 12.0, -3.0, 0.7, -0.4]))
+    assert ("falls as the load rises" in upright, "falls as the load rises" in turned) == (False, True)
+    assert "leads" not in upright + turned
+
+
 def test_remarks_of_the_fit_are_handed_on_and_empty_ones_are_not(pair: list[Experiment]) -> None:
     assert concluded(fitted(pair, notes=("", "said before"))).remarks == ("said before",)
 
@@ -268,6 +275,8 @@ def test_a_pole_below_nothing_is_no_stable_model_and_a_gain_below_nothing_is_one
         (0.501, True, 0.1, 0.01, "does not follow"),
         (0.6, False, 0.4, 0.01, ""),
         (0.6, False, 0.401, 0.01, "does not follow"),
+        (0.999, False, 0.1, 0.01, ""),
+        (1.0, False, 0.1, 0.01, "does not follow"),
         (0.4, False, 0.1, 0.25, ""),
         (0.4, False, 0.1, 0.251, "relaxation"),
     ],
@@ -277,27 +286,26 @@ def test_what_is_left_open_is_refused_beyond_its_bound(
 ) -> None:
     covariance = np.diag([pole_sd, 5.0, gain_sd, 7.0]) ** 2
     fit = SimpleNamespace(
-        problem=SimpleNamespace(shape_size=3), theta=np.array([-1.6, 30.0, -2.0, 40.0]), cost=8.0 * left,
+        problem=SimpleNamespace(shape_size=3), theta=np.array([-1.6, 30.0, -2.0, 40.0]),
         degenerate=degenerate, covariance=covariance,
     )  # fmt: skip
     values, sd = np.array([0.25, 3.0, 1.0, 0.0]), np.array([pole_sd, 0.5, 0.1, 9.0])
     if says:
         with pytest.raises(NotIdentifiableError, match=says):
-            _require_determined("here", fit, values, sd, 8.0)  # type: ignore[arg-type]
+            _require_determined("here", fit, values, sd, left)  # type: ignore[arg-type]
     else:
-        _require_determined("here", fit, values, sd, 8.0)  # type: ignore[arg-type]
+        _require_determined("here", fit, values, sd, left)  # type: ignore[arg-type]
 
 
 def test_a_fit_without_a_static_gain_follows_no_load(pair: list[Experiment]) -> None:
     fit = SimpleNamespace(
         problem=SimpleNamespace(shape_size=3),
         theta=np.zeros(3),
-        cost=0.0,
         degenerate=False,
         covariance=np.zeros((3, 3)),
     )
     with pytest.raises(NotIdentifiableError, match="does not follow"):
-        _require_determined("here", fit, np.array([0.2, 3.0, 0.0]), np.zeros(3), 8.0)  # type: ignore[arg-type]
+        _require_determined("here", fit, np.array([0.2, 3.0, 0.0]), np.zeros(3), 0.0)  # type: ignore[arg-type]
 
 
 def test_what_conclude_finds_left_open_it_refuses(pair: list[Experiment]) -> None:

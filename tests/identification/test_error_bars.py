@@ -93,12 +93,12 @@ def test_what_the_data_leave_open_is_refused_by_its_name(
     left: float, degenerate: bool, gain_sd: float, pole_sd: float, says: str
 ) -> None:
     fit = SimpleNamespace(
-        problem=SimpleNamespace(shape_size=3), theta=np.array([-1.6, 0.2, 1.0]), cost=10.0 * left,
+        problem=SimpleNamespace(shape_size=3), theta=np.array([-1.6, 0.2, 1.0]),
         degenerate=degenerate, covariance=np.diag([pole_sd, 0.1, gain_sd]) ** 2,
     )  # fmt: skip
     values, sd = np.array([0.2, 5.0, 1.0]), np.array([pole_sd, 0.5, 0.1])  # a fast gain is as sure as its own size
     with pytest.raises(NotIdentifiableError, match=says) if says else nullcontext():
-        _require_determined("here", fit, values, sd, 10.0)  # type: ignore[arg-type]
+        _require_determined("here", fit, values, sd, left)  # type: ignore[arg-type]
 
 
 def _told(found) -> dict[str, Parameter]:  # type: ignore[no-untyped-def]

@@ -228,3 +228,25 @@ def test_the_quantile_is_exact_to_a_thousand_degrees_and_an_expansion_beyond() -
     for degrees in (1001, 1500, 10_000, 10**6):
         # The next term of the expansion: (5 z^5 + 16 z^3 + 3 z)/(96 degrees^2).
         assert t_quantile(degrees) == pytest.approx(float(stdtrit(degrees, 0.975)), abs=2.9 / degrees**2)
+
+
+def test_a_border_that_was_crossed_and_not_settled_on_lies_no_further_out_than_the_search_went() -> None:
+    """A cost that is rough about the border sends the search to and fro across it."""
+
+    class _Rough:
+        lower, upper = np.full(2, -9.0), np.full(2, 9.0)
+
+        def __init__(self) -> None:
+            self.count = 0
+
+        def evaluate(self, theta: Array) -> Evaluation:
+            self.count += 1
+            inside = self.count % 2 == 0
+            off = (0.5 if inside else 2.0) * ALLOWED
+            return Evaluation(LEAST_COST + off, theta * (1.0 if inside else 40.0), 20.0 * np.eye(2), 100)
+
+    first = Evaluation(LEAST_COST, np.zeros(2), 20.0 * np.eye(2), 100)
+    ends = profile_interval(_Rough(), np.zeros(2), first, VARIANCE, QUANTILE, _first)  # type: ignore[arg-type]
+    assert np.isfinite(ends).all()
+    assert ends[0] < START - 0.2
+    assert ends[1] > START + 0.2
