@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.signals.noise import NORMAL_95
 
 
 def rmse(error: Array) -> float:
@@ -55,14 +56,22 @@ def delay_s(load_n: Array, estimate_n: Array, sample_time_s: float) -> float | N
     """Time by which the estimate trails the load: least squares of the estimate on load, slope of the load and one.
 
     The first-order expansion of a shift, good while the delay is short beside the ramps; gain and offset have terms
-    of their own, so that they do not pass for a delay. None where the load does not move.
+    of their own, so that they do not pass for a delay. None where the load does not move, where the estimate does not
+    follow it (its gain on the load holds 0 within 95 %), and where the delay would be longer than the record.
     """
     slope = np.gradient(load_n, sample_time_s)
     design = np.column_stack([load_n, slope, np.ones_like(load_n)])
     scale = np.abs(design).max(axis=0)
     if scale[1] == 0.0 or scale[0] == 0.0:
         return None
-    (gain, lag, _), _, rank, _ = np.linalg.lstsq(design / scale, estimate_n, rcond=None)
-    if rank < 3 or gain == 0.0:
+    columns = design / scale
+    found, _, rank, _ = np.linalg.lstsq(columns, estimate_n, rcond=None)
+    if rank < 3 or load_n.size <= 3:
         return None
-    return float(-(lag / scale[1]) / (gain / scale[0]))
+    error = estimate_n - columns @ found
+    variance = float(error @ error) / (load_n.size - 3)
+    gain_sd = float(np.sqrt(variance * np.linalg.inv(columns.T @ columns)[0, 0]))
+    if abs(found[0]) <= NORMAL_95 * gain_sd:
+        return None
+    delay = float(-(found[1] / scale[1]) / (found[0] / scale[0]))
+    return delay if abs(delay) < load_n.size * sample_time_s else None

@@ -157,6 +157,11 @@ def validate(
     valid = [recording.sensor.present & recording.load.present for recording in given]
     if not any(mask.any() for mask in valid):
         raise InputError(f"{given[0].label}: load and reading are never there together")
+    if all(np.ptp(r[m]) == 0.0 for r, m in zip(readings, valid, strict=True) if m.any()):
+        raise InputError(
+            f"{given[0].label}: the reading never moves, so that nothing can be judged by it: check that the unit is"
+            " connected and that this is its column"
+        )
     gain, offset_n = metrics.best_static(
         np.concatenate([r[m] for r, m in zip(readings, valid, strict=True)]),
         np.concatenate([f[m] for f, m in zip(loads, valid, strict=True)]),

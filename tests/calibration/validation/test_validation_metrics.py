@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from smartshoe.calibration import Calibration
 from smartshoe.calibration.validation import _metrics as metrics
 from smartshoe.calibration.validation import validate
+from smartshoe.errors import InputError
 from smartshoe.recording import Recording
 from smartshoe.signals import loading
 from smartshoe.units import MILLIBAR
@@ -52,6 +53,26 @@ def test_the_static_line_may_have_an_offset() -> None:
     assert found.static_offset_n == pytest.approx(-60.0)
     assert found.overall.rmse_static_n == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(found.traces[0].static_n, load_n, rtol=0, atol=1e-9)
+
+
+def test_a_reading_that_never_moves_is_refused_as_no_usable_data() -> None:
+    time_s = np.arange(0.0, 12.0, 0.01)
+    load_n = np.interp(time_s, [2.0, 6.0, 10.0], [0.0, 800.0, 0.0])
+    recording = Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=np.full(time_s.size, 12.5))
+    with pytest.raises(InputError, match="never moves"):
+        validate(recording, Calibration(0.2, 2.1, 0.4, reading_unit=MILLIBAR))
+
+
+@pytest.mark.parametrize("delay_s", [-0.02, 0.0, 0.03])
+def test_a_delay_is_told_where_the_estimate_follows_the_load_and_not_of_noise(delay_s: float) -> None:
+    time_s = np.arange(0.0, 12.0, 0.01)
+    noise = np.random.default_rng(3).standard_normal((40, time_s.size))
+    load_n = 400.0 - 400.0 * np.cos(2.0 * np.pi * time_s / 4.0)
+    late_n = 400.0 - 400.0 * np.cos(2.0 * np.pi * (time_s - delay_s) / 4.0)
+    assert metrics.delay_s(load_n, 0.7 * late_n + noise[0], 0.01) == pytest.approx(delay_s, abs=2e-3)
+    told = [metrics.delay_s(load_n, one, 0.01) for one in noise]
+    assert sum(one is not None for one in told) <= 8  # 5 % of 40, and three sd more
+    assert all(abs(one) < 12.0 for one in told if one is not None)
 
 
 @pytest.mark.parametrize(("height", "counts"), [(0.2, False), (0.4, True), (0.55, True)])
