@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
@@ -19,6 +20,29 @@ if TYPE_CHECKING:
 figures_option = click.option(
     "--figures", type=click.Choice(["svg", "pdf", "png"]), help="Write figures for papers as well, below DIR/figures."
 )
+
+
+def require_writable(*files: str | None, folder: str | None = None) -> None:
+    """Refuse with `UsageError`, before anything is computed, what could not be written at the end.
+
+    ``files`` are to be written (None: not asked for, ``-``: stdout), some of them perhaps in ``folder``, which is made
+    where it is missing.
+    """
+    from smartshoe.errors import UsageError
+
+    made = None if folder is None else Path(folder).absolute()
+    if made is not None:
+        there = next(place for place in (made, *made.parents) if place.exists())
+        if not there.is_dir():
+            raise UsageError(f"{folder} cannot be made a folder, {there} is a file: choose another --out")
+    for path in files:
+        if path is None or path == "-":
+            continue
+        parent = Path(path).absolute().parent
+        if not parent.is_dir() and (made is None or parent not in (made, *made.parents)):
+            raise UsageError(f"{path} cannot be written, there is no folder {parent}: choose one that exists")
+        if Path(path).is_dir():
+            raise UsageError(f"{path} is a directory: give the name of a file to write")
 
 
 def emit_json(result: dict[str, Any], path: str | None) -> bool:

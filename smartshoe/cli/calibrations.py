@@ -49,7 +49,11 @@ def _today() -> str:
     return datetime.datetime.now(datetime.UTC).date().isoformat()
 
 
-@click.group("calibrations")
+@click.group(
+    "calibrations",
+    epilog="Example: smartshoe calibrations add left_toe.json --serial-number S0123, then smartshoe calibrations list."
+    " Each of them has --help with an example of its own.",
+)
 def command() -> None:
     """Every unit's calibrations over its life: list, show, compare, drift; add, swap, repair, retire.
 
@@ -114,10 +118,11 @@ def show_command(
 ) -> None:
     """One calibration: its parameters, its file, whether it holds."""
     from smartshoe.calibration.store.quantities import quantities
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.report.numbers import with_sd
     from smartshoe.report.tables import new_console, table_of
 
+    require_writable(out_path, json_path)
     store = _opened(store_folder)
     name, says, found = _one(store, calibration, date, refuse_expired)
     _show_faults(store)
@@ -177,8 +182,9 @@ def drift_command(
 ) -> None:
     """How a unit's parameters move over its life: trend, repairs, jumps."""
     from smartshoe.calibration.store.drift import drift
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
 
+    require_writable(json_path, folder=out_folder)
     store = _opened(store_folder)
     found = drift(store, _serial(store, unit, _today()))
     _show_faults(store)
@@ -215,9 +221,10 @@ def add_command(
 ) -> None:
     """Take calibrations (files that identify or diagnose wrote) into the store."""
     from smartshoe.calibration import Calibration
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.errors import UsageError
 
+    require_writable(json_path)
     if len(files) > 1 and (serial_number or position):
         raise UsageError(
             f"--serial-number and --position name one unit, {len(files)} files are given: add them one by one"

@@ -46,9 +46,10 @@ def command(
     Each FILE is a trial of one or two shoes; two FILES of one shoe each are weighed together. A rest of two seconds
     before the first step lets the zero be checked.
     """
-    from smartshoe.cli._output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress, require_writable
     from smartshoe.errors import RefusedError
 
+    require_writable(json_path)
     with progress(2) as step:
         step("reading")
         from smartshoe.calibration.folder import load_calibrations

@@ -25,8 +25,9 @@ def command(
     unit: str | None,
 ) -> None:
     """Force from the pressure in FILE, by a calibration."""
-    from smartshoe.cli._output import note, progress
+    from smartshoe.cli._output import note, progress, require_writable
 
+    require_writable(out_path)
     with progress(2 + (out_path is not None)) as step:
         step("reading")
         from smartshoe.calibration import Calibration, compensated

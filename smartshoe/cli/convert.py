@@ -26,10 +26,11 @@ def command(
     source: str, target: str, time: str | None, force: str | None, sensors: tuple[str, ...], unit: str | None
 ) -> None:
     """Convert SOURCE to TARGET; the target's ending says the format (.csv, .lvm, .tdms, .mat, .h5, .parquet)."""
-    from smartshoe.cli._output import progress
+    from smartshoe.cli._output import progress, require_writable
     from smartshoe.display import first_names
     from smartshoe.files.logs import write
 
+    require_writable(target)
     with progress(2) as step:
         step("reading")
         (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)

@@ -70,10 +70,11 @@ def command(
     **columns: Any,
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
-    from smartshoe.cli._output import emit_json, note, progress
+    from smartshoe.cli._output import emit_json, note, progress, require_writable
     from smartshoe.errors import NotIdentifiableError, SmartShoeError, UsageError
     from smartshoe.files.atomic import make_folder
 
+    require_writable(json_path, calibration_path, folder=out_folder)
     if design_path is not None:
         if files or held_out:
             raise UsageError("--design asks about protocols, before anything is measured: name no FILE beside it")

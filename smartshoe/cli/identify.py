@@ -86,9 +86,10 @@ def command(
     **choices: Any,
 ) -> None:
     """Identify one unit from one or more experiments (one FILE each)."""
-    from smartshoe.cli._output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress, require_writable
     from smartshoe.report.tables import print_identification
 
+    require_writable(json_path, calibration_path)
     options: dict[str, Any] = {
         "offset": "estimate" if offset is None else _number("--offset", offset),
         "delay": "estimate" if delay is None else _number("--delay", delay),

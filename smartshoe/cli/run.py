@@ -29,10 +29,11 @@ def command(
     figures: str | None,
 ) -> None:
     """Run SCENARIO: devices (simulated, replayed or logged), protocol, identification, validation."""
-    from smartshoe.cli._output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress, require_writable
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
+    require_writable(json_path, folder=out_folder)
     with progress() as step:
         step("reading the scenario")
         from smartshoe.kernels import warm_up

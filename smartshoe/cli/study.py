@@ -14,9 +14,10 @@ import click
 def command(study_file: str, out_folder: str, jobs: int | None, c3d: bool, json_path: str | None) -> None:
     """Analyse the trials of STUDY by subject and condition, and compare conditions within subjects."""
     from smartshoe.cli._counting import counting
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.runs.studies import study
 
+    require_writable(json_path, folder=out_folder)
     with counting("trials") as progress:
         result = study(study_file, out_folder, jobs=jobs, c3d=c3d, progress=progress)
     if emit_json(result.to_dict(), json_path):

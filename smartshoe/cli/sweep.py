@@ -31,9 +31,10 @@ def command(
 ) -> None:
     """Run SCENARIO for each case of its [sweep]: values of keys, and seeds. Each case is computed once."""
     from smartshoe.cli._counting import counting
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.runs.sweeps import sweep
 
+    require_writable(json_path, folder=out_folder)
     with counting("cases") as progress:
         result = sweep(scenario, out_folder, jobs=jobs, scheduler=scheduler, shard=shard, progress=progress)
     if emit_json(result.to_dict(), json_path):

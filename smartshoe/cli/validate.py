@@ -25,8 +25,9 @@ def command(
     unit: str | None,
 ) -> None:
     """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
-    from smartshoe.cli._output import emit_json, progress
+    from smartshoe.cli._output import emit_json, progress, require_writable
 
+    require_writable(json_path)
     with progress(2) as step:
         step("reading")
         from smartshoe.calibration import Calibration

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smartshoe.cli import run_command
+from smartshoe.cli import _COMMANDS, run_command
 from smartshoe.recording import Recording
 
 Table = Callable[..., Path]
@@ -131,6 +131,49 @@ def test_truncated_and_foreign_calibrations_are_refused(
     assert not (tmp_path / "o.csv").exists()
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "run s.toml --out new --json nowhere/x.json",
+        "identify t.csv --calibration c.json --json nowhere/x.json",
+        "identify t.csv --json x.json --calibration nowhere/c.json",
+        "compensate t.csv --calibration c.json --out nowhere/x.csv",
+        "validate t.csv --calibration c.json --json nowhere/x.json",
+        "diagnose t.csv --out new --json nowhere/x.json",
+        "diagnose t.csv --out new --calibration nowhere/c.json",
+        "diagnose t.csv --out here.txt/new",
+        "diagnose t.csv --json new/x.json",
+        "convert t.csv nowhere/x.csv",
+        "gait t.csv --out new --c3d nowhere/x.c3d",
+        "check t.csv --json nowhere/x.json",
+        "study s.toml --out new --json nowhere/x.json",
+        "sweep s.toml --out new --json nowhere/x.json",
+        "calibrate --shoe sim:stand --machine sim:instron --unit u --protocol static --out new --json nowhere/x.json",
+        "calibrations show c.json --out nowhere/x.json",
+        "calibrations drift u --out new --json nowhere/x.json",
+        "calibrations add c.json --json nowhere/x.json",
+    ],
+)
+def test_a_place_that_cannot_be_written_is_told_before_anything_is_read(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No input is there, so that whatever is told of is the output."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "here.txt").touch()
+    assert run_command(words.split()) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(r"nowhere|here\.txt|new/x\.json", said)
+    assert "choose" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["here.txt"]
+
+
+def test_a_result_may_lie_in_the_folder_that_is_made(table: Path, tmp_path: Path) -> None:
+    from smartshoe.cli._output import require_writable
+
+    require_writable(str(tmp_path / "new" / "x.json"), "-", None, folder=str(tmp_path / "new"))
+    require_writable("x.json", "/dev/null", folder=str(table.parent / "a" / "b"))
+
+
 def test_places_that_cannot_be_written_end_in_status_2(
     table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -198,7 +241,7 @@ def test_wrong_command_lines_end_in_status_2(words: list[str], capsys: pytest.Ca
     assert capsys.readouterr().err.startswith("error:")
 
 
-@pytest.mark.parametrize("command", ["run", "simulate", "identify", "compensate", "validate", "convert"])
+@pytest.mark.parametrize("command", _COMMANDS)
 def test_every_command_has_help_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command([command, "--help"]) == 0
     assert re.search(rf"Example: smartshoe {command}", capsys.readouterr().out)
