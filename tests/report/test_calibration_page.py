@@ -116,7 +116,7 @@ def test_the_keyboard_reads_and_zooms_and_the_numbers_stand_in_a_table(browser: 
     browser.run("document.querySelector('figure.chart .plot').focus()")
     browser.key("ArrowRight")
     browser.settle()
-    assert "100.0" in browser.run("document.querySelector('figure.chart .live').textContent")
+    assert " 100:" in browser.run("document.querySelector('figure.chart .live').textContent")
     browser.run("document.querySelector('figure.chart details.numbers').open = true")
     rows = "document.querySelector('figure.chart tbody')?.rows.length"
     browser.until(f"{rows} === {len(RATES)}")

@@ -29,11 +29,23 @@
     if (value === null || value === undefined) return "–";
     if (value === 0) return "0";
     const size = Math.abs(value);
-    if (size >= 1e6 || size < 1e-4) return value.toExponential(digits - 1);
+    if (size >= 1e6 || size < 1e-4) return value.toExponential(digits - 1).replaceAll("-", "−");
     return value.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(size)))).replace("-", "−");
   }
   const day = (seconds) => new Date(1000 * seconds).toISOString().slice(0, 10);
-  const shownX = (chart, value) => (value === null || value === undefined ? "–" : chart.dates ? day(value) : short(value));
+  // Of x as many digits as part neighbours: whole numbers have none behind the point, close times more than four in all.
+  function shownX(chart, value) {
+    if (value === null || value === undefined) return "–";
+    if (chart.dates) return day(value);
+    const x = chart.data.x;
+    if (chart.whole === undefined) {
+      chart.whole = x.every(Number.isInteger);
+      chart.places = x.length < 2 || chart.logX ? 0 : Math.min(4, Math.ceil(-0.01 - Math.log10((x[x.length - 1] - x[0]) / (chart.of - 1))));
+    }
+    if (chart.whole) return String(value).replace("-", "−");
+    const said = short(value), places = (said.split(".")[1] || "").length;
+    return places < chart.places ? value.toFixed(chart.places).replace("-", "−") : said;
+  }
 
   // What is seen of a panel, with bands and bars, so that nothing is cut off.
   function limits(lines, u) {
@@ -51,6 +63,13 @@
     if (low > high) return [0, 1];
     const margin = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1;
     return [low - (low === 0 ? 0 : margin), high + margin];
+  }
+
+  // Places of each run of true, so that nothing is drawn where there is nothing.
+  function runs(flags) {
+    const found = [];
+    flags.forEach((flag, k) => { if (flag) { if (!k || !flags[k - 1]) found.push([]); found[found.length - 1].push(k); } });
+    return found;
   }
 
   // Under the grid: shaded spans, bands about lines; over it: error bars.
@@ -81,11 +100,13 @@
         });
         ctx.stroke();
       } else {
-        ctx.globalAlpha = 0.22; ctx.beginPath();
-        const there = x.map((_, k) => k).filter((k) => low[k] !== null && high[k] !== null);
-        there.forEach((k, n) => ctx[n ? "lineTo" : "moveTo"](at(x[k], "x"), at(high[k], "y")));
-        there.reverse().forEach((k) => ctx.lineTo(at(x[k], "x"), at(low[k], "y")));
-        ctx.closePath(); ctx.fill();
+        ctx.globalAlpha = 0.22;
+        for (const there of runs(x.map((_, k) => low[k] !== null && high[k] !== null))) {
+          ctx.beginPath();
+          there.forEach((k, n) => ctx[n ? "lineTo" : "moveTo"](at(x[k], "x"), at(high[k], "y")));
+          there.reverse().forEach((k) => ctx.lineTo(at(x[k], "x"), at(low[k], "y")));
+          ctx.closePath(); ctx.fill();
+        }
       }
     });
     ctx.restore();
@@ -103,16 +124,24 @@
       made.size = 26; made.space = chart.dates ? 95 : 70;
       if (chart.dates) made.values = (u, splits) => splits.map(day);
       else if (chart.logX) {
-        if (chart.data.x.length <= 12) made.splits = () => chart.data.x;
-        made.filter = (u, splits) => splits.map((v) => (chart.data.x.length <= 12 || /^[125]/.test(v.toExponential()) ? v : null));
-        made.space = 34;
+        made.splits = (u) => (chart.data.x.length <= 12 ? chart.data.x : logTicks(u.scales.x.min, u.scales.x.max, u.bbox.width / devicePixelRatio));
+        made.filter = (u, splits) => splits;
       }
-      if (chart.logX) made.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(3))));
-    } else {
-      made.size = wide;
-      made.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(6)).replace("-", "−")));
-    }
+    } else made.size = wide;
+    if (!made.values) made.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(chart.logX && isX ? 3 : 6)).replace("-", "−")));
     return made;
+  }
+
+  // Round numbers on a logarithmic axis: as many as keep their labels apart, and two at least.
+  function logTicks(low, high, width) {
+    const decades = [];
+    for (let k = Math.floor(Math.log10(low)); k <= Math.ceil(Math.log10(high)); k++) decades.push(k);
+    const tenths = Array.from({ length: 90 }, (_, k) => 1 + k / 10);
+    const steps = [[1], [1, 3], [1, 2, 5], [1, 2, 3, 5, 7], [1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9], tenths].map((each) =>
+      decades.flatMap((k) => each.map((v) => +(v * 10 ** k).toPrecision(3))).filter((v) => v >= low && v <= high));
+    const apart = (ticks) => Math.min(...ticks.slice(1).map((v, k) => (Math.log(v / ticks[k]) / Math.log(high / low)) * width));
+    const fitting = steps.filter((ticks) => ticks.length > 1 && apart(ticks) >= 46);
+    return fitting.length ? fitting[fitting.length - 1] : [+low.toPrecision(2), +high.toPrecision(2)].filter((v) => v >= low && v <= high);
   }
 
   function series(line) {
@@ -178,6 +207,7 @@
           axis(chart, panel.label, false),
         ],
         series: [{ label: chart.xLabel, value: (u, v) => shownX(chart, v) }, ...panel.lines.map(series)],
+        legend: { markers: { dash: (u, k) => (u.series[k].dash ? "dashed" : "solid") } },
         cursor: { sync: { key: group, scales: ["x", null] }, drag: { x: true, y: false, dist: 6 }, points: { size: 7 } },
         hooks: { drawAxes: [(u) => under(chart, panel, data.panels[p], u)], setScale: [(u, k) => k === "x" && follow(u)] },
       }, [data.x, ...data.panels[p].map((line) => line.y)], plot);
@@ -225,6 +255,14 @@
     event.preventDefault();
   }
 
+  // A column's heading: the line's name with the unit, and which panel it is of where there are several.
+  function headOf(chart, panel, line) {
+    if (panel.label.startsWith(line.label + " (")) return panel.label;
+    if (chart.panels.length > 1) return line.label + ", " + panel.label;
+    const unit = panel.label.match(/ \([^()]*\)$/);
+    return line.label + (unit && !line.label.endsWith(")") ? unit[0] : "");
+  }
+
   function fillNumbers(figure) {
     const details = figure.querySelector("details.numbers");
     if (!details.open) return;
@@ -235,7 +273,7 @@
     const table = document.createElement("table"), head = table.createTHead().insertRow();
     const columns = [];
     chart.panels.forEach((panel, p) => panel.lines.forEach((line, i) => {
-      columns.push([line.label + (chart.panels.length > 1 ? ", " + panel.label : ""), data.panels[p][i].y]);
+      columns.push([headOf(chart, panel, line), data.panels[p][i].y]);
       const whose = chart.panels.length > 1 || panel.lines.some((other) => other !== line && other.low) ? line.label + ", " : "";
       for (const name of ["low", "high"]) if (data.panels[p][i][name]) columns.push([whose + name, data.panels[p][i][name]]);
     }));
