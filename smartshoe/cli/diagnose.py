@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
     from smartshoe.recording import Recording
 
+NOT_FITTED = "every third load cycle, or part of the time where there are few cycles, not fitted"
+USUAL_NOISE_PERCENT = 0.1  # of a design, where no unit states its own
 # Steps that usually follow one, without the report. The fits between the first two go on until one adds nothing.
 _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing alternatives": 1}
 
@@ -31,7 +33,8 @@ _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing a
     "held_out",
     multiple=True,
     metavar="FILE",
-    help="An experiment to judge on and never to fit (repeatable); without it every third load cycle.",
+    help="An experiment to judge on and never to fit (repeatable); without it every third load cycle, or part of the"
+    " time where there are few cycles.",
 )
 @click.option(
     "--material",
@@ -39,7 +42,9 @@ _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing a
     default=0.02,
     show_default=True,
     metavar="PERCENT",
-    help="Of full scale: what is smaller does not count.",
+    help="Smallest error of the reading that counts, of full scale: an effect that moves it less is not named, and what"
+    " is left below it is not held against the simulation. More than usual changes nothing of what is found; less than"
+    " usual expects as much less of what imperfections of a good unit add up to (0.15 % by itself).",
 )
 @click.option(
     "--design",
@@ -173,13 +178,12 @@ def _design(path: str, json_path: str | None) -> None:
     protocols = tuple(protocols_of(scenario, source).values())
     if not protocols:
         raise source.error(("protocol",), "there is none, and a design asks about protocols: add a [protocol.dynamic]")
-    noise = noise_of(scenario, source)
-    if noise is None:
-        found = design(protocols)
-    else:
-        unit, percent = noise
-        found = design(protocols, noise_percent=percent)
-        note(f"noise of {percent:g} % of full scale, the largest that a unit of the scenario states ({unit})")
+    unit, percent = noise_of(scenario, source) or (None, USUAL_NOISE_PERCENT)
+    said_by = "since no unit of the scenario states any"
+    if unit is not None:
+        said_by = f"the largest that a unit of the scenario states ({unit})"
+    found = design(protocols, noise_percent=percent)
+    note(f"noise of {percent:g} % of full scale, {said_by}")
     if not emit_json(found.to_dict(), json_path):
         print_design(found)
 
@@ -216,7 +220,7 @@ def _facts(recordings: list[Recording], others: list[Recording], *, is_refused: 
     if is_refused:
         return {"given": ", ".join(one.name for one in (*recordings, *others)), "smartshoe": __version__}
     facts = {"fitted": ", ".join(recording.name for recording in recordings)}
-    facts["judged on"] = ", ".join(recording.name for recording in others) or "every third load cycle, not fitted"
+    facts["judged on"] = ", ".join(recording.name for recording in others) or NOT_FITTED
     return {**facts, "smartshoe": __version__}
 
 

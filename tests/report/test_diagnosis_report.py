@@ -602,7 +602,43 @@ def test_a_gain_that_is_none_is_not_called_one() -> None:
 def test_a_parameter_at_the_end_of_its_range_is_told_as_such() -> None:
     assert parameter_text(Parameter(50.0, 20.0, (0.5, 50.0), "s")) == "50 [0.5, 50] s, at its limit"
     assert parameter_text(Parameter(0.5, 20.0, (0.5, 50.0), "1")) == "0.5 [0.5, 50], at its limit"
-    assert parameter_text(Parameter(20.0, 20.0, (0.5, 50.0), "s")) == "20 [0.5, 50] s"
+    assert parameter_text(Parameter(20.0, 8.0, (4.3, 35.7), "s")) == "20 [4, 36] s"
+
+
+@pytest.mark.parametrize(("value", "sd"), [(20.0, 20.0), (50.0, 40.0), (0.5, math.inf)])
+def test_a_parameter_that_may_be_anything_within_its_range_is_told_as_no_result(value: float, sd: float) -> None:
+    assert parameter_text(Parameter(value, sd, (0.5, 50.0), "s")) == "not determined"
+
+
+def test_structure_that_no_test_could_have_shown_is_not_called_none() -> None:
+    found = case("unexplained")
+    assert found.baseline is not None
+    assert found.extended is not None
+    untested = replace(
+        found,
+        baseline=replace(found.baseline, structure_rms=math.nan),
+        extended=replace(found.extended, structure_rms=math.nan),
+    )
+    row = comparison(untested)[-1]
+    assert (row.before, row.after, row.change) == ("cannot be told", "cannot be told", "–")
+
+
+def test_limits_come_before_recordings_that_were_left_out_and_none_is_cut_off(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    left_out = tuple(f"left out: r{k}.csv: the load stands still" for k in range(90))
+    limits = tuple(f"limit number {k} of the data" for k in range(20))
+    print_diagnosis(replace(case("unexplained"), limits=(*left_out, *limits)))
+    said = capsys.readouterr().out
+    assert all(limit in said for limit in limits)
+    assert said.index(limits[-1]) < said.index("r0.csv: the load stands still") < said.index("and 78 more")
+
+
+def test_the_terminal_tells_of_a_name_how_far_it_is_this_one(capsys: pytest.CaptureFixture[str]) -> None:
+    print_diagnosis(replace(case("one cause"), causes=(PLAY_CAUSE,)))
+    said = " ".join(capsys.readouterr().out.split())
+    assert "95 %" in said
+    assert "62 %" in said
 
 
 def test_words_for_numbers() -> None:

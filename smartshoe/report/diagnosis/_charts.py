@@ -76,7 +76,7 @@ def over_time(found: EvidenceView, unit: str) -> Chart:
 
 
 def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
-    """The load cycle on which the baseline is furthest off: the load, and what each simulation misses."""
+    """The load cycle, or part of the time, on which the baseline is furthest off: what each simulation misses."""
     segment = worst_cycle(traces)
     if segment is None:
         return None
@@ -86,12 +86,15 @@ def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
     if _differs(trace):
         lines.append(Line("after", np.where(usable, (trace.reading - trace.extended)[segment.span], np.nan), AFTER))
     held = "not fitted" if trace.held_out[segment.span].mean() > 0.5 else "fitted"
-    says = f"{file_name(trace.name)}, the cycle on which the simulation is furthest off ({held})."
+    says = (
+        f"{file_name(trace.name)}, the load cycle, or part of the time where there are few cycles, on which the"
+        f" simulation is furthest off ({held})."
+    )
     panels = [
         Panel("load (N)", [Line("load", trace.load_n[segment.span], "load")], height=90),
         Panel(f"measured − simulated ({unit})", lines, height=200),
     ]
-    return Chart("The worst cycle", says, "time (s)", trace.time_s[segment.span], panels)
+    return Chart("Where the error is largest", says, "time (s)", trace.time_s[segment.span], panels)
 
 
 def _differs(trace: Trace) -> bool:
@@ -168,7 +171,8 @@ def over_cycles(found: EvidenceView, unit: str) -> Chart | None:
         return None
     edges = np.asarray(np.arange(cycle.min(), cycle.max() + 2) + 0.5, dtype=np.float64)
     x, lines = _means(found, cycle.astype(np.float64) + 1.0, edges)
-    return Chart("The error over load cycles", "Mean and band of one sd; what comes and goes with use shows here.",
+    return Chart("The error over load cycles", "Mean and band of one sd; what comes and goes with use"
+                 " shows here. Where load cycles are few, they are parts of the time.",
                  "load cycle (number)", x, [Panel(f"measured − simulated ({unit})", lines)])  # fmt: skip
 
 

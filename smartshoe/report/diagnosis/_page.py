@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from smartshoe.diagnosis import Cause, Diagnosis, described
-from smartshoe.models.effects import effect
+from smartshoe.models.effects import effect, in_words
 from smartshoe.report.charts import Chart
 from smartshoe.report.diagnosis import _charts as charts
 from smartshoe.report.diagnosis import _sentences as sentences
@@ -59,7 +61,9 @@ def write_diagnosis_page(
         "parts": _parts(diagnosis),
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
         "minor": sentences.unnamed(diagnosis),
-        "bars": [(words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
+        "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
+        "named": in_words,
+        "is_changed": any(not np.array_equal(one.baseline, one.extended) for one in diagnosis.traces),
         "likeness": grids.likeness(diagnosis),
         "protocol_file": protocol_file,
         "next_load": charts.protocol(following.steps) if following and following.steps else None,
@@ -145,7 +149,7 @@ def _card(number: int, cause: Cause) -> Card:
     valued = cause.effect if cause.part is None else effect(cause.part)  # of a free form, its own parameters
     says = {parameter.name: parameter.says for one in (cause.effect, valued) for parameter in one.parameters}
     return Card(
-        f"{number}. {words(cause.name).capitalize()}",
+        f"{number}. {in_words(cause.name).capitalize()}",
         cause,
         sentences.how_sure(cause),
         sentences.gain_sentence(cause.held_out),

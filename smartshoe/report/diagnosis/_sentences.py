@@ -14,6 +14,7 @@ from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
 from smartshoe.report.wording import sentence, words
+from smartshoe.signals.noise import NORMAL_95
 
 HEADINGS = {
     "adequate": "The simulation is good enough",
@@ -23,12 +24,13 @@ HEADINGS = {
     "refused": "No diagnosis: this data does not allow one",
 }
 SUREST = 0.99
-NO_STRUCTURE = "none beyond noise"
+NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
+LEFT_OUT = "left out: "  # as limits of recordings that are of no use begin
 
 
 def listed(names: Sequence[str], last: str = "or") -> str:
     """Identifiers as "a, b or c"."""
-    said = [words(name) for name in names]
+    said = [in_words(name) for name in names]
     return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} {last} {said[-1]}" if said else ""
 
 
@@ -43,7 +45,12 @@ def how_sure(cause: Cause) -> str:
     """The confidence of a cause, and where others may be meant how far it is this one."""
     said = f"{sure(cause.confidence)} sure"
     meant = listed(("this", *cause.equivalents))
-    return f"{said} that it is {meant}, {sure(cause.law_confidence)} for this one" if cause.equivalents else said
+    return f"{said} that it is {meant}, {for_this_one(cause)}" if cause.equivalents else said
+
+
+def for_this_one(cause: Cause) -> str:
+    """How far, of a cause and what this data cannot tell from it, it is the one that is named."""
+    return f"{sure(cause.law_confidence)} for this one"
 
 
 def unnamed(diagnosis: Diagnosis) -> str:
@@ -89,10 +96,16 @@ def two_numbers(first: float, second: float) -> tuple[str, str]:
 
 
 def parameter_text(parameter: Parameter) -> str:
-    """Value, 95 % interval and unit; a parameter without an interval was held where it is."""
+    """Value, 95 % interval and unit; a parameter without an interval was held where it is.
+
+    One whose interval is cut off at both ends by its bounds is not determined: any value that it may have will do.
+    """
     low, high = parameter.ci95
     if low == high:
         return f"held at {plain(parameter.value)}{unit_of(parameter.unit)}"
+    within = (1.0 - 1e-9) * NORMAL_95 * parameter.sd
+    if low > parameter.value - within and high < parameter.value + within:
+        return "not determined"
     at_a_limit = ", at its limit" if parameter.value in (low, high) else ""
     return interval(parameter.value, low, high) + unit_of(parameter.unit) + at_a_limit
 
@@ -129,8 +142,9 @@ def how_much(diagnosis: Diagnosis) -> str | None:
         f" ({plain(share_of_full_scale(diagnosis, before.rmse), 2)} % of full scale, rms)"
     )
     if after.rmse < 0.98 * before.rmse:
+        what = "what was found" if diagnosis.causes else "effects that have no name"
         said += (
-            f"; with what was found it is off by {plain(after.rmse)} {after.unit}"
+            f"; with {what} it is off by {plain(after.rmse)} {after.unit}"
             f" ({plain(share_of_full_scale(diagnosis, after.rmse), 2)} %)"
         )
     return sentence(said)
@@ -175,11 +189,17 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
                 _change(before.force_rmse_n, after.force_rmse_n) if diagnosis.force_model is None else "",
             )
         )
+
+    def structure(standing: GoodnessOfFit) -> str:
+        if not math.isfinite(standing.structure_rms):
+            return NOT_TESTED
+        return of_scale(standing, standing.structure_rms) if standing.structure_rms > 0 else NO_STRUCTURE
+
     rows.append(
         Row(
             "structure beyond noise, over all recordings, fitted or not, rms (of full scale)",
-            of_scale(before, before.structure_rms) if before.structure_rms > 0 else NO_STRUCTURE,
-            of_scale(after, after.structure_rms) if after.structure_rms > 0 else NO_STRUCTURE,
+            structure(before),
+            structure(after),
             _change(before.structure_rms, after.structure_rms),
         )
     )
@@ -187,7 +207,7 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
 
 
 def _change(before: float, after: float) -> str:
-    if not before > 0:
+    if not before > 0 or not math.isfinite(after):
         return "–"
     percent = 100.0 * (after / before - 1.0)
     return "none" if abs(percent) < 0.5 else f"{percent:+.0f} %".replace("-", "−")
@@ -213,7 +233,7 @@ def neighbours(cause: Cause, names: Sequence[str]) -> list[Neighbour]:
         apart = sorted(SAYS[word] for word in told_apart_by(cause.effect, other)) if other else []
         found.append(
             Neighbour(
-                words(name),
+                in_words(name),
                 other.says if other else "",
                 f"{plain(rivals[name].margin, 2)} ({rivals[name].by})" if name in rivals else "–",
                 "; ".join(apart),
@@ -238,9 +258,9 @@ def why_this_one(cause: Cause) -> str:
         nearest = cause.rivals[0]
         by = f"(−2 log, by {'its ' if nearest.by == 'fit' else ''}{nearest.by})"
         if nearest.margin <= 0.0:
-            return f"{words(nearest.effect)} alone in its place is likelier by {plain(-nearest.margin, 2)} {by}"
+            return f"{in_words(nearest.effect)} alone in its place is likelier by {plain(-nearest.margin, 2)} {by}"
         return (
-            f"no other effect of the catalogue does as well; the nearest, {words(nearest.effect)}, is less likely by"
+            f"no other effect of the catalogue does as well; the nearest, {in_words(nearest.effect)}, is less likely by"
             f" {plain(nearest.margin, 2)} {by}"
         )
     return "no other effect of the catalogue comes near"

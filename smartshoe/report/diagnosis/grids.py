@@ -10,9 +10,9 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis import Diagnosis
+from smartshoe.models.effects import in_words
 from smartshoe.report.diagnosis.views import Map
 from smartshoe.report.numbers import plain
-from smartshoe.report.wording import words
 
 Kind = Literal["cause", "equivalent", "other"]
 
@@ -25,7 +25,7 @@ SAYS: dict[Kind, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """An effect, what it alone could take off the error (in -2 log likelihood), and that over the largest."""
+    """An effect, what it alone could take off the error (in −2 log likelihood), and that over the largest."""
 
     name: str
     fall: float
@@ -94,7 +94,7 @@ def likeness(diagnosis: Diagnosis) -> Grid | None:
     if found is None:
         return None
     names, part = found
-    labels = [words(name) for name in names]
+    labels = [in_words(name) for name in names]
     rows = [
         (
             label,

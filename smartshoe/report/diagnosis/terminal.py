@@ -10,10 +10,13 @@ from rich.table import Table
 
 from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.design import Design
+from smartshoe.models.effects import in_words
 from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
+    LEFT_OUT,
     comparison,
     fault_text,
+    for_this_one,
     gain_text,
     how_much,
     is_free_form,
@@ -56,7 +59,10 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
         console.print(table)
         _line(console, shares_text(diagnosis))
     _several(console, "faults of the data", [fault_text(fault) for fault in diagnosis.data_faults])
-    _several(console, "limits of this data", diagnosis.limits)
+    # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
+    left_out = [said for said in diagnosis.limits if said.startswith(LEFT_OUT)]
+    _several(console, "limits of this data", [said for said in diagnosis.limits if said not in left_out], most=None)
+    _several(console, "recordings that were left out", [said.removeprefix(LEFT_OUT) for said in left_out])
     if diagnosis.next_experiment is not None:
         _several(console, "what to do next", [diagnosis.next_experiment.says])
 
@@ -70,8 +76,13 @@ def print_design(design: Design) -> None:
     )
     for name, least in zip(design.names, design.least, strict=True):
         shows = f"{100 * least:.2g}" if math.isfinite(least) else "never"
-        table.add_row(words(name), shows, listed(design.cannot_be_told(name)) or "–")
+        table.add_row(in_words(name), shows, listed(design.cannot_be_told(name)) or "–")
     console.print(table)
+    _line(
+        console,
+        "one cannot be told from another that follows it in its place; where the other's row does not name it in turn,"
+        " it does not follow all that the other one does",
+    )
 
 
 def _causes(console: Console, diagnosis: Diagnosis) -> None:
@@ -85,11 +96,9 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
             shown = [("free form", "no equation fits well enough")]
         for k, (name, value) in enumerate(shown):
             of_cause = (
-                (gain_text(cause.held_out), sure(cause.confidence), listed(cause.equivalents) or "–")
-                if k == 0
-                else ("", "", "")
+                (gain_text(cause.held_out), _sure(cause), listed(cause.equivalents) or "–") if k == 0 else ("", "", "")
             )
-            table.add_row(words(cause.name) if k == 0 else "", name, value, *of_cause)
+            table.add_row(in_words(cause.name) if k == 0 else "", name, value, *of_cause)
     console.print()
     console.print(table)
     for cause in diagnosis.causes:
@@ -104,18 +113,23 @@ def _wrapping(title: str, columns: Sequence[str]) -> Table:
     return table
 
 
+def _sure(cause: Cause) -> str:
+    return sure(cause.confidence) + (f", {for_this_one(cause)}" if cause.equivalents else "")
+
+
 def _about(cause: Cause) -> str:
-    return f"{words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
+    return f"{in_words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
 
 
-def _several(console: Console, heading: str, lines: Sequence[str]) -> None:
+def _several(console: Console, heading: str, lines: Sequence[str], most: int | None = MOST_FAULTS) -> None:
     if not lines:
         return
     console.print(f"\n{heading}", style="bold")
-    for line in lines[:MOST_FAULTS]:
+    shown = lines[:most]
+    for line in shown:
         _line(console, f"- {line}")
-    if len(lines) > MOST_FAULTS:
-        _line(console, f"- and {len(lines) - MOST_FAULTS} more")
+    if len(lines) > len(shown):
+        _line(console, f"- and {len(lines) - len(shown)} more")
 
 
 def _line(console: Console, text: str) -> None:
