@@ -80,8 +80,8 @@ def print_design(design: Design) -> None:
     console.print(table)
     _line(
         console,
-        "one cannot be told from another that follows it in its place; where the other's row does not name it in turn,"
-        " it does not follow all that the other one does",
+        "the last column names what would follow an effect as well in its place; where the row of one that is named does"
+        " not name it back, it cannot follow all that the other does",
     )
 
 
