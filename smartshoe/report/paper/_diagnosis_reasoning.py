@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis import Diagnosis
+from smartshoe.models.effects import in_words
 from smartshoe.report.diagnosis.grids import ALIKE, compared, ranked
 from smartshoe.report.diagnosis.views import Map
 from smartshoe.report.paper.drawing import STYLE, figure_of
-from smartshoe.report.wording import words
 
 CAUSE, EQUIVALENT, OTHER = "#0072B2", "#56B4E9", "#cbd5e1"
 
@@ -34,7 +34,7 @@ def screening(diagnosis: Diagnosis) -> Figure | None:
                 axis.barh(place[shown], falls[shown] / falls[0] * 100.0, color=colour, label=label, height=0.72)
         for k, fall in enumerate(falls):
             axis.text(fall / falls[0] * 100.0 + 1.5, k, f"{fall:,.0f}", va="center", fontsize=8)
-        axis.set_yticks(place, [words(name) for name in names])
+        axis.set_yticks(place, [in_words(name) for name in names])
         axis.invert_yaxis()
         axis.set_xlim(0, 122)
         axis.grid(axis="y", visible=False)
@@ -61,7 +61,7 @@ def likeness(diagnosis: Diagnosis) -> Figure | None:
                     j, i, f"{part[i, j]:.2f}", ha="center", va="center", fontsize=7,
                     color="white" if part[i, j] > 0.6 else "#374151", fontweight="bold" if part[i, j] > ALIKE else None,
                 )  # fmt: skip
-        labels = [words(name) for name in chosen]
+        labels = [in_words(name) for name in chosen]
         axis.set_xticks(range(len(chosen)), labels, rotation=40, ha="right")
         axis.set_yticks(range(len(chosen)), labels)
         figure.subplots_adjust(left=0.31, right=0.98, top=0.98, bottom=1.4 / height)
