@@ -80,8 +80,8 @@ def print_design(design: Design) -> None:
     console.print(table)
     _line(
         console,
-        "the last column names what would follow an effect as well in its place; where the row of one that is named does"
-        " not name it back, it cannot follow all that the other does",
+        "the last column names what would follow an effect as well in its place; where the row of one that is named"
+        " does not name it back, it cannot follow all that the other does",
     )
 
 
