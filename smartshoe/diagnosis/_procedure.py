@@ -202,8 +202,9 @@ def _diagnosed(
     if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         follows = all(name.is_sure and not name.kind_only for name in named.names)
         # What is followed is there, though of no kind with a name, or where too little is left to test for more.
+        least = max(thresholds.tolerable, thresholds.material, known)
         gained = 0.0 if causes else won.certain_fall(scale)
-        besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > thresholds.tolerable))
+        besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
         verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
     rest = unexplained_of(causes, before, after)
     with_zero = _with_offset(extended, named.zeros, sessions, scale)
@@ -329,7 +330,7 @@ def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Sca
         scale.unit.symbol,
         found.fit_percent,
         force_n,
-        left.rms * span,
+        left.rms * span if left.rms > 0.0 or left.is_tested else math.nan,
         found.variance_explained_percent,
     )
 

@@ -108,7 +108,7 @@ class Cause:
 class GoodnessOfFit:
     """How a model does on held-out data; ``structure_rms`` is what its residual of all recordings holds beside noise.
 
-    NaN where nothing could be judged.
+    NaN where nothing could be judged, ``structure_rms`` where no test could have shown any.
     """
 
     rmse: float
@@ -124,7 +124,7 @@ class GoodnessOfFit:
             "rmse": {"value": finite_or_none(self.rmse), "unit": self.unit},
             "fit_percent": finite_or_none(self.fit_percent),
             "force_rmse_n": finite_or_none(self.force_rmse_n),
-            "structure_rms": {"value": self.structure_rms, "unit": self.unit},
+            "structure_rms": {"value": finite_or_none(self.structure_rms), "unit": self.unit},
             "variance_explained_percent": finite_or_none(self.variance_explained_percent),
         }
 

@@ -32,6 +32,7 @@ def costs(monkeypatch: pytest.MonkeyPatch) -> dict[str, tuple[float, float]]:
         return SimpleNamespace(model=model.with_part(law, values), cost=cost, law=law.name)
 
     monkeypatch.setattr(_laws, "fit_with", curved)
+    monkeypatch.setattr(_laws, "weighed", lambda likelihood, model: SimpleNamespace(cost=likelihood.cost(model)))
     monkeypatch.setattr(_laws, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model, cost=NOTHING_COST))
     return told
 
