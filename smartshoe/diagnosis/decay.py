@@ -26,7 +26,8 @@ class Decay:
 
     From ``onset_s`` (since the first sample) the reading falls by ``lost_percent`` of its first level in ``within_s``,
     with the time constant ``tau_s`` of one exponential (``ci95_s``), towards ``plateau`` (reading's unit; 0 unless the
-    data shows another). ``from_start_s`` is the time constant when the stretch before the onset is counted in.
+    data shows another). ``from_start_s`` is the time constant when the stretch before the onset is counted in, but for
+    one in which the reading had still to rise.
     ``order`` m (``order_ci95``): the rate of fall goes with the m-th power of the reading, as in -p' = k p^m: 1 is
     exponential, 1/2 an orifice with incompressible flow, up to 2 a narrow channel with gas far above the ambient
     pressure; None where too little is lost. ``course`` is the verdict on it, ``says`` all of it in a sentence.
@@ -56,33 +57,36 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
     if present.sum() < thresholds.least_samples:
         return None
     points = thresholds.bins // 8  # a smooth fall has no detail
-    time_s, reading = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present], points)
-    if not _falls(reading, thresholds):
+    time_s, reading, sign = _thinned(recording.time_s[present] - recording.time_s[0], sensor.values[present], points)
+    noise = largest_of_noise(reading.size, thresholds) * white_noise_sd(reading)
+    end = max(time_s.size // 20, 3)
+    low = float(np.median(reading[-end:]))
+    full = _first_at_its_level(reading, low, thresholds.standing, noise)
+    time_s, reading = time_s[full:], reading[full:]
+    high = float(np.median(reading[:3]))
+    if high <= 0.0 or not _falls(reading, thresholds):
         return None
     slight = thresholds.clear * thresholds.standing
-    largest = largest_of_noise(reading.size, thresholds)
-    end = max(time_s.size // 20, 3)
-    high, low = float(np.median(reading[:3])), float(np.median(reading[-end:]))
-    begun = np.flatnonzero(reading < high - max(thresholds.standing * (high - low), largest * white_noise_sd(reading)))
+    begun = np.flatnonzero(reading < high - max(thresholds.standing * (high - low), noise))
     # A decay of which hardly anything is seen is a straight line, without a corner to begin at.
     first = max(int(begun[0]) - 1, 0) if begun.size and high - low > slight * high else 0
     if time_s.size - first < thresholds.local // 4:
         return None
     onset_s, t, v = float(time_s[first]), time_s[first:] - time_s[first], reading[first:]
     lost = (high - low) / high
-    guess = _guess(t, v)
+    guess = _guess(t, v, high)
     one = _fit(_exponential, t, v, [high, guess])
     plateau = 0.0
     order: float | None = None
     order_ci95: tuple[float, float] | None = None
     course: Course = "undecided"
     if lost > slight:
-        towards = _fit(_to_plateau, t, v, [high - low, _guess(t, v - low), low])
+        towards = _fit(_to_plateau, t, v, [high - low, _guess(t, v - low, high - low), low])
         ordered = _fit(_of_order, t, v, [high, float(one.at[1]), 1.05])
         earned = towards.square < min(one.square / thresholds.clear, ordered.square)
         if earned and towards.at[2] > slight * high:
-            one, plateau = towards, float(towards.at[2])
-            ordered = _fit(_of_order, t, v - plateau, [high - plateau, float(one.at[1]), 1.05])
+            one, plateau = towards, sign * float(towards.at[2])
+            ordered = _fit(_of_order, t, v - one.at[2], [high - float(one.at[2]), float(one.at[1]), 1.05])
         half = NORMAL_95 * float(ordered.sd[2])
         if half < thresholds.same:  # else too little of the curve is seen
             order = float(ordered.at[2])
@@ -94,7 +98,8 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
     ci95_s = (max(tau_s - NORMAL_95 * tau_sd, 0.0), tau_s + NORMAL_95 * tau_sd)
     unit = sensor.unit.symbol
     begins = f" from {onset_s:.3g} s on" if onset_s > thresholds.standing * float(time_s[-1]) else ""
-    counted = f" ({_duration(from_start_s)} when counted from the first sample)" if begins and lost > 0.5 else ""
+    since = f"{time_s[0]:.3g} s on" if full else "the first sample"
+    counted = f" ({_duration(from_start_s)} when counted from {since})" if begins and first and lost > 0.5 else ""
     aim = f" towards {plateau:.3g} {unit}" if plateau else ""
     says = (
         f"the {sensor.name} falls by {100 * lost:.3g} % in {float(t[-1]):.3g} s{begins}{aim}, with a time constant of"
@@ -121,19 +126,30 @@ def _load_stands_still(recording: Recording, standing: float) -> Literal["absent
     if not loads:
         return "absent"
     values = loads[0].values[loads[0].present]
+    if not values.size:
+        return "absent"
     low, high = (float(value) for value in np.percentile(values, [1, 99]))
     return "still" if high - low <= standing * max(abs(low), abs(high)) else None
 
 
-def _thinned(time_s: Array, values: Array, points: int) -> tuple[Array, Array]:
-    """Means of both over at most ``points`` blocks; a negative reading that dies away is turned."""
+def _thinned(time_s: Array, values: Array, points: int) -> tuple[Array, Array, float]:
+    """Means of both over at most ``points`` blocks, and -1.0 where a negative reading, that dies away, is turned."""
     width = -(-values.size // points)
     count = values.size // max(width, 1)
     if count == 0:
-        return time_s, values
+        return time_s, values, 1.0
     t = time_s[: count * width].reshape(count, width).mean(axis=1)
     v = values[: count * width].reshape(count, width).mean(axis=1)
-    return t, -v if v[: max(count // 20, 1)].mean() < 0 else v
+    sign = -1.0 if v[: max(count // 10, 1)].mean() < 0 else 1.0
+    return t, sign * v, sign
+
+
+def _first_at_its_level(reading: Array, low: float, standing: float, noise: float) -> int:
+    """Where a reading that ends at ``low`` has come to the highest level of its first tenth: a unit may be filled."""
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(reading[: max(reading.size // 10, 3)], 3), axis=1)
+    top = int(np.argmax(medians))
+    below = np.flatnonzero(reading[: top + 2] < medians[top] - max(standing * (medians[top] - low), noise))
+    return int(below[-1]) + 1 if below.size else 0
 
 
 def _falls(reading: Array, thresholds: Thresholds) -> bool:
@@ -156,11 +172,11 @@ def _falls(reading: Array, thresholds: Thresholds) -> bool:
     )
 
 
-def _guess(t: Array, v: Array) -> float:
-    """Time constant of a straight line through the logarithm of the part above a fifth."""
-    part = v > 0.2 * v[0]
+def _guess(t: Array, v: Array, high: float) -> float:
+    """Time constant of a straight line through the logarithm of the part above a fifth of ``high``, where it begins."""
+    part = v > 0.2 * high
     part[:3] = True
-    slope = float(np.polyfit(t[part], np.log(np.maximum(v[part], 1e-9 * v[0])), 1)[0])
+    slope = float(np.polyfit(t[part], np.log(np.maximum(v[part], 1e-9 * high)), 1)[0])
     return float(np.clip(-1.0 / slope if slope < 0 else 1e3 * t[-1], 1e-3 * t[-1], 1e6 * t[-1]))
 
 
@@ -188,9 +204,10 @@ def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list
     jac = np.asarray(found.jac, dtype=float)
     scale = np.linalg.norm(jac, axis=0)
     scale[scale == 0.0] = 1.0
-    jac = jac / scale
-    covariance = np.linalg.pinv(jac.T @ jac) / np.outer(scale, scale)
-    return _Fitted(np.asarray(found.x, dtype=float), np.sqrt(np.diag(covariance) * variance), square)
+    # Of columns that are nearly alike the inverse of their products may have negative squares, its root has none.
+    root = np.linalg.pinv(jac / scale)
+    sd = np.linalg.norm(root, axis=1) / scale * np.sqrt(variance)
+    return _Fitted(np.asarray(found.x, dtype=float), sd, square)
 
 
 def _exponential(at: Array, t: Array) -> Array:

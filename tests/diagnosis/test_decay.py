@@ -205,3 +205,52 @@ def test_a_fall_with_a_rise_in_it_is_none() -> None:
 
 def test_without_a_reading_there_is_none() -> None:
     assert decay_of(Recording.from_arrays(time_s=TIME_S, force_n=np.full(TIME_S.size, 5.0))) is None
+
+
+@given(
+    fills_s=st.floats(0.2, 6.0),
+    rises_s=st.floats(0.0, 0.5),
+    sign=st.sampled_from([1.0, -1.0]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=20)
+def test_a_unit_that_is_filled_while_the_log_runs_decays_from_when_it_is_full(
+    fills_s: float, rises_s: float, sign: float, seed: int
+) -> None:
+    full_s = fills_s * (1.0 + rises_s)
+    fills = np.clip((TIME_S - fills_s) / (full_s - fills_s + 1e-9), 0.0, 1.0)
+    pressure = 100.0 * fills * np.exp(-np.maximum(TIME_S - full_s, 0.0) / 60.0)
+    decay = _found(sign * pressure, seed=seed)
+    assert decay.tau_s == pytest.approx(60.0, rel=0.02)
+    assert decay.lost_percent == pytest.approx(100.0 * (1.0 - np.exp(-(97.5 - full_s) / 60.0)), abs=2.0)
+    assert full_s - 0.5 <= decay.onset_s <= full_s + 3.0
+    assert "counted from the first sample" not in decay.says
+
+
+def test_zeros_before_a_fall_divide_nothing() -> None:
+    pressure = np.where(TIME_S < 1.0, 0.0, 100.0 * np.exp(-(TIME_S - 1.0) / 60.0))
+    decay = decay_of(Recording.from_arrays(time_s=TIME_S, pressure_mbar=pressure))
+    assert decay is not None
+    assert decay.tau_s == pytest.approx(60.0, rel=1e-3)
+
+
+def test_a_load_that_lacks_throughout_is_absent() -> None:
+    falling = 100.0 * np.exp(-TIME_S / 20.0)
+    assert "only a logged load tells apart" in _found(falling, np.full(TIME_S.size, np.nan)).says
+
+
+def test_a_vacuum_that_dies_away_ends_below_zero() -> None:
+    decay = _found(-20.0 - 80.0 * np.exp(-TIME_S / 15.0))
+    assert decay.plateau == pytest.approx(-20.0, abs=0.5)
+    assert "towards -20 mbar" in decay.says
+    assert decay.course == "exponential"
+    assert decay.lost_percent == pytest.approx(80.0, abs=0.5)
+
+
+@given(seed=st.integers(0, 10_000), noise_mbar=st.sampled_from([3.0, 5.0, 8.0]))
+@settings(max_examples=40)
+def test_noise_as_loud_as_the_fall_is_no_error(seed: int, noise_mbar: float) -> None:
+    noise = np.random.default_rng(seed).normal(0.0, noise_mbar, 500)
+    time_s = 0.1 * np.arange(500)
+    decay = decay_of(Recording.from_arrays(time_s=time_s, pressure_mbar=90.0 + 10.0 * np.exp(-time_s / 5.0) + noise))
+    assert decay is None or (decay.tau_s > 0.0 and decay.ci95_s[0] <= decay.tau_s <= decay.ci95_s[1])

@@ -108,28 +108,31 @@ def test_of_as_many_samples_as_numbers_one_is_counted_and_what_has_no_part_has_n
 def test_a_guess_is_the_line_through_the_logarithm_above_a_fifth() -> None:
     t = 0.5 * np.arange(60.0)
     bent = np.where(t < 8.0, np.exp(-t / 5.0), np.exp(-8.0 / 5.0) * np.exp(-(t - 8.0) / 50.0))
-    assert _guess(t, 7.0 * bent) == pytest.approx(5.0)  # exp(-1.6) is a fifth and a little: the rest counts too little
+    assert _guess(t, 7.0 * bent, 7.0) == pytest.approx(
+        5.0
+    )  # exp(-1.6) is a fifth and a little: the rest counts too little
     above = bent > 0.2
     slope = np.polyfit(t[above], np.log(bent[above]), 1)[0]
-    assert _guess(t, bent) == pytest.approx(-1.0 / slope)
+    assert _guess(t, bent, 1.0) == pytest.approx(-1.0 / slope)
     # The first three count in any case, no lower than a billionth of the first.
     drops = np.array([1.0, 0.1, 0.05, 0.01, 0.01])
-    assert _guess(t[:5], drops) == pytest.approx(-1.0 / np.polyfit(t[:3], np.log(drops[:3]), 1)[0])
+    assert _guess(t[:5], drops, 1.0) == pytest.approx(-1.0 / np.polyfit(t[:3], np.log(drops[:3]), 1)[0])
     under = np.array([2.0, -1.0, -1.0, -1.0])
     floor = np.log(np.array([2.0, 2e-9, 2e-9]))
-    assert _guess(t[:4], under) == pytest.approx(-1.0 / np.polyfit(t[:3], floor, 1)[0])
+    assert _guess(t[:4], under, 2.0) == pytest.approx(-1.0 / np.polyfit(t[:3], floor, 1)[0])
     # What rises falls in a thousand times the record, and nothing falls in less than a thousandth or in for ever.
-    assert _guess(t, np.exp(t / 5.0)) == pytest.approx(1e3 * t[-1])
-    assert _guess(t, 1.0 - 1e-9 * t) == pytest.approx(1e6 * t[-1])
-    assert _guess(np.array([0.0, 1e-4, 2e-4, 3.0]), np.array([1.0, 0.9, 0.8, 0.1])) == pytest.approx(3e-3)
+    assert _guess(t, np.exp(t / 5.0), 1.0) == pytest.approx(1e3 * t[-1])
+    assert _guess(t, 1.0 - 1e-9 * t, 1.0) == pytest.approx(1e6 * t[-1])
+    assert _guess(np.array([0.0, 1e-4, 2e-4, 3.0]), np.array([1.0, 0.9, 0.8, 0.1]), 1.0) == pytest.approx(3e-3)
 
 
 # -- what is looked at ------------------------------------------------------------------------------------------------
 def test_a_long_record_is_taken_in_means_of_blocks() -> None:
     time_s, values = np.arange(23.0), 100.0 - np.arange(23.0)
-    t, v = _thinned(time_s, values, 5)
+    t, v, sign = _thinned(time_s, values, 5)
     assert list(t) == [2.0, 7.0, 12.0, 17.0]  # five in a block, the rest left out
     assert list(v) == [98.0, 93.0, 88.0, 83.0]
+    assert sign == 1.0
     assert list(_thinned(time_s, values, 23)[1]) == list(values)
     assert list(_thinned(time_s, values, 22)[0]) == [2.0 * k + 0.5 for k in range(11)]
     assert _thinned(time_s[:0], values[:0], 5)[0].size == 0
