@@ -96,21 +96,32 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     sensor, place = recording.sensor, found.place
     half_span = 0.5 * float(place[-1] - place[0])
     u = (place - 0.5 * (place[0] + place[-1])) / half_span
-    middle = _slope(place, found.mean, np.abs(u) < 0.25)
-    ends = 0.5 * (_slope(place, found.mean, u > 0.5) + _slope(place, found.mean, u < -0.5))
-    ratio = ends / middle if middle else np.inf
-    if thresholds.clear * ratio < 1.0:
-        shape = "it flattens, as friction does that saturates, and no straight line or linear damping describes it"
-    elif ratio > thresholds.clear:
-        shape = "it steepens towards the ends, and no straight line describes it"
-    else:
-        shape = "it is nearly straight"
-    apart = 0.5 * float(np.median(np.abs(found.ups - found.downs)[np.abs(u) < 0.5]))
     unit, of_load = sensor.unit.symbol, recording.load.unit.symbol
-    return (
-        f"over this load the {sensor.name} rises by {middle:.3g} {unit}/{of_load} about the middle and by {ends:.3g}"
-        f" {unit}/{of_load} at the ends: {shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"
-    )
+    rises = f"over this load the {sensor.name} rises by"
+    inner, lower, upper = np.abs(u) < 0.25, u < -0.5, u > 0.5
+    if min(inner.sum(), lower.sum(), upper.sum()) < 3:  # of two medians it is a difference, and no line
+        whole = _slope(place, found.mean, np.full(place.size, True))
+        shape = f"{rises} {whole:.3g} {unit}/{of_load} on the whole: too little was recorded to tell its shape"
+    else:
+        middle = _slope(place, found.mean, inner)
+        ends = 0.5 * (_slope(place, found.mean, upper) + _slope(place, found.mean, lower))
+        shape = (
+            f"{rises} {middle:.3g} {unit}/{of_load} about the middle and by {ends:.3g} {unit}/{of_load} at the ends:"
+            f" {_shape(middle, ends, thresholds)}"
+        )
+    apart = 0.5 * float(np.median(np.abs(found.ups - found.downs)[np.abs(u) < 0.5]))
+    return f"{shape}; loading and unloading lie {apart:.3g} {unit} to either side of it"
+
+
+def _shape(middle: float, ends: float, thresholds: Thresholds) -> str:
+    """What is said of a curve by its slope about the middle and at the ends."""
+    if middle * ends < 0.0:
+        return "it turns back, and no straight line describes it"
+    if thresholds.clear * abs(ends) < abs(middle):
+        return "it flattens, as friction does that saturates, and no straight line or linear damping describes it"
+    if abs(ends) > thresholds.clear * abs(middle):
+        return "it steepens towards the ends, and no straight line describes it"
+    return "it is nearly straight"
 
 
 def conductance_of(recordings: Sequence[Recording], thresholds: Thresholds) -> str | None:
@@ -147,4 +158,4 @@ def _explained(values: Array, by: Array) -> float:
 
 
 def _slope(place: Array, level: Array, among: Mask) -> float:
-    return float(np.polyfit(place[among], level[among], 1)[0]) if among.sum() >= 3 else 0.0
+    return float(np.polyfit(place[among], level[among], 1)[0])

@@ -171,3 +171,20 @@ def test_a_resistance_that_falls_as_contacts_grow_is_better_diagnosed_as_a_condu
     assert said(pressure_mbar=1.0 / noisy) is None
     assert said(resistance_ohm=1e3 * noisy) is None
     assert said(resistance_ohm=1.0 / noisy - 1.0 / noisy.min()) is None  # a difference of resistances has no reciprocal
+
+
+@given(
+    count=st.integers(100, 1200), cycles=st.integers(2, 8), seed=st.integers(0, 1000), grid=st.sampled_from([0.0, 1.0])
+)
+@settings(max_examples=30)
+def test_a_straight_line_is_never_bent_however_short_or_coarse(count: int, cycles: int, seed: int, grid: float) -> None:
+    phase = np.linspace(0.0, cycles, count, endpoint=False) % 1.0
+    load = 800.0 * (1.0 - np.abs(2.0 * phase - 1.0))
+    reading = 0.1 * load + np.random.default_rng(seed).normal(0.0, 0.1, count)
+    reading = grid * np.round(reading / grid) if grid else reading
+    said = characteristic_of(
+        Recording.from_arrays(time_s=0.1 * np.arange(count), force_n=load, pressure_mbar=reading), STANDARD
+    )
+    assert said is None or "nearly straight" in said or "too little was recorded to tell its shape" in said
+    slopes = [float(value) for value in re.findall(r"by ([\d.]+) mbar/N", said or "")]
+    assert slopes == pytest.approx([0.1] * len(slopes), rel=0.2)

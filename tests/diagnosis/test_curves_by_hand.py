@@ -118,7 +118,6 @@ def test_what_explains_is_a_share_of_the_variance() -> None:
     assert _explained(np.ones(4), values) == 0.0
     among = np.array([True, True, False, True])
     assert _slope(np.array([0.0, 1.0, 5.0, 2.0]), np.array([1.0, 3.0, 99.0, 5.0]), among) == pytest.approx(2.0)
-    assert _slope(values, values, np.array([True, True, False, False])) == 0.0
 
 
 # -- what is said of them ---------------------------------------------------------------------------------------------
@@ -164,9 +163,29 @@ def test_slopes_and_the_loop_are_told_over_their_parts_of_the_load(monkeypatch: 
     assert ends == pytest.approx(0.5 * (slope(u > 0.5) + slope(u < -0.5)), rel=5e-3)
     apart = float(re.findall(r"lie ([\d.]+) mbar to either side", said)[0])
     assert apart == pytest.approx(float(np.median(2.0 + np.abs(u[np.abs(u) < 0.5]))), rel=5e-3)
-    # Where there is no middle its ends are all.
-    few = np.linspace(0.0, 6.0, 7)
-    assert "steepens" in str(_said(monkeypatch, _branches(few, few)))
+
+
+@pytest.mark.parametrize("places", [7, 10, 11, 13, 14])
+def test_of_fewer_than_three_places_in_a_part_no_shape_is_told(monkeypatch: pytest.MonkeyPatch, places: int) -> None:
+    place = np.linspace(0.0, 6.0, places)
+    u = place / 3.0 - 1.0
+    said = str(_said(monkeypatch, _branches(place, 7.0 * place)))
+    is_told = min(int(np.sum(part)) for part in (np.abs(u) < 0.25, u > 0.5, u < -0.5)) >= 3
+    assert ("nearly straight" in said) is is_told
+    assert ("rises by 7 mbar/N on the whole: too little was recorded to tell its shape" in said) is not is_told
+
+
+@pytest.mark.parametrize(
+    ("middle", "ends", "words"),
+    [(1.0, -0.6, "turns back"), (-1.0, 3.0, "turns back"), (-1.0, -3.0, "steepens"), (1.0, 0.0, "flattens"),
+     (0.0, 1.0, "steepens"), (-1.0, -0.4, "flattens"), (-1.0, -1.0, "nearly straight")],
+)  # fmt: skip
+def test_a_shape_is_told_of_slopes_of_either_sign(
+    monkeypatch: pytest.MonkeyPatch, middle: float, ends: float, words: str
+) -> None:
+    place = np.linspace(-1.0, 1.0, 41)
+    level = np.where(np.abs(place) < 0.4, middle * place, ends * place)
+    assert words in str(_said(monkeypatch, _branches(place, level)))
 
 
 def test_what_follows_neither_load_nor_direction_has_no_course(monkeypatch: pytest.MonkeyPatch) -> None:
