@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from smartshoe.arrays import Mask
 from smartshoe.diagnosis._session import LEAST_WINDOW, Session, have_later_cycles
@@ -65,9 +65,9 @@ class Excitation:
                 " known (hold out a recording whose reading follows its load)"
             )
         if len(self.rates_per_s) <= 1:
+            seen = "one loading rate only" if self.rates_per_s else "no rise of the load of which the rate is seen"
             said.append(
-                "one loading rate only: nothing can be said of rate dependence, nor can viscous friction be told from"
-                " Coulomb's"
+                f"{seen}: nothing can be said of rate dependence, nor can viscous friction be told from Coulomb's"
             )
         if "holds" not in self.present:
             said.append(
@@ -98,19 +98,17 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     each = [list(_rises(session, thresholds)) for session in sessions]
     rises = [rise for own in each for rise in own]
     rated = [rise for rise in rises if rise.is_rated]
-    alike = float(np.log1p(thresholds.same))
-    kinds = Counter((round(np.log(rise.rate) / alike), round(np.log(rise.peak) / alike)) for rise in rated)
     hold_s = max(
         (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
     )
-    rests_s = [[n * session.conditions.step_s for n in _runs(_rested(session, thresholds))] for session in sessions]
+    rests_s = [[n * one.conditions.step_s for n in _runs(_rested(one, thresholds))] for one in sessions]
+    pauses = [n * one.conditions.step_s for one in sessions for n in _runs(_within(_rested(one, thresholds)))]
     # Where a ramp begins and ends is smeared by its window, and found to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
     rest_s = max((rest for own in rests_s for rest in own), default=0.0)
-    pauses = [rest for own in rests_s for rest in own[1:-1]]
-    repeats = max(kinds.values(), default=0)
+    repeats = _most_alike([(rise.rate, rise.peak) for rise in rated], thresholds.same)
     found = {
         "rates": len(rates) > 1,
         "peaks": len(peaks) > 1,
@@ -148,7 +146,7 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
     span = min(1.0, max(float(np.ptp(load)), 1e-9))
     for first, last in pairwise(turning_points(load, thresholds.cycle * span)):
         rise = float(load[last] - load[first])
-        if rise < 3.0 * thresholds.cycle * span or load[last] <= 0.0:
+        if rise < thresholds.cycle * span or load[last] <= 0.0:
             continue
         part = (load[first : last + 1] - load[first]) / rise
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
@@ -198,6 +196,15 @@ def _rested(session: Session, thresholds: Thresholds) -> Mask:
     return np.asarray(_still(session, thresholds) & session.resting)
 
 
+def _within(mask: Mask) -> Mask:
+    """(n,) ``mask`` but for what begins or ends the recording."""
+    other = np.flatnonzero(~mask)
+    inner = np.zeros_like(mask)
+    if other.size:
+        inner[other[0] : other[-1]] = mask[other[0] : other[-1]]
+    return inner
+
+
 def _runs(mask: Mask) -> list[int]:
     first, last = runs_of(mask)
     return [int(n) for n in last - first]
@@ -213,6 +220,14 @@ def _distinct(values: Sequence[float], alike: float) -> list[float]:
         if not found or value > found[-1] * (1.0 + alike):
             found.append(value)
     return found
+
+
+def _most_alike(kinds: Sequence[tuple[float, float]], same: float) -> int:
+    """The most of such pairs that differ from one of them by up to ``same`` in either number."""
+    if not kinds:
+        return 0
+    at = np.log(kinds)
+    return int(KDTree(at).query_ball_point(at, np.log1p(same), p=np.inf, return_length=True).max())
 
 
 def _distinct_rates(rates: Sequence[tuple[float, float]], same: float, ends: float = 2.0) -> list[float]:
