@@ -16,6 +16,7 @@ USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's
 _, SHARE, RATE = BASELINE
 # A resolution: a fit starts at the best. All halved or doubled, no name changed in two cases.
 POLES_PER_S = np.geomspace(RATE.lower, RATE.upper, 35)
+WALL_RATIOS = 1.02, 50.0  # bounds of any tube's
 
 
 def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
@@ -66,4 +67,4 @@ def _wall_ratio(sessions: Sequence[Session], gain: float, scale: Scale) -> float
     area_m2 = recording.positive("effective_area_m2", "m2")
     pascal_per_newton = gain * float(scale.unit.to_si(np.array([abs(scale.reading)]))[0]) / scale.load_n
     ratio = 1.0 / (area_m2 * pascal_per_newton)
-    return ratio if 1.02 < ratio < 50.0 else USUAL_WALL_RATIO
+    return ratio if WALL_RATIOS[0] < ratio < WALL_RATIOS[1] else USUAL_WALL_RATIO

@@ -9,7 +9,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._arms import arms_of, is_stretched
-from smartshoe.diagnosis._baseline import RATE
+from smartshoe.diagnosis._baseline import RATE, WALL_RATIOS
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._held_out import Gain
@@ -86,6 +86,7 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
     if excitation.shows(name.effect):
         return None
     ways = "; or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
+    ways = ways or "more load cycles"
     return (
         f"{name.effect.name.replace('_', ' ')} fits, but recordings of one load cycle cannot show it, so that it is"
         f" not named; it needs {ways}"
@@ -140,14 +141,20 @@ def end_of_range_of(model: ExtendedModel) -> str | None:
 
 def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> str | None:
     """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
-    known = model.wall_ratio != USUAL_WALL_RATIO
-    stiffer = replace(model, wall_ratio=STIFFEST_WALL_RATIO)
-    if known or apart(sessions, model, stiffer) <= thresholds.material:
+    if model.wall_ratio != USUAL_WALL_RATIO:  # one is known
+        return None
+    gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]
+    if any("effective_area_m2" in one.metadata for one in gauges):
+        least, most = WALL_RATIOS
+        mend = f"mend effective_area_m2: the declared one makes an N beyond {least:g} to {most:g}, which no tube has"
+    elif apart(sessions, model, replace(model, wall_ratio=STIFFEST_WALL_RATIO)) > thresholds.material:
+        mend = "declare effective_area_m2"
+    else:
         return None
     return (
         f"how stiff the wall is beside the gas is not known (N = {model.wall_ratio:g} is taken, units of the paper have"
         f" 1.51 to {STIFFEST_WALL_RATIO:g}): rates of leaks and times of heat go with it, beyond their intervals"
-        " (declare effective_area_m2)"
+        f" ({mend})"
     )
 
 

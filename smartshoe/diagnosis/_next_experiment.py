@@ -12,10 +12,12 @@ from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._gains_and_zeros import changes_of
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._likelihood import Fit, fit
+from smartshoe.diagnosis._members import begun_with
 from smartshoe.diagnosis._result import Cause, NextExperiment
+from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.models.effects import Conditions, effect, told_apart_by
-from smartshoe.models.effects.exposure import SAYS, Exposure
+from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
 from smartshoe.protocol import Protocol
 
 SHOWN_BY: dict[Exposure, str] = {
@@ -27,12 +29,10 @@ SHOWN_BY: dict[Exposure, str] = {
     "pauses": "pauses",
     "steps": "steps",
 }
-CHANNELS = {
-    "displacement": "displacement",
-    "temperature": "temperature",
-    "pressure_reference": "pressure reference",
-    "neighbour": "neighbour",
-}
+ONE_CYCLE = (
+    "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be held"
+    " against another, so that no cause can be told"
+)
 
 
 def next_experiment(
@@ -48,18 +48,23 @@ def next_experiment(
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
     Where no cause is in doubt, but recordings have gains of their own, one of them again. Where none is, and something
-    is left (``open_``), or none can be told, what this data never showed; else None.
+    is left (``open_``), or a name is not sure, what this data never showed; else None. Where a single load cycle tells
+    no cause, more of them.
     """
+    pair = _pair(causes)
     if worse:
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
-        return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, says)
+        return NextExperiment(pair, "repeat", None, says)
     doubtful = [(cause, cause.part) for cause in causes if cause.equivalents and cause.part is not None]
     if not doubtful and (found.own_gains or found.zero_changes):
-        return NextExperiment(tuple(cause.name for cause in causes), "repeat", None, _again(found))
+        return NextExperiment(pair, "repeat", None, _again(found))
+    if not doubtful and not found.can_validate:
+        return NextExperiment(pair, "repeat", None, ONE_CYCLE)
     if not doubtful:
-        is_open = open_ or not found.can_validate or any(c.equivalents for c in causes)
-        return _unseen(found, causes, excitation) if is_open else None
+        least = excitation.thresholds.least_confidence
+        is_open = open_ or any(cause.equivalents or cause.confidence < least for cause in causes)
+        return _unseen(found, pair, excitation) if is_open else None
     cause, part = max(doubtful, key=lambda one: one[0].size)
     rival = cause.equivalents[0]
     truth = found.fit if part == cause.name else _in_place_of(found, part, cause.name)
@@ -73,12 +78,12 @@ def next_experiment(
     }
     best = max(expected, key=lambda name: expected[name])
     names = (cause.name, *cause.equivalents)
-    pair = f"{cause.name} and {rival}".replace("_", " ")
+    both = f"{cause.name} and {rival}".replace("_", " ")
     channel = _channel(cause.name, rival, sessions)
     no_name = -2.0 * math.log(excitation.thresholds.false_name)  # less tells nothing apart
     if expected[best] < no_name:
         instead = f"log the {channel} too" if channel else "use either, both predict the same reading"
-        says = f"no load history that a machine can run tells {pair} apart: {instead}"
+        says = f"no load history that a machine can run tells {both} apart: {instead}"
         return NextExperiment(names, None, channel, says, expected[best])
     telling = {
         name: EXPERIMENTS[name](peak_n)
@@ -88,7 +93,7 @@ def next_experiment(
     if not telling:
         instead = f"log the {channel} too" if channel else f"{cause.name.replace('_', ' ')} follows better"
         says = (
-            f"none of the {len(expected)} protocols is expected to tell {pair} apart better than this data already"
+            f"none of the {len(expected)} protocols is expected to tell {both} apart better than this data already"
             f" does: {instead}"
         )
         return NextExperiment(names, None, channel, says, expected[best])
@@ -96,10 +101,12 @@ def next_experiment(
     better = ", which this data does not"
     if margin > no_name:
         times = expected[chosen] / margin
-        better = f", {float(f'{times:.2g}'):,g} times as well as this data does"
+        better = f", {times:.2g} times as well as this data does"
         if times < 1.0 + excitation.thresholds.same:
             better = ", little better than this data does"
-    says = f"run the protocol {chosen.replace('_', ' ')}: it should tell {pair} apart{better}"
+        elif times > excitation.thresholds.extrapolates:
+            better = ", far better than this data does"
+    says = f"run the protocol {chosen.replace('_', ' ')}: it should tell {both} apart{better}"
     return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
 
 
@@ -118,22 +125,21 @@ def _again(found: Inference) -> str:
 
 
 def _in_place_of(found: Inference, name: str, rival: str) -> Fit:
-    """The fit with ``rival`` in the place of an effect, of the size that the screen expects of it."""
-    added = effect(rival)
-    sizes = {p.name: p.size for p in added.parameters if p.null is not None}
-    values = added.start()
-    for k, parameter in enumerate(added.parameters):
-        if parameter.name in sizes:
-            values[k] = min(
-                max((parameter.null or 0.0) + 0.1 * sizes[parameter.name], parameter.lower), parameter.upper
-            )
-    return fit(found.likelihood, found.fit.model.without(name).with_part(added, values))
+    """The fit with ``rival`` in the place of an effect."""
+    less = found.fit.model.without(name)
+    return fit(found.likelihood, begun_with(effect(rival), less, found.likelihood))
 
 
-def _unseen(found: Inference, causes: Sequence[Cause], excitation: Excitation) -> NextExperiment:
+def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:
+    """The largest cause that has equivalents with these, else the largest with its nearest rival; () where none has."""
+    others = [(cause, cause.equivalents) for cause in causes]
+    others += [(cause, tuple(rival.effect for rival in cause.rivals[:1])) for cause in causes]
+    return next(((cause.name, *names) for cause, names in others if names), ())
+
+
+def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) -> NextExperiment:
     """The first protocol that holds what this data lacks; the same again where it lacks nothing."""
     peak_n = found.fit.model.full_scale_load_n
-    names = tuple(cause.name for cause in causes)
     for word, protocol in SHOWN_BY.items():
         if word not in excitation.present:
             says = f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
@@ -169,9 +175,6 @@ def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise_sd: float,
 
 def _channel(name: str, rival: str, sessions: Sequence[Session]) -> str | None:
     """The channel that the catalogue says would tell them apart, if it was not logged already."""
-    said = told_apart_by(effect(name), effect(rival))
-    logged = {channel for session in sessions for channel in session.recording.channels}
-    for word, channel in CHANNELS.items():
-        if word in said and channel not in logged:
-            return channel
-    return None
+    columns = set.intersection(*({*one.recording.channels} for one in sessions))
+    lacking = (told_apart_by(effect(name), effect(rival)) & CHANNELS) - logged_channels(sessions) - columns
+    return min(lacking).replace("_", " ") if lacking else None

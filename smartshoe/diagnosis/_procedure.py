@@ -124,7 +124,8 @@ def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
         return None
     return (
         f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
-        " which bears compression only (turn the sign of the load, or take its mean out, if that is what was meant)"
+        " which bears compression only (turn the sign of the load, set it to zero at rest, or take its mean out, if"
+        " that is what was meant)"
     )
 
 
@@ -243,7 +244,7 @@ def _diagnosed(
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _nearest(found),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=bool(rest.rms > thresholds.material), worse=won.is_loss
+            found, causes, sessions, given.excitation, open_=verdict not in ("adequate", "explained"), worse=won.is_loss
         ),
         limits=(
             *given.limits,

@@ -164,6 +164,8 @@ def test_a_memory_of_which_single_load_cycles_show_nothing_is_said_with_what_wou
     )
     assert "; or rests without load" in told
     assert "pauses" not in told  # of which there are none before a second cycle
+    for name in ("cycle_conditioning", "mullins_softening", "gain_drift"):  # shown by nothing but later cycles
+        assert str(not_shown_of(_named(name), once)).endswith("so that it is not named; it needs more load cycles")
     assert not_shown_of(_named("second_relaxation"), once) is None
     assert not_shown_of(_named("permanent_set"), replace(once, is_cycled=True)) is None
 

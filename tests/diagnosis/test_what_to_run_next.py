@@ -166,6 +166,7 @@ def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None
     [
         ("temperature", ("gain_drift", "cycle_conditioning"), {"temperature_k": 300.0}),
         ("displacement", ("contact_area", "gas_compression"), {"displacement_mm": 1.0}),
+        ("neighbour", ("cross_talk", "zero_drift"), {"left_toe_mbar": 1.0}),
     ],
 )
 def test_a_channel_that_tells_two_apart_is_asked_for_unless_it_is_logged(

@@ -247,9 +247,14 @@ def test_what_a_leak_or_heat_does_goes_with_how_stiff_the_wall_is_which_is_said_
     for runs in ((declared, bare), (bare, declared)):
         told, scale = _sessions(*runs)
         assert wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is None
-    # An area that no wall has tells nothing.
+    # An area that no wall has tells nothing, which is said even where it decides over nothing.
     told, scale = _sessions(_run(seed=1, effective_area_m2=1.0), bare)
-    assert wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, sensitive) is not None
+    for thresholds in (sensitive, replace(STANDARD, material=0.4)):
+        said = wall_ratio_of(replace(model, wall_ratio=baseline_of(told, scale).wall_ratio), told, thresholds)
+        assert said is not None
+        assert said.endswith(
+            "(mend effective_area_m2: the declared one makes an N beyond 1.02 to 50, which no tube has)"
+        )
     # Without either it decides over nothing.
     assert wall_ratio_of(MODEL.with_part("dead_band"), sessions, replace(STANDARD, material=1e-12)) is None
 
