@@ -101,7 +101,7 @@ def design(
     Raises
     ------
     UsageError
-        Without a protocol, and for numbers that are not positive.
+        Without a protocol, where none bears a load, and for numbers that are not positive.
     """
     if not protocols:
         raise UsageError("a design needs a protocol: give one at least")
@@ -111,6 +111,10 @@ def design(
             raise UsageError(f"{name} is {value:g}: give a positive number")
     limits = thresholds or Thresholds()
     peak_n = max(protocol.peak_load_n for protocol in protocols)
+    if not peak_n > 0:
+        raise UsageError(
+            f"no load is put on in {', '.join(one.name for one in protocols)}: give a protocol that presses"
+        )
     recordings = [_commanded(protocol, unit, peak_n, sample_rate_hz) for protocol in protocols]
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     usable = [np.ones(len(one), dtype=bool) for one in recordings]

@@ -145,6 +145,24 @@ def test_the_command_names_the_file_and_key_where_there_is_no_protocol(
 
 
 @pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ('[protocol.a]\nkind = "static"\nloads_n = []', ("line 3", "key protocol.a.loads_n", "the list is empty")),
+        ('[protocol.a]\nkind = "dynamic"\nrates_n_per_s = []', ("key protocol.a.rates_n_per_s", "the list is empty")),
+        ('[protocol.a]\nkind = "segments"\ncorners = [[0, 0], [5, 0]]', ("no load is put on in a",)),
+    ],
+)
+def test_a_protocol_that_presses_nothing_is_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], table: str, words: tuple[str, ...]
+) -> None:
+    assert run_command(_asked(tmp_path, f'{table}\n[[unit]]\nname = "toe"\n')) == 2
+    said = capsys.readouterr().err
+    assert all(one in said for one in words)
+    assert "itself is at fault" not in said
+    assert not (tmp_path / "told.json").exists()
+
+
+@pytest.mark.parametrize(
     "more", [("--out", "o"), ("--calibration", "c.json"), ("--material", "5"), ("--unit", "toe"), ("--sensor", "6")]
 )
 def test_the_command_refuses_options_that_a_design_does_not_heed(

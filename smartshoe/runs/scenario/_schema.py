@@ -17,6 +17,7 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
     ValidationError,
+    field_validator,
     model_validator,
 )
 
@@ -70,6 +71,13 @@ class ProtocolTable(_Table):
     approach_s: PositiveFloat = 5.0
     hold_s: PositiveFloat = 5.0
     rest_s: float = Field(5.0, ge=0.0)
+
+    @field_validator("loads_n", "rates_n_per_s")
+    @classmethod
+    def _one_at_least(cls, given: tuple[float, ...]) -> tuple[float, ...]:
+        if not given:
+            raise ValueError("the list is empty: give one number at least")
+        return given
 
     @model_validator(mode="after")
     def _keys_belong_to_the_kind(self) -> ProtocolTable:
