@@ -54,15 +54,18 @@ def ranges_of(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds)
             )
         )
     said += _foreign([(one.recording.name, gain) for one, gain in zip(fitted, within, strict=True)], thresholds)
+    said += _unlike(fitted, thresholds)
     between = _between(kept, thresholds.same)
     if between is not None and all(gain is not None for gain in within):
-        gain = float(np.median([gain for gain in within if gain is not None]))
-        if not 1.0 < abs(gain / between) * (1.0 + thresholds.same) < (1.0 + thresholds.same) ** 2:
+        gains = [gain for gain in within if gain is not None]
+        # A chord of a curve is as steep as the curve somewhere on its way.
+        over = [abs(gain / between) for gain in gains]
+        if min(over) >= 1.0 + thresholds.same or max(over) * (1.0 + thresholds.same) <= 1.0:
             trap = trap or is_narrow
             said.append(
-                f"within a file the reading moves by {gain * to_physical:.3g} {unit}/N, between the files by"
-                f" {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, the"
-                " load cell was zeroed anew, or the files are not of one unit"
+                f"within a file the reading moves by {float(np.median(gains)) * to_physical:.3g} {unit}/N, between the"
+                f" files by {between * to_physical:.3g} {unit}/N: the gain within a file is not that of the unit, the"
+                " zero of reading or load is another in each file, or the files are not of one unit"
             )
     return Ranges(tuple(said), trap)
 
@@ -82,6 +85,45 @@ def _foreign(gains: Sequence[tuple[str, float | None]], thresholds: Thresholds) 
     ]
 
 
+def _unlike(sessions: Sequence[Session], thresholds: Thresholds) -> list[str]:
+    """What is said of files that read more or less than the first one by more than gains that are alike differ by.
+
+    Over loads that both have, where these go as high and as fast: neither a curve nor a rate does it. What reads many
+    times as much is told by `_foreign`.
+    """
+    first, *others = sessions
+    name = first.recording.name
+    said = []
+    for one in others:
+        # All that was recorded says how a load goes, be it held out.
+        if not all(_near(of(first, first.usable), of(one, one.usable), thresholds.same) for of in (_fastest, _highest)):
+            continue
+        most = min(_highest(file, file.fitted) for file in (first, one))
+        seen = [(file, file.fitted & (file.conditions.load <= most)) for file in (first, one)]
+        usual, gain = (_gain(file.conditions.load[at], file.reading[at], thresholds.follows) for file, at in seen)
+        if not usual or not gain or _near(gain, usual, thresholds.same):
+            continue
+        if 1.0 / thresholds.clear**2 < gain / usual < thresholds.clear**2:
+            said.append(
+                f"{one.recording.name} reads {gain / usual:.3g} times what {name} does under a load that goes as high"
+                " and as fast: is it of another unit, or was this one changed, or put back otherwise?"
+            )
+    return said
+
+
+def _near(one: float, other: float, same: float) -> bool:
+    """Whether two numbers of one sign differ by no more than ``same``."""
+    return max(abs(one), abs(other)) <= (1.0 + same) * min(abs(one), abs(other))
+
+
+def _fastest(one: Session, seen: Mask) -> float:
+    return float(np.quantile(np.abs(one.conditions.rate_per_s[seen]), 0.99))
+
+
+def _highest(one: Session, seen: Mask) -> float:
+    return float(one.conditions.load[seen].max())
+
+
 def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) -> str | None:
     """How the loads that are held out go beyond what was fitted: faster, higher or longer, or by what these lack.
 
@@ -90,13 +132,8 @@ def beyond(sessions: Sequence[Session], scale: Scale, thresholds: Thresholds) ->
     fitted = [(one, one.fitted) for one in sessions if one.fitted.any()]
     judged = [(one, one.judged) for one in sessions if one.judged.any()]
     ways: list[tuple[str, str, float, Callable[[Session, Mask], float]]] = [
-        (
-            "change by up to",
-            "N/s",
-            scale.load_n,
-            lambda one, seen: float(np.quantile(np.abs(one.conditions.rate_per_s[seen]), 0.99)),
-        ),
-        ("reach", "N", scale.load_n, lambda one, seen: float(one.conditions.load[seen].max())),
+        ("change by up to", "N/s", scale.load_n, _fastest),
+        ("reach", "N", scale.load_n, _highest),
         ("go on for", "s", 1.0, lambda one, seen: float(np.ptp(one.conditions.time_s[seen]))),
     ]
     said = []

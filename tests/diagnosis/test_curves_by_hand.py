@@ -217,8 +217,9 @@ SCALE = Scale(800.0, 160.0, MILLIBAR)  # 0.2 mbar/N
 def _file(load: Array, reading: Array, fitted: Any = None, name: str = "file") -> Any:
     kept = np.ones(load.size, dtype=bool) if fitted is None else fitted
     return SimpleNamespace(
-        conditions=SimpleNamespace(load=load), reading=reading, fitted=kept, recording=SimpleNamespace(name=name)
-    )
+        conditions=SimpleNamespace(load=load, rate_per_s=np.gradient(load)), reading=reading, fitted=kept,
+        usable=np.ones(load.size, dtype=bool), recording=SimpleNamespace(name=name),
+    )  # fmt: skip
 
 
 def _line(low: float, high: float, slope: float = 1.0, at: float | None = None) -> Any:
@@ -271,6 +272,14 @@ def test_a_gain_within_files_is_held_against_that_between_them() -> None:
     assert not _told(_line(0.4, 0.5, 0.9), _line(0.8, 1.0, 0.9)).is_trap
     lost = _file(np.linspace(0.4, 0.5, 101), np.full(101, 0.45))
     assert _told(lost, _line(0.8, 1.0, 0.7)) == Ranges()
+
+
+def test_a_gain_between_files_is_none_of_a_curve_where_it_is_beyond_all_within() -> None:
+    """A chord is as steep as its curve somewhere: files on a parabola say nothing, their zeros moved they do."""
+    parts = [np.linspace(low, low + 0.2, 101) for low in (0.0, 0.2, 0.8)]  # the median's slope is not the chord's
+    assert _told(*(_file(load, load + load**2) for load in parts)) == Ranges()
+    moved = _told(*(_file(load, load + load**2 - 1.5 * load.mean()) for load in parts))
+    assert "the zero of reading or load is another in each file" in moved.says[-1]
 
 
 def test_a_trap_stays_one_whatever_the_files_say() -> None:

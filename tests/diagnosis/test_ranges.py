@@ -129,6 +129,31 @@ def test_it_is_named_beside_the_first_that_tells_its_gain_and_only_where_it_is_f
     assert _foreign([("a", 0.1), ("b", 1.0)], replace(Thresholds(), clear=4.0)) == []
 
 
+def _unlike_ones(found: Ranges) -> list[str]:
+    return [said for said in found.says if "goes as high and as fast" in said]
+
+
+@pytest.mark.parametrize(("ratio", "is_told"), [(1.24, False), (0.81, False), (1.26, True), (0.5, True), (3.9, True),
+                                                (4.1, False), (0.26, True), (-0.5, False)])  # fmt: skip
+def test_a_file_of_another_gain_under_a_like_load_is_named(ratio: float, is_told: bool) -> None:
+    """By more than gains that are alike differ by; what is many times as much, or the other way, is named anyway."""
+    load, reading = _proportional(0.0, 800.0)
+    found = _ranges((load, reading), (1.1 * load, ratio * 1.1 * reading))
+    assert bool(_unlike_ones(found)) is is_told
+    assert not is_told or f"run_1 reads {ratio:.3g} times what run_0 does" in _unlike_ones(found)[0]
+
+
+def test_neither_a_curve_nor_a_rate_makes_a_file_another_units() -> None:
+    """Loads that go less high, or more slowly, are not alike; of those that are, only what both have counts."""
+    load, reading = _proportional(0.0, 800.0)
+    slow = 800.0 * np.abs(2.0 * (TIME_S / 8.0 % 1.0) - 1.0)
+    assert _unlike_ones(_ranges((load, reading), (0.7 * load, 2.0 * reading))) == []
+    assert _unlike_ones(_ranges((load, reading), (slow, 2.0 * GAIN_MBAR_PER_N * slow))) == []
+    higher = 1.2 * load
+    curve = [(one, GAIN_MBAR_PER_N * (one + 1.5 * np.maximum(one - 800.0, 0.0))) for one in (load, higher)]
+    assert _unlike_ones(_ranges(*curve)) == []
+
+
 @pytest.mark.parametrize(
     ("higher", "faster", "longer", "said"),
     [
