@@ -115,6 +115,20 @@ def test_a_load_that_pulls_refuses_where_it_is_fitted_and_is_left_out_where_it_i
     assert [(trace.name, trace.recording) for trace in found.traces] == [("good", 0), ("other", 2)]
     (said,) = (one for one in found.limits if one.startswith("left out: pulled:"))
     assert "from -4" in said
+    assert "set it to zero at rest" in said  # what is a cell's zero, and no pull
+
+
+def test_of_a_single_load_cycle_the_cycle_is_to_be_repeated() -> None:
+    once = diagnose([_run("once", 59.0)])
+    assert once.causes == ()
+    assert once.next_experiment is not None
+    assert (once.next_experiment.separates, once.next_experiment.protocol) == ((), "repeat")
+    assert once.next_experiment.says.startswith("repeat the load cycle")
+
+
+def test_of_a_unit_that_is_as_it_should_be_nothing_is_asked_for() -> None:
+    found = diagnose([GOOD, OTHER])
+    assert (found.verdict, found.next_experiment) == ("adequate", None)
 
 
 @pytest.mark.parametrize("hold_out", [True, False])
