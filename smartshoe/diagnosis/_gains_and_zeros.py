@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.arrays import Array, Index
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.diagnosis._evidence import Evidence, Members
 from smartshoe.diagnosis._held_out import own_of, residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
@@ -73,8 +73,8 @@ class _Gained:
 
     @property
     def odds_of_a_change(self) -> float:
-        """-2 log prior odds against one: of one effect among all, at one of the moments of the recordings."""
-        return self.evidence.odds + 2.0 * math.log(MOMENTS * len(self.evidence.given.sessions))
+        """-2 log prior odds against one: of one effect among all, at one of the samples of the recordings."""
+        return self.evidence.odds + 2.0 * math.log(sum(one.reading.size for one in self.evidence.given.sessions))
 
     def searched(self) -> _Gained:
         """The same with the best set beside them."""
@@ -186,17 +186,25 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
 
     for _ in range(MOST_CHANGES * len(fitted)):
         falls = falls_at([_moments_of(one) for one in fitted])
+        falls[~np.concatenate([_may_change(one, _moments_of(one)) for one in _fitted(gained.sessions)])] = -math.inf
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
         one = _fitted(gained.sessions)[k]
         # Between the moments beside it, so that what changes once is not told as two changes around it.
         around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
+        around = around[_may_change(one, around)]
         close = falls_at([around if other is fitted[k] else around[:0] for other in fitted])
         changed = _changed(one, int(around[np.argmax(close)]), zero_sd)
         sessions = [changed if other is one else other for other in gained.sessions]
         gained = _Gained.of(state, sessions, gained.evidence.noise_sd)
     return gained
+
+
+def _may_change(session: Session, at: Index) -> Mask:
+    """(k,) at which samples something may change: what is undone within a load cycle is what that cycle did."""
+    known = session.cycle[[*session.gain_changes, *session.zero_changes]]
+    return np.asarray(np.abs(session.cycle[at][:, None] - known).min(axis=1, initial=2) > 1)
 
 
 def _changed(session: Session, at: int, zero_sd: float) -> Session:
