@@ -4,7 +4,8 @@ Increments of load and reading over equal bins are correlated window by window; 
 that correlates as well as the best. A unit with friction stands still after each reversal, which makes a plateau of
 lags from zero on, and a unit with relaxation answers a corner at once: both give zero. The lags are then a straight
 line over time (an offset and a rate). Last, the line must *earn* its place: load passed through a bank of relaxations,
-powers and stop operators must fit the reading much better on the shifted clock than on the given one.
+powers and stop operators must fit the reading much better on the shifted clock than on the given one, as the load rises
+and as it falls.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def align(view: View) -> tuple[View, Lags]:
     if followed is None:
         return view, UNSEEN
     seen = Lags(followed.places - view.time_s[0], followed.best)
-    line = _lag_line(view, followed)
+    line = _lag_line(view, followed) if _follows(followed, view.thresholds) else None
     if line is None:
         return view, seen
     offset_s, rate = line
@@ -107,8 +108,8 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
         "two_clocks",
         np.ones(len(view.recording), dtype=bool),
         f"load and reading come from two clocks: the reading is {abs(view.offset_s):.2f} s"
-        f" {'late' if view.offset_s >= 0 else 'early'}{course}, at rising and at falling edges alike, more than the"
-        " unit's relaxation explains (record both by one clock)",
+        f" {'late' if view.offset_s >= 0 else 'early'}{course}, more than the unit's relaxation explains"
+        " (record both by one clock)",
     )
 
 
@@ -176,7 +177,7 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
         offered = []
         for offset_s, rate in _lines(places - middle, lags, weights, 0.5 * duration_s):
             ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
-            if np.max(np.abs(ends)) <= least:
+            if np.max(np.abs(ends)) <= least or not _describes(offset_s + rate * (places - middle), lags, given):
                 continue
             shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
             before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
@@ -185,14 +186,13 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
             # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
             # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
             # a constant lag from a relaxation neither way.
-            if agreed and after < before / (1.0 if rate else 1.0 - given.same):
+            if agreed and after.sum() < before.sum() / (1.0 if rate else 1.0 - given.same):
                 return offset_s, rate
-            offered.append((after, offset_s, rate))
-        if before is None or not offered:
-            continue
-        after, offset_s, rate = min(offered)
-        if after < earned * before:
-            return offset_s, rate
+            # At rising and at falling edges alike: load that the unit remembers has a lag for each direction.
+            if np.all(after <= earned * before):
+                offered.append((float(after.sum()), offset_s, rate))
+        if offered:
+            return min(offered)[1:]
     return None
 
 
@@ -222,8 +222,11 @@ def _unanimous(places: Array, lags: Array, offset_s: float, rate: float, thresho
     """
     line = offset_s + rate * places
     far = np.abs(line) > thresholds.clear * thresholds.sensor_lag_s
-    if far.sum() < WINDOWS // 2 or np.mean(lags[far] != 0.0) < 1.0 - thresholds.same:
-        return False
+    return bool(far.sum() >= WINDOWS // 2 and np.mean(lags[far] != 0.0) >= 1.0 - thresholds.same)
+
+
+def _describes(line: Array, lags: Array, thresholds: Thresholds) -> bool:
+    """Whether lags (w,) lie on a ``line`` (w,), but for a share of its longest."""
     return bool(np.median(np.abs(lags - line)) < thresholds.same * np.max(np.abs(line)))
 
 
@@ -320,8 +323,8 @@ def _middle(values: Array, weights: Array) -> float:
 
 
 @on_one_thread
-def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thresholds: Thresholds) -> float:
-    """Mean square of the reading's increments after all that a unit without a second clock might do to the load.
+def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thresholds: Thresholds) -> Array:
+    """(2,) sums over rising and over falling load: squared increments of the reading beyond what a unit may do to it.
 
     Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
     """
@@ -346,7 +349,8 @@ def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thre
     normal = matrix.T @ matrix
     normal[np.diag_indices_from(normal)] += 1e-6
     left = target - matrix @ np.linalg.solve(normal, matrix.T @ target)
-    return float(np.mean(left**2))
+    rising = matrix[:, 0] > 0.0
+    return np.array([np.sum(left[rising] ** 2), np.sum(left[~rising] ** 2)])
 
 
 def _play(load: Array, width: Array) -> Array:

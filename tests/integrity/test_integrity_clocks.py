@@ -46,6 +46,20 @@ def test_a_unit_that_relaxes_by_most_of_its_reading_has_one_clock(tau_s: float, 
     assert (found.clock_offset_s, found.clock_rate) == ((0.0,), (0.0,))
 
 
+@pytest.mark.parametrize("knee", [0.03, 0.1])
+def test_a_reading_that_saturates_in_a_single_cycle_has_one_clock(knee: float) -> None:
+    """Its edges lie at little load, which the load leaves early and comes back to late: a lag for each direction."""
+    time_s = np.arange(0.0, 58.0, 0.05)
+    load = 0.5 - 0.5 * np.cos(np.pi * np.interp(time_s, [4.0, 29.0, 54.0], [0.0, 1.0, 0.0]))
+    single = Recording.from_arrays(
+        time_s=time_s,
+        force_n=800.0 * load + np.random.default_rng(1).normal(0.0, 1.0, time_s.size),
+        pressure_mbar=100.0 * (1.0 - np.exp(-load / knee)),
+    )
+    found = examine([single], Thresholds())
+    assert (found.clock_offset_s, found.clock_rate) == ((0.0,), (0.0,))
+
+
 def test_a_drift_of_the_clock_in_all_recordings_is_one_cause_and_none_is_moved() -> None:
     runs = [staircase(levels, 3.0, 0.1, drift=0.004, seed=levels) for levels in (6, 8, 11)]
     integrity = examine(runs, Thresholds())

@@ -104,6 +104,6 @@ def test_two_clocks_are_said_with_the_lag_and_what_to_do() -> None:
     load = np.interp(TIME_S, *np.array(corners).T)
     kind, said = _said(_pressed(np.interp(TIME_S - 0.35, TIME_S, load) + 1e-3 * NOISE[0], load))
     assert kind == "two_clocks"
-    (late_s,) = re.findall(r"^load and reading come from two clocks: the reading is ([\d.]+) s late, at", said)
+    (late_s,) = re.findall(r"^load and reading come from two clocks: the reading is ([\d.]+) s late, more", said)
     assert float(late_s) == pytest.approx(0.35, abs=0.02)
     assert said.endswith("more than the unit's relaxation explains (record both by one clock)")
