@@ -3,36 +3,46 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
-from numbers import Real
+from dataclasses import Field, dataclass, field, fields, replace
+from itertools import pairwise
+from numbers import Integral, Real
 from typing import Any
 
 from smartshoe.errors import UsageError
 
 
-def threshold(value: Any, unit: str, meaning: str, origin: str) -> Any:
-    """A field of `Thresholds` with its documentation."""
-    return field(default=value, metadata={"unit": unit, "meaning": meaning, "origin": origin})
+def threshold(
+    value: Any, unit: str, meaning: str, origin: str, least: float | None = None, most: float = math.inf
+) -> Any:
+    """A field of `Thresholds` with its documentation: from ``least`` to ``most``, above 0 where there is no least."""
+    documented = {"unit": unit, "meaning": meaning, "origin": origin}
+    return field(default=value, metadata={**documented, "least": least, "most": most})
 
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
     """What a diagnosis decides by. Carried in the result and printed in the page; `described` lists it.
 
-    Raises `UsageError` for what is no number, and for a ``material`` that is no share of full scale up to a half.
+    Raises `UsageError` for what nothing can be decided by: no finite number, one beyond its bounds, a count that is not
+    whole, time constants that do not rise.
     """
 
     material: float = threshold(
-        2e-4, "share of full scale", "smallest error of the reading that counts", "chosen: 0.02 %"
+        2e-4, "share of full scale", "smallest error of the reading that counts", "chosen: 0.02 %", most=0.5
     )
     imperfection: float = threshold(
-        2e-4, "share of full scale", "standard deviation of what any effect adds to a good unit", "0.02 % of full scale"
+        2e-4,
+        "share of full scale",
+        "standard deviation of what any effect adds to a good unit",
+        "0.02 % of full scale",
+        least=0.0,
     )
     departure: float = threshold(
         0.25,
         "share of an effect's size",
         "standard deviation by which a real law departs from an equation of its kind",
         "two simulated worlds: 0.05 to 0.4",
+        least=0.0,
     )
     strength_sd: float = threshold(
         0.03,
@@ -40,12 +50,15 @@ class Thresholds:
         "prior standard deviation of an effect's size, and of a recording's own gain",
         "effects of 0.1 to 10 %",
     )
-    false_name: float = threshold(0.02, "probability", "chance of naming an effect that is not there", "chosen: 2 %")
+    false_name: float = threshold(
+        0.02, "probability", "chance of naming an effect that is not there", "chosen: 2 %", most=1.0
+    )
     unknown_past: float = threshold(
         0.05,
         "share of full scale",
         "load that a unit may remember from before a recording that begins at rest",
         "judgement",
+        least=0.0,
     )
     foreign_zero: float = threshold(
         0.3,
@@ -54,7 +67,7 @@ class Thresholds:
         "judgement",
     )
     zero_sd: float = threshold(
-        4e-4, "share of full scale", "standard deviation of a rest's zero", "load cells: 0.02 % of rating"
+        4e-4, "share of full scale", "standard deviation of a rest's zero", "load cells: 0.02 % of rating", least=0.0
     )
     linear: float = threshold(
         0.01,
@@ -68,6 +81,7 @@ class Thresholds:
         "error that small imperfections of a good unit add up to; "
         "a larger effect is named beside another cause where it is likelier there than not",
         "three effects of 0.08 % each: 0.14 %",
+        least=0.0,
     )
     extrapolates: float = threshold(
         10.0,
@@ -75,15 +89,21 @@ class Thresholds:
         "times by which an effect may be larger on held-out data than on fitted data to be trusted; "
         "times by which a zero's shift may exceed a drift and be of it",
         "an order of magnitude",
+        least=1.0,
     )
     validated: float = threshold(
-        0.5, "standard errors", "gain on recordings left out in turn that an effect must have", "two to one, one-sided"
+        0.5,
+        "standard errors",
+        "gain on recordings left out in turn that an effect must have",
+        "two to one, one-sided",
+        least=0.0,
     )
     foreseen: float = threshold(
         0.25,
         "share of squared error",
         "share of the baseline's squared error, over recordings left out in turn, that an extension must remove",
         "a law of the usual departure",
+        least=0.0,
     )
     alike: float = threshold(
         3.0,
@@ -110,6 +130,7 @@ class Thresholds:
         "per standard deviation of its departure; where no law of it fits; for its likeness to another effect "
         "that is there",
         "logistic regression on the effects in 661 simulated cases of two worlds",
+        least=-math.inf,
     )
     least_confidence: float = threshold(
         0.75, "probability", "confidence from which on a kind is sure", "three to one for being right"
@@ -119,6 +140,7 @@ class Thresholds:
         "log odds",
         "log odds that a kind which is sure, and named, gains by that",
         "1,489 names in two simulated worlds",
+        least=-math.inf,
     )
     still_per_s: float = threshold(
         0.004, "full scales a second", "change of the load below which it is held", "3 N/s on 800 N"
@@ -130,7 +152,11 @@ class Thresholds:
         "one a decade of the protocols",
     )
     held_out_every: int = threshold(
-        3, "load cycles", "one in so many judges and fits nothing, where no recording is held out", "two thirds to fit"
+        3,
+        "load cycles",
+        "one in so many judges and fits nothing, where no recording is held out",
+        "two thirds to fit",
+        least=2,
     )
     # What an experiment can show at all.
     false_alarm: float = threshold(
@@ -138,12 +164,14 @@ class Thresholds:
         "probability",
         "chance that one test finds a fault in a sound recording",
         "ten tests, a thousand recordings",
+        most=1.0,
     )
     faulty_share: float = threshold(
         0.05,
         "share of samples",
         "share of samples beyond which a fault is how the logger works",
         "5 %, as convention has it",
+        most=1.0,
     )
     least_samples: int = threshold(
         100, "samples", "fewest samples that tell anything", "quantiles of 5 % rest on five samples"
@@ -153,29 +181,41 @@ class Thresholds:
         "share of variance",
         "share of the reading's variance that the load must explain",
         "measured sensors: 0.33 and more",
+        most=1.0,
     )
-    clear: float = threshold(2.0, "ratio", "ratio from which on two sizes differ for certain", "judgement")
-    same: float = threshold(0.25, "share", "difference up to which two rates, peaks or gains are alike", "judgement")
+    clear: float = threshold(2.0, "ratio", "ratio from which on two sizes differ for certain", "judgement", least=1.0)
+    same: float = threshold(
+        0.25, "share", "difference up to which two rates, peaks or gains are alike", "judgement", most=0.9
+    )
     standing: float = threshold(
-        0.02, "share of the span", "movement up to which a load, or a reading that is lost, stands still", "judgement"
+        0.02,
+        "share of the span",
+        "movement up to which a load, or a reading that is lost, stands still",
+        "judgement",
+        most=0.5,
     )
     echo_s: float = threshold(
         0.1, "s", "time within which a reading answers a corner of its load", "slowest sensor known"
     )
-    local: int = threshold(64, "samples", "samples over which a local scale is taken", "a median to 15 %")
-    bins: int = threshold(4000, "bins", "bins to which long recordings are thinned to look for lags", "speed")
+    local: int = threshold(64, "samples", "samples over which a local scale is taken", "a median to 15 %", least=4)
+    bins: int = threshold(4000, "bins", "bins to which long recordings are thinned to look for lags", "speed", least=10)
     hold_s: float = threshold(3.0, "s", "shortest hold that shows creep", "the paper's holds of 5 s")
     idle_s: float = threshold(60.0, "s", "shortest rest that shows ageing and recovery", "judgement")
 
     def __post_init__(self) -> None:
         """Refuse what nothing can be decided by."""
         for one in fields(self):
-            given = getattr(self, one.name)
-            for value in given if isinstance(given, tuple) else (given,):
-                if isinstance(value, bool) or not isinstance(value, Real) or math.isnan(value):
-                    raise UsageError(f"{one.name} is {value!r}: give a number ({one.metadata['unit']})")
-        if not 0.0 < self.material <= 0.5:
-            raise UsageError(f"material is {self.material:g}: give a share of full scale up to 0.5, such as 0.0002")
+            given, several = getattr(self, one.name), isinstance(one.default, tuple)
+            for value in given if several and isinstance(given, tuple) else (given,):
+                if not _is_within(value, one):
+                    raise UsageError(f"{one.name} is {value!r}: give a {_asked(one)} ({one.metadata['unit']})")
+        if not isinstance(self.kind_odds, tuple) or len(self.kind_odds) != 5:
+            raise UsageError(f"kind_odds is {self.kind_odds!r}: give a tuple of five numbers (log odds)")
+        rises = isinstance(self.memory_s, tuple) and all(a < b for a, b in pairwise(self.memory_s))
+        if not (self.memory_s and rises):
+            raise UsageError(
+                f"memory_s is {self.memory_s!r}: give a tuple of numbers that rise, such as (0.3, 3.0, 30.0)"
+            )
 
     @property
     def few(self) -> int:
@@ -203,6 +243,27 @@ class Thresholds:
         return self.clear**2 * self.standing
 
 
+def _is_within(value: object, one: Field[Any]) -> bool:
+    if isinstance(value, bool) or not isinstance(value, Integral if isinstance(one.default, int) else Real):
+        return False
+    least, number = one.metadata["least"], float(value)
+    return (
+        math.isfinite(number)
+        and number <= one.metadata["most"]
+        and (number > 0.0 if least is None else number >= least)
+    )
+
+
+def _asked(one: Field[Any]) -> str:
+    """The numbers that a field takes, in words."""
+    least, most = one.metadata["least"], one.metadata["most"]
+    kind = "whole number" if isinstance(one.default, int) else "number"
+    if least == -math.inf:
+        return kind
+    lowest = "above 0" if least is None else f"of at least {least:g}"
+    return f"{kind} {lowest}" + (f" and at most {most:g}" if math.isfinite(most) else "")
+
+
 def decided_by(given: Thresholds | None, material: float | None = None) -> Thresholds:
     """``given`` or the usual, with ``material`` where there is one; `UsageError` for what are no thresholds.
 
@@ -221,7 +282,10 @@ def decided_by(given: Thresholds | None, material: float | None = None) -> Thres
 
 def described(given: Thresholds) -> list[dict[str, Any]]:
     """Name, value, unit, meaning and origin of each."""
-    return [{"name": f.name, "value": getattr(given, f.name), **f.metadata} for f in fields(given)]
+    said = ("unit", "meaning", "origin")
+    return [
+        {"name": f.name, "value": getattr(given, f.name), **{k: f.metadata[k] for k in said}} for f in fields(given)
+    ]
 
 
 def largest_of_noise(count: int, thresholds: Thresholds) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -158,10 +159,42 @@ def test_where_nothing_is_asked_for_the_record_decides_as_it_is() -> None:
     assert decided_by(given_one, 5e-4).imperfection == pytest.approx(0.5 * STANDARD.imperfection)
 
 
-@pytest.mark.parametrize("numbers", [{"standing": float("nan")}, {"memory_s": (0.3, "x")}, {"hold_s": None}])
-def test_numbers_to_decide_by_are_numbers(numbers: dict[str, object]) -> None:
-    with pytest.raises(UsageError, match=f"{next(iter(numbers))} is .*: give a number"):
-        replace(STANDARD, **numbers)
+@pytest.mark.parametrize(
+    ("name", "number", "asked"),
+    [
+        ("standing", float("nan"), "a number above 0 and at most 0.5"),
+        ("hold_s", None, "a number above 0"),
+        ("hold_s", float("inf"), "a number above 0"),
+        ("imperfection", -1e-4, "a number of at least 0"),
+        ("strength_sd", 0.0, "a number above 0"),
+        ("false_name", 0.0, "a number above 0 and at most 1"),
+        ("false_alarm", 1.5, "a number above 0 and at most 1"),
+        ("standing", 0.0, "a number above 0"),
+        ("clear", 0.5, "a number of at least 1"),
+        ("held_out_every", 1, "a whole number of at least 2"),
+        ("least_samples", 0, "a whole number above 0"),
+        ("local", 64.5, "a whole number of at least 4"),
+        ("local", 1, "a whole number"),
+        ("bins", 0, "a whole number"),
+        ("named_odds", "x", r"a number \("),
+        ("memory_s", (0.3, "x"), "a number above 0"),
+        ("memory_s", (0.0, 3.0), "a number above 0"),
+        ("memory_s", (), "a tuple of numbers that rise"),
+        ("memory_s", (3.0, 3.0), "a tuple of numbers that rise"),
+        ("memory_s", 3.0, "a tuple of numbers that rise"),
+        ("kind_odds", (1.0, 2.0), "a tuple of five"),
+    ],
+)
+def test_what_nothing_can_be_decided_by_is_refused(name: str, number: object, asked: str) -> None:
+    with pytest.raises(UsageError, match=f"{name} is .*: give {asked}"):
+        replace(STANDARD, **{name: number})
+
+
+def test_each_number_is_taken_at_its_bounds() -> None:
+    for one in fields(Thresholds):
+        for bound in (one.metadata["least"], one.metadata["most"]):
+            if bound is not None and math.isfinite(bound):
+                assert getattr(replace(STANDARD, **{one.name: bound}), one.name) == bound
 
 
 @pytest.mark.parametrize("given", [3, 0, {}])
