@@ -139,14 +139,14 @@ def _followed(view: View) -> _Followed | None:
     """How late the reading follows, or None where nothing can tell."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
-    if duration_s < given.hold_s or np.ptp(view.load.values) == 0.0 or np.ptp(view.reading.values) == 0.0:
+    if duration_s < given.hold_s:
         return None
     bins = int(min(given.bins, view.time_s.size // 2))
     width_s = duration_s / bins
     grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
     load = _binned(view.time_s, five_point_median(view.load.values), grid, width_s)
     reading = _binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
-    if _is_one_sine(load, given):
+    if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
     for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
         smooth_s = echoes * given.echo_s

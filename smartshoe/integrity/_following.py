@@ -56,7 +56,10 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
 
 
 def _followed_share(view: View) -> tuple[float, float]:
-    """Share of the reading's variance about a straight line in time that load explains; correlation of increments."""
+    """Share of the reading's variance about a straight line in time that load explains; correlation of increments.
+
+    About its mean where the load is itself such a line.
+    """
     n = view.reading.values.size
     width = max(1, n // view.thresholds.bins)
     count = n // width
@@ -64,11 +67,10 @@ def _followed_share(view: View) -> tuple[float, float]:
     reading = np.median(view.reading.values[: count * width].reshape(count, width), axis=1)
     curve = np.interp(load, view.curve[0], view.curve[1])
     columns = np.concatenate([_of_load(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1)
-    trend = np.linspace(-1.0, 1.0, count)
-    base = np.stack([np.ones(count), trend], axis=1)
-    matrix = np.concatenate([base, columns], axis=1)
-    left_base = reading - base @ np.linalg.lstsq(base, reading, rcond=None)[0]
-    left = reading - matrix @ np.linalg.lstsq(matrix, reading, rcond=None)[0]
+    base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
+    if float(np.std(_beyond(load, base))) < view.thresholds.standing * float(np.ptp(load)):
+        base = base[:, :1]
+    left_base, left = _beyond(reading, base), _beyond(reading, np.concatenate([base, columns], axis=1))
     total = float(np.dot(left_base, left_base))
     if total == 0.0:
         return 0.0, 0.0
@@ -77,6 +79,12 @@ def _followed_share(view: View) -> tuple[float, float]:
         for stride_s in view.thresholds.memory_s
     )
     return 1.0 - float(np.dot(left, left)) / total, together
+
+
+def _beyond(signal: Array, columns: Array) -> Array:
+    """(n,) what ``columns`` (n, k) leave of a ``signal`` (n,)."""
+    out: Array = signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
+    return out
 
 
 def _moves_with(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:

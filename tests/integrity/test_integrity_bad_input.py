@@ -49,6 +49,29 @@ def test_a_channel_that_is_constant_is_refused(load: float, reading: float) -> N
     assert ("the reading is constant" if load else "the load covers 0 N only") in found.refusals[0]
 
 
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_load_that_stands_but_for_a_spike_is_refused(samples: int) -> None:
+    load_n = np.full(TIME_S.size, 100.0)
+    load_n[1000 : 1000 + samples] = 500.0
+    found = examine([_recording(force_n=load_n, pressure_mbar=READING)])
+    assert "the reading does not follow the load" in found.refusals[0]
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 3.0])
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_a_single_ramp_is_followed(rest_s: float, noise: float) -> None:
+    """All that such a load explains is a trend."""
+    share = np.clip((TIME_S - rest_s) / (TIME_S[-1] - rest_s), 0.0, 1.0)
+    reading = 100.0 * (share + noise * np.random.default_rng(3).standard_normal(share.size))
+    load_n = 800.0 * share + 0.2 * np.random.default_rng(4).standard_normal(share.size)
+    assert examine([_recording(force_n=load_n, pressure_mbar=reading)]).refusals == ()
+
+
+def test_noise_does_not_follow_a_single_ramp() -> None:
+    found = examine([_recording(force_n=TIME_S, pressure_mbar=np.random.default_rng(3).standard_normal(TIME_S.size))])
+    assert "the reading does not follow the load" in found.refusals[0]
+
+
 def test_thousands_of_short_recordings_are_refused_each_and_a_long_one_among_them_stays() -> None:
     whole = _recording(force_n=LOAD_N, pressure_mbar=READING)
     found = examine([*(whole.taken(slice(k, k + 60)) for k in range(2000)), whole])
