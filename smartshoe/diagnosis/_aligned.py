@@ -14,7 +14,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity import Integrity, OneClock
 from smartshoe.models.effects import Effect, effect
-from smartshoe.recording import Recording
+from smartshoe.recording import Channel, Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +73,16 @@ def as_they_follow(recordings: Sequence[Recording], shared: OneClock | None) -> 
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:
+    """The recording with its reading moved, missing where it would be made by a missing one; what of it is usable."""
     time_s = recording.time_s
     middle = 0.5 * (time_s[0] + time_s[-1])
     source_s = time_s + offset_s + rate * (time_s - middle)
     sensor = recording.sensor
-    values = np.interp(source_s, time_s, sensor.values)
     inside = (source_s >= time_s[0]) & (source_s <= time_s[-1])
-    nearest = np.clip(np.searchsorted(time_s, source_s), 0, time_s.size - 1)
-    return recording.with_channel(replace(sensor, values=values, missing=None)), inside & usable[nearest]
+    before, after = (np.searchsorted(time_s, source_s, side) for side in ("right", "left"))
+    before, after = np.maximum(before - 1, 0), np.minimum(after, time_s.size - 1)
+    there, usable = (inside & mask[before] & mask[after] for mask in (sensor.present, usable))
+    moved = Channel.from_values(
+        sensor.name, np.where(there, np.interp(source_s, time_s, sensor.values), np.nan), sensor.unit
+    )
+    return recording.with_channel(replace(sensor, values=moved.values, missing=moved.missing)), usable

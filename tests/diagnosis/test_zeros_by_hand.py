@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from smartshoe.diagnosis import Thresholds, _noise_kinds, _zero
-from smartshoe.diagnosis._aligned import _on_one_clock
+from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, shift_of, zeros_of
+from smartshoe.integrity import OneClock
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.recording import Recording
+from smartshoe.recording import Channel, Recording
 from smartshoe.units import MILLIBAR, VOLT
 
 Array = NDArray[np.float64]
@@ -256,19 +257,29 @@ def _run(name: str = "run", size: int = 400) -> Recording:
 
 
 def test_a_reading_is_moved_by_its_lag_about_the_middle_and_masked_where_none_was_taken() -> None:
-    """Its clock shows the middle late by the lag, and runs fast by the rate."""
+    """Its clock shows the middle late by the lag, and runs fast by the rate; a wild sample lies between two others."""
     kept = np.ones(400, dtype=bool)
     kept[200] = False
+    run = _run()
+    wild = replace(run.sensor, values=np.where(kept, run.sensor.values, 1e6))
     for offset_s, rate in ((0.52, 0.0), (-0.52, 0.0), (0.2, 0.01), (-0.2, -0.02)):
-        moved, usable = _on_one_clock(_run(), kept, offset_s, rate)
+        moved, usable = _on_one_clock(run.with_channel(wild), kept, offset_s, rate)
         middle = 0.5 * (T[0] + T[-1])
         source = T + offset_s + rate * (T - middle)
         inside = (source >= 0.0) & (source <= T[-1])
-        assert moved.sensor.values[inside] == pytest.approx(10.0 * source[inside])
-        nearest = [int(np.flatnonzero(at - 1e-12 <= T)[0]) if at <= T[-1] else 399 for at in source]
-        expected = inside & kept[nearest]
-        assert list(np.flatnonzero(usable != expected)) == []
-        assert list(moved.force_n) == list(_run().force_n)
+        assert moved.sensor.values[usable] == pytest.approx(10.0 * source[usable])
+        assert list(usable) == list(inside & (np.abs(source - T[200]) >= T[1] - 1e-9))
+        assert list(moved.sensor.present) == list(inside)
+        assert list(moved.force_n) == list(run.force_n)
+
+
+def test_what_is_missing_stays_so_where_a_reading_is_moved() -> None:
+    run = _run()
+    holed = Channel.from_values("pressure", np.where(np.arange(400) == 200, np.nan, run.sensor.values), MILLIBAR)
+    (moved,) = as_they_follow([run.with_channel(replace(holed, role="sensor"))], OneClock(0.52, 0.0))
+    there = moved.sensor.present
+    assert moved.sensor.values[there] == pytest.approx(10.0 * (T[there] + 0.52))
+    assert list(np.flatnonzero(~there[:380])) == [189, 190]
 
 
 # -- kinds of noise ---------------------------------------------------------------------------------------------------
