@@ -294,13 +294,7 @@ def _session(
     reading = bridged(time_s, reading, good)
     load_n = bridged(time_s, load_n, load_present)
     known = load_present
-    extra = {}
-    temperature = _named(recording, "temperature")
-    if temperature is not None:
-        extra["temperature_k"] = bridged(time_s, temperature.si, temperature.present)
-    neighbour = _neighbour(recording)
-    if neighbour is not None:
-        extra["neighbour"] = neighbour.in_unit(scale.unit) / abs(scale.reading)
+    extra = _logged_beside(recording, time_s, scale)
     if not recording.is_uniform:
         even = step_s * np.arange(int(time_s[-1] / step_s) + 1)
         nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
@@ -408,16 +402,23 @@ def smoothed(signal: Array, weights: Array, factor: int) -> Array:
     return np.convolve(np.concatenate([left, signal, right]), weights, "valid")[::factor]
 
 
-def _named(recording: Recording, name: str) -> Channel | None:
-    found = recording.channels.get(name)
-    return found if found is not None and found.role == "auxiliary" else None
+def _logged_beside(recording: Recording, time_s: Array, scale: Scale) -> dict[str, Array]:
+    """Temperature and neighbour (n,), as conditions have them, of which any sample is there."""
+    found = {}
+    temperature, neighbour = recording.channels.get("temperature"), _neighbour(recording)
+    if temperature is not None and temperature.role == "auxiliary" and temperature.present.any():
+        found["temperature_k"] = bridged(time_s, temperature.si, temperature.present)
+    if neighbour is not None:
+        share = neighbour.in_unit(scale.unit) / abs(scale.reading)
+        found["neighbour"] = bridged(time_s, share, neighbour.present)
+    return found
 
 
 def _neighbour(recording: Recording) -> Channel | None:
     """Another unit's reading beside the one that is diagnosed."""
     quantity = recording.sensor.unit.quantity
     others = [c for c in recording.of_role("auxiliary") if c.unit.quantity == quantity and c.name != "reference"]
-    return others[0] if others else None
+    return next((one for one in others if one.present.any()), None)
 
 
 def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:

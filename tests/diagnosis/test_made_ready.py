@@ -19,6 +19,7 @@ from smartshoe.diagnosis._procedure import _without
 from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
 from smartshoe.diagnosis._session import (
     Scale,
+    Session,
     at_full_rate,
     full_scale,
     kernel,
@@ -264,6 +265,33 @@ def test_other_channels_go_along(  # a temperature from its first value on, a ne
     assert at.neighbour.max() == pytest.approx(35.0 / abs(scale.reading), rel=0.03)
     (plain,), _ = prepared(pressed(load))
     assert (plain.conditions.temperature_k, plain.conditions.neighbour) == (None, None)
+
+
+def test_other_channels_are_bridged_where_samples_are_missing_and_are_none_where_all_are() -> None:
+    load = triangles()
+    time_s = STEP_S * np.arange(load.size)
+    gone = (time_s > 4.0) & (time_s < 5.0)
+    missing = np.full(load.size, np.nan)
+
+    def conditions(temperature_k: Array, neighbour_mbar: Array) -> tuple[Session, float]:
+        run = Recording.from_arrays(
+            time_s=time_s,
+            force_n=800.0 * load,
+            pressure_mbar=140.0 * load,
+            pressure_2_mbar=neighbour_mbar,
+            temperature_k=temperature_k,
+        )
+        (session,), scale = prepared(run)
+        return session, abs(scale.reading)
+
+    session, full = conditions(np.where(gone, np.nan, 293.0 + time_s), np.where(gone, np.nan, 20.0 + time_s))
+    at = session.conditions
+    assert at.temperature_k == pytest.approx(at.time_s, abs=1e-3)
+    assert at.neighbour == pytest.approx((20.0 + at.time_s) / full, abs=1e-3)
+    assert logged_channels([session]) == {"temperature", "neighbour"}
+    none, _ = conditions(missing, missing)
+    assert (none.conditions.temperature_k, none.conditions.neighbour) == (None, None)
+    assert logged_channels([none]) == set()
 
 
 def test_temperatures_of_all_recordings_are_on_one_scale() -> None:
