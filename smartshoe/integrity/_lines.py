@@ -89,11 +89,12 @@ def _quiet_stretches(view: View) -> list[tuple[int, int]]:
     quiet = np.zeros(count, dtype=bool)
     quiet[1:-1] = still[1:] & still[:-1]
     starts, stops = runs_of(quiet)
+    # A block is as long as a sensor's lag: in the first of a stretch the reading may still follow the move before it.
     return [(int(a + 1) * block, int(b) * block) for a, b in zip(starts, stops, strict=True) if b - a > given.few]
 
 
 def _residual(view: View, bad: Mask, stretches: list[tuple[int, int]]) -> tuple[Array, Array]:
-    """Reading less a cubic in each stretch under a Hann window, 0 elsewhere; and the window (m,)."""
+    """Reading less a fifth-degree polynomial in each stretch under a Hann window, 0 elsewhere; and the window (m,)."""
     y = view.reading.values
     limit = view.reading.largest * view.reading.noise + view.thresholds.clear * view.reading.step
     residual, weight = np.zeros(y.size), np.zeros(y.size)
