@@ -45,7 +45,7 @@ def held(view: View, bad: Mask) -> Mask:
     starts, stops = runs_of(same)  # samples starts..stops, stops included
     if starts.size == 0 or view.span == 0.0:
         return at
-    log_chance = _log_chance(view, starts, stops)
+    log_chance = _log_chance(view, bad, starts, stops)
     sure = log_chance < _rarely_honest(log_chance, y.size, view.thresholds)
     sure |= _caught_up(view, starts, stops)
     for first, last in zip(starts[sure], stops[sure], strict=True):
@@ -67,7 +67,7 @@ def _rarely_honest(log_chance: Array, count: int, thresholds: Thresholds) -> flo
     return float(np.log(max(thresholds.false_alarm, often) / count))
 
 
-def _log_chance(view: View, starts: Index, stops: Index) -> Array:
+def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     """(runs,) upper bound of the log chance that honest readings repeat so."""
     from scipy.special import erf
 
@@ -83,7 +83,7 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     rail = (y[starts] == y.min()) | (y[starts] == y.max())
     noisy = (least > toggling(given) * step) & ~rail & _alternates(y, starts, stops, given)
     within = np.ones(starts.size)
-    within[noisy] = erf(step[noisy] / (np.sqrt(8.0) * least[noisy]))
+    within[noisy] = erf(np.maximum(step[noisy], _coincident_step(view, bad)) / (np.sqrt(8.0) * least[noisy]))
     within[noisy] = np.maximum(within[noisy], _common(y, starts[noisy], stops[noisy], given.local // 2))
     motion = _motion(view, starts, stops, step)
     beyond = np.maximum(0.5 * (motion * repeats - step), 0.0)
@@ -92,6 +92,19 @@ def _log_chance(view: View, starts: Index, stops: Index) -> Array:
     width = np.hypot(noise, UNIFORM_SD * step)
     out: Array = repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
     return out
+
+
+def _coincident_step(view: View, bad: Mask) -> float:
+    """The grid's step by which noise brings readings that lie a few apart to the same value, each held one once.
+
+    A grid that was calibrated or averaged afterwards is written with finer differences, and still repeats itself.
+    """
+    y = view.reading.values
+    taken = ~bad & (np.diff(y, prepend=np.nan) != 0.0) & (y > y.min()) & (y < y.max()) & (view.reading.noise > 0.0)
+    values, density = y[taken], 1.0 / (np.sqrt(4.0 * np.pi) * view.reading.noise[taken])
+    lags = range(2, view.thresholds.few + 1)
+    honest = sum(float(density[lag:].sum()) for lag in lags)
+    return sum(int(np.count_nonzero(values[lag:] == values[:-lag])) for lag in lags) / honest if honest else 0.0
 
 
 def _noise_beside(y: Array, starts: Index, stops: Index, beside: int) -> Array:

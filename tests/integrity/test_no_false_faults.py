@@ -77,6 +77,21 @@ def test_readings_on_a_lattice_in_the_lower_of_two_ranges_are_not_held(seed, swi
     assert "held_samples" not in kinds(examine([with_reading(recording, noisy)]))
 
 
+@pytest.mark.parametrize("is_held", [False, True])
+@FEW
+@given(SEEDS, st.floats(3.0, 30.0))
+def test_noise_comes_back_to_the_steps_of_a_lattice_however_finely_they_are_written(is_held, seed, steps):
+    """Of 16 bits calibrated by a temperature that wanders, written to more digits; a logger that holds is still one."""
+    recording = recorded(static_protocol((100.0, 500.0, 800.0)), seed, 0.2)
+    rng = np.random.default_rng(seed)
+    grid_mbar = 0.2 / steps
+    reading = np.rint(recording.sensor.values / grid_mbar) * grid_mbar + 1e-6 * rng.integers(0, 3, len(recording))
+    if is_held:
+        for start in rng.integers(1, reading.size - 5, reading.size // 100):
+            reading[start : start + 4] = reading[start - 1]
+    assert ("held_samples" in kinds(examine([with_reading(recording, reading)]))) is is_held
+
+
 @FEW
 @given(SEEDS, st.floats(0.05, 0.3))
 def test_samples_taken_early_or_late_are_no_spikes(seed, jitter_s):
