@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from smartshoe.errors import FormatError, InputError
+from smartshoe.recording import split_column
+from smartshoe.units import ONE, find_unit
 
 _BOMS = (
     (b"\xef\xbb\xbf", "utf-8-sig"),
@@ -16,6 +18,8 @@ _BOMS = (
     (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )
+_BRACKETED = re.compile(r"(.*?)\s*[\[(（]([^\[\]()（）]*)[\])）]\s*")
+_AFTER_COMMA = re.compile(r"(.*\S)\s*,\s*([^,\s]+)\s*")
 _HIGH_RUNS = re.compile(rb"[\x80-\xff]+")
 
 
@@ -114,3 +118,26 @@ def even_rows(path: Path, rows: list[list[str]], lines: Sequence[int], width: in
             )
         even.append(row if len(row) == width else row[:width])
     return even
+
+
+def bracketed(title: str) -> tuple[str, str]:
+    """A title as name and unit's text: ``Time[s]``, ``Force (N)``, ``Force, N``; the whole title and '' without one."""
+    match = _BRACKETED.fullmatch(title)
+    if match and match[1]:
+        return match[1], match[2].strip()
+    match = _AFTER_COMMA.fullmatch(title)
+    return (match[1], match[2]) if match and find_unit(match[2]) is not None else (title, "")
+
+
+def plain_title(title: str) -> tuple[str, str]:
+    """A plain table's title as name and unit's symbol: ``force_n``, or with a unit that is known as `bracketed` has it.
+
+    A number in brackets counts columns; what else stands there is of the name, which is the user's own.
+    """
+    name, unit = split_column(title)
+    if unit is None:
+        name, text = bracketed(title)
+        unit = find_unit(text)
+        if unit is None or unit == ONE:
+            return title, ""
+    return name, unit.symbol

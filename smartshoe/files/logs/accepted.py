@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 import numpy as np
 
 from smartshoe.errors import InputError, UsageError
-from smartshoe.recording import TIME_NAME, Recording, split_column
+from smartshoe.recording import TIME_NAME, Recording
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,6 +57,7 @@ def _is_frame(given: Any) -> bool:
 
 def _from_frame(frame: pd.DataFrame, argument: str) -> Recording:
     from smartshoe.files.logs._sheet import Column, Sheet, require_sound
+    from smartshoe.files.logs._text import plain_title
     from smartshoe.files.logs.columns import recording_from
 
     if f"{TIME_NAME}_s" not in frame.columns and frame.index.name == f"{TIME_NAME}_s":
@@ -69,8 +70,8 @@ def _from_frame(frame: pd.DataFrame, argument: str) -> Recording:
         )
     columns = []
     for label in frame.columns:
-        name, unit = split_column(str(label))
-        columns.append(Column(name, unit.symbol if unit else "", _numbers(frame, label, argument), label=str(label)))
+        name, unit = plain_title(str(label))
+        columns.append(Column(name, unit, _numbers(frame, label, argument), label=str(label)))
     sheet = Sheet(Path(argument), "plain", columns)
     require_sound(sheet)
     return replace(recording_from(sheet, name="recording"), source="")

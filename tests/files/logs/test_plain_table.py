@@ -5,12 +5,14 @@ import string
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import smartshoe
-from smartshoe.errors import FormatError, InputError, MissingChannelError, UsageError
+from smartshoe.errors import FormatError, InputError, MissingChannelError, UnitError, UsageError
+from smartshoe.files.logs.accepted import recording_of
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import unit
 
@@ -129,6 +131,29 @@ def test_faults_name_file_and_line(tmp_path: Path, text: str) -> None:
     assert "walk.csv" in str(error.value)
     assert "\n" not in str(error.value)
     assert error.value.exit_status == 3
+
+
+@pytest.mark.parametrize(
+    ("title", "newtons"),
+    [("Force (kgf)", 9.80665), ("Force [kN]", 1e3), ("Load (lbf)", 4.4482216152605), ('"Force, N"', 1.0)],
+)
+def test_a_unit_in_brackets_or_after_a_comma_holds_beside_the_tables_own_titles(
+    tmp_path: Path, title: str, newtons: float
+) -> None:
+    path = table(tmp_path, f"time_s,{title},pressure_mbar\n0,0,1\n1,2,3\n2,4,5\n")
+    bare = title.strip('"')
+    for force in (None, bare, "2"):
+        assert smartshoe.read(path, force=force).force_n == pytest.approx(newtons * np.array([0.0, 2.0, 4.0]))
+    framed = pd.DataFrame({"time_s": [0.0, 1.0, 2.0], bare: [0.0, 2.0, 4.0], "pressure_mbar": [1.0, 3.0, 5.0]})
+    assert recording_of(framed).force_n == pytest.approx(newtons * np.array([0.0, 2.0, 4.0]))
+    with pytest.raises(UnitError, match="by the file, --force says daN: leave the unit out"):
+        smartshoe.read(path, force=f"{bare}[daN]")
+
+
+@pytest.mark.parametrize("title", ["Force (peak)", "Sensor (1)", "Sensor, left"])
+def test_what_else_stands_in_brackets_is_of_the_name(tmp_path: Path, title: str) -> None:
+    path = table(tmp_path, f'time_s,"{title}",pressure_mbar\n0,0,1\n1,2,3\n')
+    assert list(smartshoe.read(path).channels) == [title, "pressure"]
 
 
 def test_missing_runs_and_infinities_become_missing_samples(tmp_path: Path) -> None:

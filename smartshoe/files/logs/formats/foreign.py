@@ -14,14 +14,13 @@ from smartshoe.files.gate import require_columns
 from smartshoe.files.logs._moments import is_moment, seconds_of
 from smartshoe.files.logs._numbers import is_missing, is_number, numbers_of
 from smartshoe.files.logs._sheet import Column, Format, Sheet
-from smartshoe.files.logs._text import even_rows, is_text, read_lines, split_cells
+from smartshoe.files.logs._text import bracketed, even_rows, is_text, read_lines, split_cells
 from smartshoe.recording import split_column
 from smartshoe.units import ONE, find_unit
 
 _DELIMITERS = ("\t", ";", ",", None)  # None: any run of blanks
 _SAMPLE_LINES = 200
 _LEAST_SCORE = 0.2  # share of cells that must be numbers for text to be a table
-_BRACKETED = re.compile(r"(.*?)\s*[\[(（]([^\[\]()（）]*)[\])）]\s*")
 _AFTER_SLASH = re.compile(r"(.*\S)\s*/\s*([^/\s]+)")
 
 
@@ -58,10 +57,10 @@ def _delimiter(path: Path, lines: Sequence[str]) -> tuple[str | None, list[list[
 
 
 def _title(text: str) -> tuple[str, str]:
-    """A header's cell as name and unit: ``Time[s]``, ``Force (N)``, ``F/N``, ``P_bar``."""
-    match = _BRACKETED.fullmatch(text)
-    if match and match[1]:
-        return match[1], match[2].strip()
+    """A header's cell as name and unit: ``Time[s]``, ``Force (N)``, ``Force, N``, ``F/N``, ``P_bar``."""
+    name, unit_text = bracketed(text)
+    if unit_text or name != text:
+        return name, unit_text
     match = _AFTER_SLASH.fullmatch(text)
     if match and find_unit(match[2]) is not None:
         return match[1], match[2]

@@ -18,7 +18,7 @@ from smartshoe.files.gate import require_columns
 from smartshoe.files.logs._moments import is_moment
 from smartshoe.files.logs._numbers import is_missing, numbers_of
 from smartshoe.files.logs._sheet import Column, Format, Sheet
-from smartshoe.files.logs._text import head_lines, is_text, read_lines
+from smartshoe.files.logs._text import head_lines, is_text, plain_title, read_lines
 from smartshoe.files.logs.columns import roles_of
 from smartshoe.recording import Recording, Role, column_name, split_column
 
@@ -194,9 +194,9 @@ def read(path: Path) -> Sheet:
     }
     columns = []
     for index, cell in enumerate(header):
-        name, unit = split_column(cell)
+        name, unit = plain_title(cell)
         role_of_column = _ROLES[roles[cell]] if cell in roles else None
-        columns.append(Column(name, unit.symbol if unit else "", values[:, index], role_of_column, label=cell))
+        columns.append(Column(name, unit, values[:, index], role_of_column, label=cell))
     return Sheet(
         path,
         "plain",
