@@ -303,8 +303,10 @@ class Recording(Summarised):
         found = self.sensors
         if len(found) != 1:
             what = "no sensor reading" if not found else f"{len(found)} readings ({', '.join(c.name for c in found)})"
+            likely = [one.name for one in found or self.of_role("auxiliary")]
+            example = f", for example --sensor '{likely[0]}'" if likely else ""
             raise MissingChannelError(
-                f"{self.label} has {what}; name one column with --sensor, for example --sensor 'pressure[mbar]'"
+                f"{self.label} has {what}; name one column with --sensor{example}"
                 f" (columns: {first_names(list(self.channels))})"
             )
         return found[0]

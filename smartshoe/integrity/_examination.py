@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.display import first_names
 from smartshoe.errors import InputError
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
 from smartshoe.integrity._dropouts import dropouts
@@ -149,21 +150,19 @@ def _examined(tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE) ->
 
 def _lacking(recording: Recording) -> str | None:
     """Why there is no pair of load and reading, or None."""
+    others = first_names([one.name for one in recording.of_role("auxiliary")])
+    among = f" (columns: {others})" if others else ""
     if not recording.of_role("load"):
         commanded = recording.of_role("command")
         said = f" ({commanded[0].name} is what was asked for, not what was measured)" if commanded else ""
         return (
             f"there is no reference load{said}: without it an error of the unit cannot be told from the load; name its"
-            " column with --force"
+            f" column with --force{among}"
         )
-    count = len(recording.sensors)
-    if count == 1:
-        return None
-    if count:
-        return f"there are {count} readings: name one with --sensor"
-    others = ", ".join(one.name for one in recording.of_role("auxiliary"))
-    among = f" (columns: {others})" if others else ""
-    return f"there is no reading: name its column with --sensor{among}"
+    readings = [one.name for one in recording.sensors]
+    if len(readings) > 1:
+        return f"there are {len(readings)} readings ({first_names(readings)}): name one with --sensor"
+    return None if readings else f"there is no reading: name its column with --sensor{among}"
 
 
 def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> View | None:

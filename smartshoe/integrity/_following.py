@@ -46,7 +46,7 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
     if at[-1] < -view.thresholds.same * at[0]:
         says = (
             f"the load is negative in compression (it runs from {at[0]:.4g} to {at[-1]:.4g} N): turn its sign,"
-            " compression is positive"
+            " compression is positive (a minus before the column does so: --force '-COLUMN')"
         )
         yield Finding("wrong_sign", whole, says, "fatal", True, says)
     elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD:

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import diagnose
+from smartshoe.errors import MissingChannelError
 from smartshoe.integrity import examine
 from smartshoe.recording import Recording
 
@@ -25,6 +26,15 @@ def _recording(**columns: Array) -> Recording:
 def test_a_load_that_is_only_commanded_is_no_reference() -> None:
     found = examine([_recording(command_n=LOAD_N, pressure_mbar=READING)])
     assert "command is what was asked for, not what was measured" in found.refusals[0]
+
+
+def test_what_is_asked_for_is_chosen_from_the_columns_that_are_there() -> None:
+    loadless = _recording(pressure_mbar=READING, left_mv=LOAD_N, right_mv=LOAD_N)
+    assert examine([loadless]).refusals[0].endswith("name its column with --force (columns: left, right)")
+    with pytest.raises(MissingChannelError, match=r"--sensor, for example --sensor 'left' \(columns: left, force\)"):
+        _ = _recording(left_mv=READING, force_n=LOAD_N).sensor
+    both = examine([_recording(force_n=LOAD_N, left_toe_mbar=READING, left_heel_mbar=READING)])
+    assert both.refusals[0].endswith("there are 2 readings (left_toe, left_heel): name one with --sensor")
 
 
 def test_a_load_that_is_negative_in_compression_is_told_as_such() -> None:
