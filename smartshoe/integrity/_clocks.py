@@ -18,6 +18,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding, OneClock
+from smartshoe.integrity._following import of_load
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -329,18 +330,13 @@ def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thre
     Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
     """
     from scipy.ndimage import gaussian_filter1d
-    from scipy.signal import lfilter
 
     step_s = float(grid[1] - grid[0])
-    f = (load - load.min()) / np.ptp(load)
-    columns = [f, f**2, f**3]
-    memory_s = np.geomspace(thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1], 8)
-    for tau_s in memory_s:  # two and a half a decade
-        keep = float(np.exp(-step_s / tau_s))
-        columns.append(lfilter([1.0 - keep], [1.0, -keep], f, zi=[keep * f[0]])[0])
-    columns += list(_play(f, thresholds.standing * OCTAVES))
+    shortest_s, longest_s = thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1]
+    viscous = of_load(load, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
+    rubbed = _play(viscous[:, 0], thresholds.standing * OCTAVES)
     smooth = max(smooth_s / step_s, 1.0)
-    matrix = gaussian_filter1d(np.stack(columns, axis=1), smooth, axis=0, order=1)
+    matrix = gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1)
     target = gaussian_filter1d(reading, smooth, order=1)
     moving = np.abs(matrix[:, 0]) > thresholds.faulty_share * np.max(np.abs(matrix[:, 0]))
     limit = largest_of_noise(grid.size, thresholds) * float(np.median(np.abs(target[moving])))
@@ -354,11 +350,11 @@ def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thre
 
 
 def _play(load: Array, width: Array) -> Array:
-    """(widths, n) play operators of the load, each of one width."""
+    """(n, widths) play operators of the load, each of one width."""
     out = np.empty((load.size, width.size))
     state = np.full(width.size, load[0])
     low, high = load[:, None] - width, load[:, None] + width
     for k in range(load.size):
         state = np.minimum(np.maximum(state, low[k]), high[k])
         out[k] = state
-    return out.T
+    return out

@@ -66,7 +66,7 @@ def _followed_share(view: View) -> tuple[float, float]:
     load = view.load.values[: count * width].reshape(count, width).mean(axis=1)
     reading = np.median(view.reading.values[: count * width].reshape(count, width), axis=1)
     curve = np.interp(load, view.curve[0], view.curve[1])
-    columns = np.concatenate([_of_load(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1)
+    columns = np.concatenate([of_load(load, width * view.step_s, view.thresholds.memory_s), curve[:, None]], axis=1)
     base = np.stack([np.ones(count), np.linspace(-1.0, 1.0, count)], axis=1)
     if float(np.std(_beyond(load, base))) < view.thresholds.standing * float(np.ptp(load)):
         base = base[:, :1]
@@ -100,8 +100,8 @@ def _moves_with(load: Array, reading: Array, stride: float, thresholds: Threshol
     return float(np.dot(d_load, d_reading) / size - thresholds.clear / np.sqrt(load.size / apart))
 
 
-def _of_load(load: Array, step_s: float, time_constants_s: Sequence[float]) -> Array:
-    """(n, 6) load, its powers and its low passes."""
+def of_load(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
+    """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
     from scipy.signal import lfilter
 
     f = (load - load.min()) / np.ptp(load)
