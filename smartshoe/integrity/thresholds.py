@@ -96,7 +96,7 @@ class Thresholds:
         "standard errors",
         "gain on recordings left out in turn that an effect must have",
         "two to one, one-sided",
-        least=0.0,
+        least=-math.inf,
     )
     foreseen: float = threshold(
         0.25,
