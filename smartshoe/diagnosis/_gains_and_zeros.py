@@ -74,7 +74,7 @@ class _Gained:
     @property
     def odds_of_a_change(self) -> float:
         """-2 log prior odds against one: of one effect among all, at one of the samples of the recordings."""
-        return self.evidence.odds + 2.0 * math.log(sum(one.reading.size for one in self.evidence.given.sessions))
+        return self.evidence.odds + 2.0 * math.log(MOMENTS * len(self.evidence.given.sessions))
 
     def searched(self) -> _Gained:
         """The same with the best set beside them."""

@@ -79,17 +79,13 @@ def names_of(
         return larger
     if larger:
         largest = max(larger, key=lambda one: one.member.size)
-        if _may_be(probability_of_kind(largest.member, left, thresholds), thresholds):
+        kind = probability_of_kind(largest.member, left, thresholds)
+        if kind > thresholds.equivalent_odds * (1.0 - kind):
             return (_doubted(largest),)
     if alone is None:
         return ()
-    by_itself = (one for one in likely if one.member.effect.kind == alone.kind and _may_be(one.kind, thresholds))
+    by_itself = (one for one in likely if one.member.effect.kind == alone.kind)
     return tuple(_doubted(one) for one in by_itself if one.member.size > thresholds.tolerable)
-
-
-def _may_be(probability: float, thresholds: Thresholds) -> bool:
-    """Whether what has this probability cannot be ruled out."""
-    return probability > thresholds.equivalent_odds * (1.0 - probability)
 
 
 def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
