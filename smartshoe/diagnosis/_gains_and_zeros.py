@@ -204,7 +204,7 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
 def _may_change(session: Session, at: Index) -> Mask:
     """(k,) at which samples something may change: what is undone within a load cycle is what that cycle did."""
     known = session.cycle[[*session.gain_changes, *session.zero_changes]]
-    return np.asarray(np.abs(session.cycle[at][:, None] - known).min(axis=1, initial=2) > 1)
+    return np.isin(session.cycle[at], known, invert=True)
 
 
 def _changed(session: Session, at: int, zero_sd: float) -> Session:
