@@ -11,8 +11,7 @@ from smartshoe.calibration._core_inverse import CoreInverse
 from smartshoe.calibration._filter import ForceFilter
 from smartshoe.calibration._noise_limit import MOST, NoiseLimit, noise_gain
 from smartshoe.errors import UsageError
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, SIGMAS
-from smartshoe.models.effects.effect import CStep, Inverse, Surroundings
+from smartshoe.models.effects.effect import ChainContext, CStep, Inverse
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel, Part
 from smartshoe.units import Unit, declared, find_unit
@@ -70,7 +69,7 @@ class ExtendedCompensator(ForceFilter):
     def _undo(self, part: Part) -> None:
         # A tone's phase belongs to the session it was fitted on, so that noise is never taken off.
         arm = Arm(self.model.relaxing_share, self.model.relaxation_rate_per_s)
-        chain = Surroundings(arm, max(LEAST_DEAD_ZONE, SIGMAS * self._noise))
+        chain = ChainContext(arm, self._noise)
         inverse = part.effect.inverse_within(chain, part.values, self.step_s) if part.effect.is_physical else None
         if inverse is None:
             self._passed_over[part.name] = _why_not(part)

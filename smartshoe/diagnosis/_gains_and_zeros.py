@@ -73,7 +73,7 @@ class _Gained:
 
     @property
     def odds_of_a_change(self) -> float:
-        """-2 log prior odds against one: of one effect among all, at one of the samples of the recordings."""
+        """-2 log prior odds against one: of one effect among all, at one of the moments of the recordings."""
         return self.evidence.odds + 2.0 * math.log(MOMENTS * len(self.evidence.given.sessions))
 
     def searched(self) -> _Gained:

@@ -15,7 +15,7 @@ from smartshoe.models.core import USUAL_WALL_RATIO, Core
 from smartshoe.models.effects._wall_loop import relaxed
 from smartshoe.models.effects._wall_memory import dead_zone
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect, Surroundings
+from smartshoe.models.effects.effect import ChainContext, Conditions, CoreEffect, Effect
 from smartshoe.models.elements import Arm
 from smartshoe.models.first_order import hold_coefficients
 
@@ -395,7 +395,7 @@ def test_beside_an_arm_that_pushes_no_gas_is_asked_for_less_than_a_vacuum() -> N
         pressure = made.apply(load, beside, np.array([5.0]))
         assert pressure.max() <= 0.0
         assert pressure.min() >= -1.0
-        back = made.inverse_within(Surroundings(Arm(share, 0.23), 1e-3), np.array([5.0]), step_s)
+        back = made.inverse_within(ChainContext(Arm(share, 0.23)), np.array([5.0]), step_s)
         back.reset()
         assert back.push(pressure, beside.time_s) == pytest.approx(load, abs=5e-4)
 
@@ -409,6 +409,6 @@ def test_a_softened_wall_beside_an_arm_that_pushes_is_undone(share: float, of_ar
     load = np.interp(time_s, [0.0, 10.0, 20.0, 30.0, 40.0], [0.0, 0.6, 0.1, 1.0, 0.2])
     beside = Conditions(time_s, load, step_s).within(share, 0.23)
     values = np.array([0.8, 0.5, 0.3, 0.0, power, of_arm])
-    back = made.inverse_within(Surroundings(Arm(share, 0.23), 1e-3), values, step_s)
+    back = made.inverse_within(ChainContext(Arm(share, 0.23)), values, step_s)
     back.reset()
     assert back.push(made.apply(load, beside, values), time_s) == pytest.approx(load, abs=2e-3)

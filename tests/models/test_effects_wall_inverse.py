@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, SIGMAS
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import Conditions, CoreEffect, Effect, Surroundings
+from smartshoe.models.effects.effect import ChainContext, Conditions, CoreEffect, Effect
 from smartshoe.models.elements import Arm
 
 EXACT = (
@@ -122,8 +122,8 @@ def test_memory_takes_no_noise_for_a_load_that_turns(seed: int) -> None:
         made = effect(name)
         read = made.apply(given_.load, given_, values) + noise
         off = []
-        for zone in (LEAST_DEAD_ZONE, SIGMAS * 0.003):
-            back = made.inverse_within(Surroundings(Arm(0.1, 0.2), zone), values, STEP_S)
+        for known in (0.0, 0.003):
+            back = made.inverse_within(ChainContext(Arm(0.1, 0.2), known), values, STEP_S)
             assert back is not None
             off.append(float(np.std(back.push(read, time_s) - given_.load - noise)))
         assert off[1] < 0.5 * off[0]

@@ -18,7 +18,12 @@ NO_LOAD = 1e30  # as in `smartshoe.kernels.memory`: before the first sample
 
 def dead_zone(conditions: Conditions) -> float:
     """Half the swing of load that memory must not take for a reversal, a share of full scale."""
-    return max(LEAST_DEAD_ZONE, SIGMAS * conditions.load_noise)
+    return beyond_noise(conditions.load_noise)
+
+
+def beyond_noise(sd: float) -> float:
+    """The same of a signal whose noise has this standard deviation, a share of full scale."""
+    return max(LEAST_DEAD_ZONE, SIGMAS * sd)
 
 
 def cleaned(load: Array, half_width: float) -> Array:

@@ -9,8 +9,8 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned, dead_zone
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, beyond_noise, cleaned, dead_zone
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
@@ -76,9 +76,9 @@ class BoucWenHysteresis(Effect):
         constants = (strength, fading, per_load, z, slope, dead_zone)
         return Undone(bouc_wen_undone, constants, np.array(START), ("last", "value", "direction", "place"), body)
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, chain.dead_zone)
+        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 START = (NO_LOAD, 0.0, 0.0, 0.0)

@@ -8,8 +8,8 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETTLED, Undone, cleaned_load
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETTLED, Undone, beyond_noise, cleaned_load
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
@@ -111,9 +111,9 @@ class CycleConditioning(Effect):
         constants = (gained, per_cycle, by_way, stretch, LEAST_HEIGHT, dead_zone, MOST_ROUNDS, SETTLED)
         return Undone(conditioned_undone, constants, start, MEMBERS, body)
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, chain.dead_zone)
+        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 def half_way(conditions: Conditions) -> Array:

@@ -163,15 +163,14 @@ class CStep:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class ChainContext:
     """What an inverse may know of the chain that it stands in.
 
-    ``arm`` is the baseline's; ``dead_zone`` half the swing of what comes in, a share of full scale, that memory must
-    not take for a reversal.
+    ``arm`` is the baseline's; ``noise`` the rms of what comes in that is none of the load, a share of full scale.
     """
 
     arm: Arm
-    dead_zone: float
+    noise: float = 0.0
 
 
 class Effect(ABC):
@@ -233,7 +232,7 @@ class Effect(ABC):
         """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""
         return None
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse | None:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse | None:
         """The same in a chain, for what bends beside its arm, or must not remember its noise."""
         return self.inverse(values, step_s)
 

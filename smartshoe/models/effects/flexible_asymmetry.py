@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sense_of_motion import by_sense, undone_by_sense
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, beyond_noise
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -36,9 +36,9 @@ class FlexibleAsymmetry(Effect):
         """The load whose own sense gives the output, by bisection; exact for a load without noise."""
         return undone_by_sense(*_constants(values, step_s), dead_zone)
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, chain.dead_zone)
+        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 def _constants(values: Array, step_s: float) -> tuple[float, float, float]:

@@ -12,8 +12,8 @@ from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_loop import arm_beside, most_beside
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, dead_zone
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, beyond_noise, dead_zone
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -73,10 +73,10 @@ class MullinsSoftening(Effect):
         softened(np.ascontiguousarray(signal), *given, out)
         return out
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
         beside = replace(chain.arm, share=chain.arm.share * (1.0 - float(values[5])))
-        return BesideArm(_undone(*_amounts(values, beside.share), dead_zone=chain.dead_zone), beside, step_s)
+        return BesideArm(_undone(*_amounts(values, beside.share), dead_zone=beyond_noise(chain.noise)), beside, step_s)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, cleaned_load
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, beyond_noise, cleaned_load
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 HALF_WINDOW_S = 0.04
@@ -82,9 +82,9 @@ class RateGain(Effect):
         constants = (gain, exponent, LEAST_GAIN, SLOW_PER_S, dead_zone, step_s, keep)
         return Undone(rate_undone, constants, np.array([NO_LOAD, 0.0]), ("last", "rate"), body)
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, chain.dead_zone)
+        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 def _rate(conditions: Conditions) -> Array:

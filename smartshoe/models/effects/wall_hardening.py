@@ -8,7 +8,7 @@ from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects._wall_loop import arm_beside
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Surroundings
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -47,7 +47,7 @@ class WallHardening(Effect):
         hardened(np.ascontiguousarray(signal), *_coefficients(values), *arm_beside(conditions), out)
         return out
 
-    def inverse_within(self, chain: Surroundings, values: Array, step_s: float) -> Inverse:
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
         return BesideArm(self.inverse(values, step_s), chain.arm, step_s)
 
