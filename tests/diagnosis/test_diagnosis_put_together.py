@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +15,7 @@ from smartshoe import Recording
 from smartshoe.diagnosis import _procedure, _withheld
 from smartshoe.diagnosis._force import Compensation, ForceError
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
+from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._prepared import prepared
 from smartshoe.diagnosis._procedure import _diagnosed
 from smartshoe.diagnosis._zero import Zero, shift_of
@@ -250,6 +251,30 @@ def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explai
         assert (sessions, residuals) == ([FINE], [f"{FINE} 2"])  # at full rate
         assert (left is parts.kinds[1], thresholds, known) == (True, STANDARD, 0.0)
         assert parts.seen["not_explained_of"][0][1:3] == (0.0, unproven)
+
+
+@pytest.mark.parametrize(
+    ("cycles", "after", "material", "verdict"),
+    [
+        (30, 0.1, None, "unexplained"), (30, 0.1, 0.5, "adequate"),  # as much counts for nothing
+        (30, 0.199998, None, "adequate"),  # hardly any
+        (2, 0.1, None, "adequate"),  # by chance, as far as is known
+    ],
+)  # fmt: skip
+def test_what_the_extended_model_does_away_with_for_certain_is_not_good_enough_without_it(
+    parts: Any, monkeypatch: pytest.MonkeyPatch, cycles: int, after: float, material: float | None, verdict: str
+) -> None:
+    """Pieces of a few seconds repeat nothing, so that no test of what is left finds it."""
+    for kind in parts.kinds:
+        kind.significant, kind.rms = False, 0.0
+    counts = np.full(cycles, 100.0)
+    of = {False: Errors(0.2**2 * counts, counts, 0.4), True: Errors(after**2 * counts, counts, 0.4)}
+    monkeypatch.setattr(_procedure, "errors", lambda fine, model: of[bool(model.parts)])
+    said: list[str] = []
+    given = STANDARD if material is None else replace(STANDARD, material=material)
+    integrity: Any = SimpleNamespace(faults=(FAULT,))
+    told = _diagnosed(["recordings"], 1, integrity, given, said.append)  # type: ignore[list-item]
+    assert told.verdict == verdict
 
 
 def test_a_simulation_is_not_good_enough_where_no_test_would_show_what_is_left(parts: Any) -> None:
