@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from smartshoe.recording import Recording
 
 NOT_FITTED = "every third load cycle, or part of the time where there are few cycles, not fitted"
-USUAL_NOISE_PERCENT = 0.1  # of a design, where no unit states its own
 # Steps that usually follow one, without the report. The fits between the first two go on until one adds nothing.
 _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing alternatives": 1}
 
@@ -170,7 +169,7 @@ def _refuse_beside_design() -> None:
 
 def _design(path: str, json_path: str | None) -> None:
     from smartshoe.cli._output import emit_json, note
-    from smartshoe.diagnosis.design import design
+    from smartshoe.diagnosis.design import USUAL_NOISE_PERCENT, design
     from smartshoe.report.diagnosis.terminal import print_design
     from smartshoe.runs.scenario import load, noise_of, protocols_of
 

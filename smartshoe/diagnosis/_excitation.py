@@ -101,13 +101,14 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     hold_s = max(
         (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
     )
-    rests_s = [[n * one.conditions.step_s for n in _runs(_rested(one, thresholds))] for one in sessions]
-    pauses = [n * one.conditions.step_s for one in sessions for n in _runs(_within(_rested(one, thresholds)))]
+    rested = [(_rested(one, thresholds), one.conditions.step_s) for one in sessions]
+    rests_s = [n * step_s for mask, step_s in rested for n in _runs(mask)]
+    pauses = [n * step_s for mask, step_s in rested for n in _runs(_within(mask))]
     # Where a ramp begins and ends is smeared by its window, and found to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
-    rest_s = max((rest for own in rests_s for rest in own), default=0.0)
+    rest_s = max(rests_s, default=0.0)
     repeats = _most_alike([(rise.rate, rise.peak) for rise in rated], thresholds.same)
     found = {
         "rates": len(rates) > 1,

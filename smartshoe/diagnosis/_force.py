@@ -25,7 +25,8 @@ class ForceError:
 
 def force_error(fine: Sequence[Session], model: ExtendedModel) -> ForceError:
     """Of ``model`` run backwards over what was fitted, and over what is held out."""
-    return ForceError(*(_rms_n(fine, model, [getattr(one, part) for one in fine]) for part in ("fitted", "judged")))
+    off = [_off_n(one, model) for one in fine]
+    return ForceError(_rms(off, [one.fitted for one in fine]), _rms(off, [one.judged for one in fine]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +55,12 @@ def compensation(
     without. Where the plain model's is nearer all the same, it is the one.
     """
     before, whole = force_error(fine, plain), force_error(fine, extended)
-    seen, alike = [one.fitted for one in fine], 1.0 + thresholds.same
+    fitted, alike = [one for one in fine if one.fitted.any()], 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
     made_of_it = extended.noise / extended.gain * extended.full_scale_load_n
     while model.parts and least > alike * made_of_it:
         others = [model.without(name) for name in model.names]
-        off_n = [_rms_n(fine, other, seen) for other in others]
+        off_n = [force_error(fitted, other).fitted_n for other in others]
         best = min(range(len(off_n)), key=off_n.__getitem__)
         if not alike * off_n[best] < least:
             break
@@ -114,8 +115,8 @@ def _off_n(session: Session, model: ExtendedModel) -> Array:
     return force_n - session.conditions.load * model.full_scale_load_n
 
 
-def _rms_n(fine: Sequence[Session], model: ExtendedModel, seen: Sequence[Mask]) -> float:
-    """Root mean square of `_off_n` where ``seen``; NaN where nothing is."""
-    parts = [_off_n(one, model)[mask] for one, mask in zip(fine, seen, strict=True) if mask.any()]
+def _rms(signals: Sequence[Array], seen: Sequence[Mask]) -> float:
+    """Root mean square of ``signals``, (n,) each, where ``seen``; NaN where nothing is."""
+    parts = [signal[mask] for signal, mask in zip(signals, seen, strict=True)]
     count = sum(one.size for one in parts)
     return math.sqrt(sum(float(one @ one) for one in parts) / count) if count else math.nan

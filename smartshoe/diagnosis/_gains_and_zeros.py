@@ -175,18 +175,17 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     if len(fitted) > MOST_FOLDS:
         return gained
     model, zero_sd = state.given.model, state.thresholds.strength_sd if of_zero else 0.0
+    moments = [_moments_of(one) for one in fitted]
     moved = [
         np.full(one.reading.size, zero_sd) if of_zero else one.own_gain_sd * model.simulate(one.conditions)
         for one in fitted
     ]
-
-    def falls_at(moments: Sequence[Index]) -> Array:
-        steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
-        return gained.evidence.falls_beside(gained.kept, steps)
-
+    steps = [StepColumns.of(*each) for each in zip(fitted, moved, moments, strict=True)]
+    none = [replace(one, starts=one.starts[:0]) for one in steps]
     for _ in range(MOST_CHANGES * len(fitted)):
-        falls = falls_at([_moments_of(one) for one in fitted])
-        falls[~np.concatenate([_may_change(one, _moments_of(one)) for one in _fitted(gained.sessions)])] = -math.inf
+        falls = gained.evidence.falls_beside(gained.kept, steps)
+        each = zip(_fitted(gained.sessions), moments, strict=True)
+        falls[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
@@ -194,8 +193,9 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
         # Between the moments beside it, so that what changes once is not told as two changes around it.
         around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
         around = around[_may_change(one, around)]
-        close = falls_at([around if other is fitted[k] else around[:0] for other in fitted])
-        changed = _changed(one, int(around[np.argmax(close)]), zero_sd)
+        alone = [*none[:k], StepColumns.of(one, moved[k], around), *none[k + 1 :]]
+        at = int(around[np.argmax(gained.evidence.falls_beside(gained.kept, alone))])
+        changed = _changed(one, at, zero_sd)
         sessions = [changed if other is one else other for other in gained.sessions]
         gained = _Gained.of(state, sessions, gained.evidence.noise_sd)
     return gained

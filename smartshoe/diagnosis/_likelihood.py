@@ -147,8 +147,9 @@ class Fit:
 
 
 def weighed(likelihood: Likelihood, model: ExtendedModel) -> Fit:
-    """``model`` as it is, priors included."""
-    return fit(likelihood, model, 0)
+    """``model`` within its bounds, as a fit that begins there and takes no step."""
+    model = within_bounds(model)
+    return Fit(model, likelihood.cost(model) + _Prior.about(model).cost(model), likelihood)
 
 
 def within_bounds(model: ExtendedModel) -> ExtendedModel:
@@ -173,17 +174,13 @@ def fit(
     cost of a better fit, where this one only has to tell how much better that is.
     """
     owners = start.parameters
-    logarithmic = _are_logarithmic(start)
     low, high = np.array([p.lower for _, p in owners]), np.array([p.upper for _, p in owners])
     model = within_bounds(start)
-    about, precision = _about(model, logarithmic), _precision(model, logarithmic)
+    prior = _Prior.about(model)
+    logarithmic, precision = prior.logarithmic, prior.precision
     free = np.array([only in (None, owner) for owner, _ in owners])
-
-    def penalty(theta: Array) -> float:
-        return float(np.sum(precision * (_stepped(theta, logarithmic) - about) ** 2))
-
     cost, right, normal = likelihood.normal(model, rows)
-    cost += penalty(model.theta)
+    cost += prior.cost(model)
     damping, exact, came = 1e-4, True, model.theta
     for taken in range(steps):
         theta = model.theta
@@ -192,13 +189,13 @@ def fit(
         came = theta
         scale = np.where(logarithmic, theta, 1.0)
         inner = (normal * np.outer(scale, scale) + np.diag(precision)) * np.outer(free, free)
-        pull = (right * scale - precision * (_stepped(theta, logarithmic) - about)) * free
+        pull = (right * scale - precision * prior.off(theta)) * free
         best: tuple[float, ExtendedModel] | None = None
         for _ in range(6):
             step = _bounded_step(inner, pull, damping, theta, low, high, logarithmic)
             moved = np.where(logarithmic, theta * np.exp(np.where(logarithmic, step, 0.0)), theta + step)
             trial = model.at(np.clip(moved, low, high))
-            trial_cost = likelihood.cost(trial) + penalty(trial.theta)
+            trial_cost = likelihood.cost(trial) + prior.cost(trial)
             if np.isfinite(trial_cost) and trial_cost < cost:
                 best = trial_cost, trial
                 damping = max(damping * 0.1, 1e-7)
@@ -214,7 +211,29 @@ def fit(
     return Fit(model, cost, likelihood)
 
 
-def _about(model: ExtendedModel, logarithmic: Mask) -> Array:
+@dataclass(frozen=True, eq=False)
+class _Prior:
+    """The steps' prior: (p,) which parameters are stepped in their logarithm, what it is ``centre``d on, precisions."""
+
+    logarithmic: Mask
+    centre: Array
+    precision: Array
+
+    @classmethod
+    def about(cls, model: ExtendedModel) -> _Prior:
+        logarithmic = _are_logarithmic(model)
+        return cls(logarithmic, _centre(model, logarithmic), _precision(model, logarithmic))
+
+    def off(self, theta: Array) -> Array:
+        """(p,) by how much ``theta`` lies off its centre, as it is stepped."""
+        return _stepped(theta, self.logarithmic) - self.centre
+
+    def cost(self, model: ExtendedModel) -> float:
+        """-2 log of its density but for a constant."""
+        return float(np.sum(self.precision * self.off(model.theta) ** 2))
+
+
+def _centre(model: ExtendedModel, logarithmic: Mask) -> Array:
     """(p,) what the steps' prior is about: where a shape begins, where a flexible block's weight is null."""
     about = _stepped(model.theta, logarithmic).copy()
     for k, (_, parameter) in enumerate(model.parameters):

@@ -23,6 +23,8 @@ from smartshoe.protocol import Protocol
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
+USUAL_NOISE_PERCENT = 0.1  # of full scale, where no unit states its own
+
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -77,7 +79,7 @@ class Design:
 def design(
     protocols: Sequence[Protocol],
     *,
-    noise_percent: float = 0.1,
+    noise_percent: float = USUAL_NOISE_PERCENT,
     strength_percent: float = 0.3,
     sample_rate_hz: float = 100.0,
     unit: ExtendedModel = USUAL,

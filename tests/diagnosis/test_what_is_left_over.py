@@ -182,7 +182,6 @@ def test_a_force_that_is_hardly_worse_decides_nothing(
     bent, most = MODEL.with_part("gas_compression", np.array([0.1])), 9.0 * (1.0 + STANDARD.standing)
     errors = {len(MODEL.parts): ForceError(9.0, 9.0), len(bent.parts): ForceError(more * most, 8.0)}
     monkeypatch.setattr(_force, "force_error", lambda fine, model: errors[len(model.parts)])
-    monkeypatch.setattr(_force, "_rms_n", lambda *_: 9.0)
     assert compensation([one], bent, MODEL, STANDARD).is_plain is is_plain
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects.effect import Conditions, CStep, Inverse
+from smartshoe.models.effects.effect import ChainContext, Conditions, CStep, Effect, Inverse
 
 LEAST_DEAD_ZONE = 1e-3  # of full scale
 SIGMAS = 4.0
@@ -41,6 +42,18 @@ def cleaned_load(conditions: Conditions) -> Array:
     if found is None:
         found = conditions.cache["cleaned_load"] = cleaned(conditions.load, dead_zone(conditions))
     return found
+
+
+class Remembering(Effect):
+    """An effect that remembers the load as it is seen through a dead zone; so does its inverse, through the chain's."""
+
+    @abstractmethod
+    def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
+        """The streaming inverse, which takes no swing within twice ``dead_zone`` for a reversal."""
+
+    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
+        """The same, of what is clear of the chain's noise."""
+        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 @dataclass(eq=False)

@@ -9,14 +9,14 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, beyond_noise, cleaned, dead_zone
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Remembering, Undone, cleaned, dead_zone
+from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 WIDTHS, SPACINGS = 10.0, 240  # how far the branch is followed, and in how many pieces
 
 
-class BoucWenHysteresis(Effect):
+class BoucWenHysteresis(Remembering):
     """f - h (1 - l f) z, dz/df = (1 - |z|^n (gamma + beta sgn(f' z)))/width, gamma + beta = 1 (Wen 1976).
 
     z in [-1, 1] begins at 0. ``turn`` is beta - gamma: 0 unloads in a straight line, 1 with n = 1 is Dahl's friction.
@@ -75,10 +75,6 @@ class BoucWenHysteresis(Effect):
 
         constants = (strength, fading, per_load, z, slope, dead_zone)
         return Undone(bouc_wen_undone, constants, np.array(START), ("last", "value", "direction", "place"), body)
-
-    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 START = (NO_LOAD, 0.0, 0.0, 0.0)

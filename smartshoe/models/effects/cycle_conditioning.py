@@ -8,8 +8,8 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETTLED, Undone, beyond_noise, cleaned_load
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, SETTLED, Remembering, Undone, cleaned_load
+from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 LEAST_HEIGHT = 0.08  # of full scale: what counts as a cycle
@@ -17,7 +17,7 @@ MOST_ROUNDS = 60  # of a contraction that halves what is off
 MEMBERS = ("count", "trough", "peak", "place", "gone")
 
 
-class CycleConditioning(Effect):
+class CycleConditioning(Remembering):
     """f (1 + m (1 - exp(-n))), n = (1 - w) (N/n0)^stretch + w L/(2 n0).
 
     N are the cycles of 8 % of full scale and more that are over (shakedown by counting), L is the way that the load has
@@ -110,10 +110,6 @@ class CycleConditioning(Effect):
         start = np.array([0.0, NO_LOAD, NO_LOAD, NO_LOAD, 0.0])
         constants = (gained, per_cycle, by_way, stretch, LEAST_HEIGHT, dead_zone, MOST_ROUNDS, SETTLED)
         return Undone(conditioned_undone, constants, start, MEMBERS, body)
-
-    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 def half_way(conditions: Conditions) -> Array:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sense_of_motion import by_sense, undone_by_sense
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, beyond_noise
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Remembering
+from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
-class FlexibleAsymmetry(Effect):
+class FlexibleAsymmetry(Remembering):
     """f (1 - a (1 - s)/2) with ds = (sgn(df) - s) |df|/turn - s dt/T: a sense of motion that fades in T.
 
     Where T is long the sense is kept through holds; where it is short, s = r/(r + turn/T) on a ramp of rate r, which is
@@ -35,10 +35,6 @@ class FlexibleAsymmetry(Effect):
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """The load whose own sense gives the output, by bisection; exact for a load without noise."""
         return undone_by_sense(*_constants(values, step_s), dead_zone)
-
-    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 def _constants(values: Array, step_s: float) -> tuple[float, float, float]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sense_of_motion import by_sense, undone_by_sense
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, beyond_noise
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Remembering
+from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
-class LoadUnloadAsymmetry(Effect):
+class LoadUnloadAsymmetry(Remembering):
     """f (1 - a (1 - s)/2), s the sense of motion: ds = (sgn(df) - s) |df|/turn, kept through holds, +1 at first."""
 
     name, family, stage, place = "load_unload_asymmetry", "asymmetry", "wall", "wall"
@@ -36,7 +36,3 @@ class LoadUnloadAsymmetry(Effect):
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
         """The load whose own sense gives the output, by bisection; exact for a load without noise."""
         return undone_by_sense(float(values[0]), float(values[1]), 0.0, dead_zone)
-
-    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, beyond_noise(chain.noise))

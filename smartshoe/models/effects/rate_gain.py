@@ -9,8 +9,8 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Undone, beyond_noise, cleaned_load
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Remembering, Undone, cleaned_load
+from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 HALF_WINDOW_S = 0.04
@@ -18,7 +18,7 @@ SLOW_PER_S = 0.01  # below this rate the power is rounded off
 LEAST_GAIN = 0.5  # of that at rest: what fast loads may lose, so that no rate makes a reading without a load
 
 
-class RateGain(Effect):
+class RateGain(Remembering):
     """f max(1 + g r^m, 1/2), r = |f'| over 1 FS/s: the way gone within 0.08 s, small reversals taken out."""
 
     name, family, stage, place = "rate_gain", "rate", "wall", "wall"
@@ -81,10 +81,6 @@ class RateGain(Effect):
 
         constants = (gain, exponent, LEAST_GAIN, SLOW_PER_S, dead_zone, step_s, keep)
         return Undone(rate_undone, constants, np.array([NO_LOAD, 0.0]), ("last", "rate"), body)
-
-    def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
-        """The same, of what is clear of the chain's noise."""
-        return self.inverse(values, step_s, beyond_noise(chain.noise))
 
 
 def _rate(conditions: Conditions) -> Array:

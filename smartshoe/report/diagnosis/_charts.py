@@ -83,7 +83,7 @@ def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
     trace = segment.trace
     usable = trace.usable[segment.span]
     lines = [Line("before", np.where(usable, (trace.reading - trace.baseline)[segment.span], np.nan), BEFORE)]
-    if _differs(trace):
+    if differs(trace):
         lines.append(Line("after", np.where(usable, (trace.reading - trace.extended)[segment.span], np.nan), AFTER))
     held = "not fitted" if trace.held_out[segment.span].mean() > 0.5 else "fitted"
     says = (
@@ -97,7 +97,8 @@ def worst(traces: Sequence[Trace], unit: str) -> Chart | None:
     return Chart("Where the error is largest", says, "time (s)", trace.time_s[segment.span], panels)
 
 
-def _differs(trace: Trace) -> bool:
+def differs(trace: Trace) -> bool:
+    """Whether the extended model simulates a recording otherwise than the baseline."""
     return not np.array_equal(trace.baseline, trace.extended)
 
 
@@ -116,7 +117,7 @@ def _loop(rate: float, segment: TraceSegment, unit: str) -> Chart:
     low, high = (float(edge) for edge in np.percentile(load_n, [3.0, 97.0]))
     at_n = np.linspace(low, high, LOOP_POINTS)
     shown = [("measured", "load", reading), ("before", BEFORE, trace.baseline[span])]
-    if _differs(trace):
+    if differs(trace):
         shown.append(("after", AFTER, trace.extended[span]))
     lines = []
     for label, colour, values in shown:

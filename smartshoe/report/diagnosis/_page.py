@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from smartshoe.diagnosis import Cause, Diagnosis, described
 from smartshoe.models.effects import effect, in_words
 from smartshoe.report.charts import Chart
@@ -63,7 +61,7 @@ def write_diagnosis_page(
         "minor": sentences.unnamed(diagnosis),
         "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],
         "named": in_words,
-        "is_changed": any(not np.array_equal(one.baseline, one.extended) for one in diagnosis.traces),
+        "is_changed": any(map(charts.differs, diagnosis.traces)),
         "likeness": grids.likeness(diagnosis),
         "protocol_file": protocol_file,
         "next_load": charts.protocol(following.steps) if following and following.steps else None,
