@@ -222,7 +222,7 @@ class _Prior:
     @classmethod
     def about(cls, model: ExtendedModel) -> _Prior:
         logarithmic = _are_logarithmic(model)
-        return cls(logarithmic, _centre(model, logarithmic), _precision(model, logarithmic))
+        return cls(logarithmic, _about(model, logarithmic), _precision(model, logarithmic))
 
     def off(self, theta: Array) -> Array:
         """(p,) by how much ``theta`` lies off its centre, as it is stepped."""
@@ -233,7 +233,7 @@ class _Prior:
         return float(np.sum(self.precision * self.off(model.theta) ** 2))
 
 
-def _centre(model: ExtendedModel, logarithmic: Mask) -> Array:
+def _about(model: ExtendedModel, logarithmic: Mask) -> Array:
     """(p,) what the steps' prior is about: where a shape begins, where a flexible block's weight is null."""
     about = _stepped(model.theta, logarithmic).copy()
     for k, (_, parameter) in enumerate(model.parameters):
