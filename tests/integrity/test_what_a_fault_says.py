@@ -67,6 +67,22 @@ def test_a_gap_is_one_and_several_are_counted(missing: tuple[tuple[int, int], ..
     assert _said(_pressed(READING).taken(kept)) == ("gaps", said)
 
 
+@pytest.mark.parametrize(
+    ("gone", "said"),
+    [
+        (((500, 501),), "one sample: it is left out"),
+        (((500, 503),), "3 samples in a row: they are left out"),
+        (((500, 501), (700, 701)), "2 samples, each alone: they are left out"),
+        (((500, 503), (700, 701)), "4 samples, in 2 stretches of up to 3: they are left out"),
+    ],
+)
+def test_one_missing_sample_is_one_and_stretches_are_counted(gone: tuple[tuple[int, int], ...], said: str) -> None:
+    holey = READING.copy()
+    for first, stop in gone:
+        holey[first:stop] = np.nan
+    assert _said(_pressed(holey)) == ("missing_samples", f"the reading pressure is missing in {said}")
+
+
 def test_a_reading_that_repeats_once_is_one_and_several_are_told_with_the_longest_row() -> None:
     reading = np.rint((TRIANGLE + 1e-4 * NOISE[0]) / 1e-5) * 1e-5
     reading[1234] = reading[1233]
