@@ -29,6 +29,7 @@ from smartshoe.report.diagnosis._page import write_diagnosis_page
 from smartshoe.report.diagnosis._protocol_file import protocol_text
 from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
+    Row,
     comparison,
     gain_sentence,
     interval,
@@ -395,16 +396,20 @@ def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:
 
 def test_a_force_that_the_extended_model_gives_back_worse_is_the_baselines() -> None:
     made = case("one cause")
-    (row,) = [one for one in comparison(made) if one.name.startswith("error of the compensated force")]
-    assert row.after.endswith(" N")
-    assert row.change.endswith(" %")
-    (row,) = [
-        one
-        for one in comparison(replace(made, force_model=BASELINE))
-        if one.name.startswith("error of the compensated")
-    ]
-    assert row.before.endswith(" N")
-    assert (row.after, row.change) == ("by the baseline, see the limits", "")
+
+    def row(by: ExtendedModel | None) -> Row:
+        rows = comparison(replace(made, force_model=by))
+        return next(one for one in rows if one.name.startswith("error of the compensated force"))
+
+    own = row(None)
+    assert own.after.endswith(" N")
+    assert own.change.endswith(" %")
+    with_zero = BASELINE.with_part(effect("zero_offset"), np.array([0.01]))  # so that it gives readings as logged
+    for plain_model in (BASELINE, with_zero):
+        assert row(plain_model).before == own.before
+        assert (row(plain_model).after, row(plain_model).change) == ("by the baseline, see the limits", "")
+    # One effect is passed over and others are undone: it is no baseline, and its error is that of the result.
+    assert row(with_zero.with_part(*LEAK)) == own
 
 
 @pytest.mark.parametrize(
