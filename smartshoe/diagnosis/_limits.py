@@ -216,7 +216,7 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
     return [
         f"the zero jumps, in shares of full scale, {_when(changes)}, as where a unit slips, water moves in a line or"
         " the room warms:"
-        " jumps that are not seen may imitate any effect, so that no cause is more than half sure, and no model"
+        " jumps that are not seen may imitate any effect of the unit, so that none is more than half sure, and no model"
         " foresees those of another recording"
     ]
 
