@@ -78,7 +78,8 @@ def command(
     from smartshoe.errors import NotIdentifiableError, SmartShoeError, UsageError
     from smartshoe.files.atomic import make_folder
 
-    require_writable(json_path, calibration_path, folder=out_folder)
+    read = (*files, *held_out, *([] if design_path is None else [design_path]))
+    require_writable(json_path, calibration_path, folder=out_folder, read=read)
     if design_path is not None:
         if files or held_out:
             raise UsageError("--design asks about protocols, before anything is measured: name no FILE beside it")
