@@ -17,10 +17,8 @@ def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
     """Kind ``short_recording``: fatal, since so little shows nothing."""
     if len(recording) >= thresholds.least_samples:
         return
-    says = (
-        f"the recording holds {len(recording)} samples in {recording.duration_s:.3g} s: give at least"
-        f" {thresholds.least_samples} samples"
-    )
+    held = f"{len(recording)} samples in {recording.duration_s:.3g} s" if len(recording) > 1 else "one sample"
+    says = f"the recording holds {held}: give at least {thresholds.least_samples} samples"
     yield Finding("short_recording", np.ones(len(recording), dtype=bool), says, "fatal", True, says)
 
 

@@ -67,6 +67,12 @@ def test_a_gap_is_one_and_several_are_counted(missing: tuple[tuple[int, int], ..
     assert _said(_pressed(READING).taken(kept)) == ("gaps", said)
 
 
+@pytest.mark.parametrize(("count", "held"), [(1, "one sample"), (2, "2 samples in 0.01 s")])
+def test_a_recording_of_one_sample_holds_one(count: int, held: str) -> None:
+    few = _pressed(READING).taken(np.arange(TIME_S.size) < count)
+    assert _said(few) == ("short_recording", f"the recording holds {held}: give at least 100 samples")
+
+
 @pytest.mark.parametrize(
     ("gone", "said"),
     [
