@@ -99,11 +99,11 @@ def repeats(sessions: Sequence[Session], residuals: Sequence[Array], alike: floa
             if inside.size < 8:
                 continue
             first, last = int(start + inside[0]), int(start + inside[-1])
-            span = slice(first, last + 1)
-            if session.usable[span].mean() < 0.9:
+            usable = np.flatnonzero(session.usable[first : last + 1])
+            if usable.size < 0.9 * (last + 1 - first):
                 continue
-            places = np.linspace(0, last - first, PLACES)
-            row = np.interp(places, np.arange(last + 1 - first), residual[span])
+            # A reading at its rail is as wrong each time: of what is masked nothing is left over.
+            row = np.interp(np.linspace(0, last - first, PLACES), usable, residual[first + usable])
             found.append((peak, (last - first) * session.conditions.step_s, row, int(last + 1 - first)))
     kinds: list[list[tuple[float, float, Array, int]]] = []
     for one in found:

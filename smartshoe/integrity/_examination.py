@@ -23,6 +23,7 @@ from smartshoe.integrity._sampling import gaps, missing_samples, short_recording
 from smartshoe.integrity._spikes import spikes
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity._wild import with_missing, without_wild
+from smartshoe.integrity._wrapped import unwrapped
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
 
@@ -52,7 +53,7 @@ UNTOLD: Clock = (0.0, 0.0, UNSEEN)
 
 @dataclass(frozen=True, eq=False)
 class _Tamed:
-    """A recording as ``logged``, but each channel at its own rate; ``recording`` is it without wild values.
+    """A recording as ``logged``, but each channel at its own rate, and counted on; ``recording``: without wild values.
 
     ``findings``: what was found on the way.
     """
@@ -102,9 +103,10 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
 
 def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
     made = []
-    for logged, held in at_their_rates(recordings, thresholds):
+    for read, held in at_their_rates(recordings, thresholds):
+        logged, wrapped = unwrapped(read, thresholds)
         recording, wild = without_wild(logged, thresholds)
-        made.append(_Tamed(logged, recording, (*held, *wild)))
+        made.append(_Tamed(logged, recording, (*held, *wrapped, *wild)))
     return made
 
 

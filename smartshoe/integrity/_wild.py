@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smartshoe.arrays import Mask
+from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Channel, Recording
@@ -77,5 +77,10 @@ def with_missing(recording: Recording, channel: Channel, at: Mask) -> Recording:
     """``recording`` whose ``channel`` lacks the samples ``at`` (n,)."""
     values = channel.with_nan().copy()
     values[at] = np.nan
-    fewer = Channel.from_values(channel.name, values, channel.unit, channel.role)
-    return recording.with_channel(replace(fewer, range_=channel.range_, resolution=channel.resolution))
+    return with_values(recording, channel, values)
+
+
+def with_values(recording: Recording, channel: Channel, values: Array) -> Recording:
+    """``recording`` whose ``channel`` has ``values`` (n,) instead, NaN where there is none."""
+    other = Channel.from_values(channel.name, values, channel.unit, channel.role)
+    return recording.with_channel(replace(other, range_=channel.range_, resolution=channel.resolution))

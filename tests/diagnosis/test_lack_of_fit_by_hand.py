@@ -79,7 +79,8 @@ def _slow_repeats(sessions: list[Any], residuals: list[Array]) -> list[tuple[lis
             if sum(session.usable[i] for i in span_of) < 0.9 * len(span_of):
                 continue
             places = [above[0] + (above[-1] - above[0]) * k / 63.0 for k in range(64)]
-            row = np.interp(places, np.arange(len(load)), residual)
+            seen = [i for i in span_of if session.usable[i]]
+            row = np.interp(places, seen, residual[seen])
             duration_s = (above[-1] - above[0]) * session.conditions.step_s
             for first_peak, first_s, rows, sizes in kinds:
                 if abs(peak - first_peak) <= ALIKE * first_peak and abs(duration_s - first_s) <= ALIKE * first_s:
@@ -234,6 +235,17 @@ def test_a_cycle_that_lacks_more_than_a_tenth_is_not_laid_over_others(lost: int,
     usable = np.ones(160, dtype=bool)
     usable[25 : 25 + lost] = False
     assert bool(repeats([_session(load, cycle, usable)], [load], ALIKE)) is is_told
+
+
+def test_what_is_masked_in_each_cycle_repeats_nothing() -> None:
+    """A reading that is tied at its rail is as wrong each time, and no matter of the model."""
+    load, cycle = np.zeros(160), np.repeat(np.arange(2), 80)
+    load[20:60] = load[100:140] = 1.0
+    usable, residual = np.ones(160, dtype=bool), np.zeros(160)
+    usable[38:42] = usable[118:122] = False
+    residual[~usable] = 9.0
+    ((rows, _),) = repeats([_session(load, cycle, usable)], [residual], ALIKE)
+    assert np.all(rows == 0.0)
 
 
 @pytest.mark.parametrize(("height", "duration"), [(1.08, 25), (0.92, 25), (1.0, 27), (1.0, 23)])
