@@ -1,5 +1,6 @@
 """What a measurement may hold beside the standard linear solid: one file an effect, found by `catalogue`."""
 
+from smartshoe.models.effects._sensor_evidence import NoiseEffect
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.catalogue import (
     blocks,
@@ -24,6 +25,7 @@ __all__ = [
     "Inverse",
     "Leak",
     "Memoryless",
+    "NoiseEffect",
     "Place",
     "blocks",
     "by",
