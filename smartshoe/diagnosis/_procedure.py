@@ -46,14 +46,14 @@ from smartshoe.diagnosis._verdict import (
     verdict_of,
 )
 from smartshoe.diagnosis._withheld import causes_among
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
+from smartshoe.diagnosis._zero import Zero, offsets, zeros_of
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.integrity import Integrity, examine, twins
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.models.effects import catalogue
+from smartshoe.models.effects import catalogue, shift_of
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording

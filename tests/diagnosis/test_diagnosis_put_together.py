@@ -18,9 +18,9 @@ from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._prepared import prepared
 from smartshoe.diagnosis._procedure import _diagnosed
-from smartshoe.diagnosis._zero import Zero, shift_of
+from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity import OneClock
-from smartshoe.models.effects import effect
+from smartshoe.models.effects import effect, shift_of
 
 Array = NDArray[np.float64]
 

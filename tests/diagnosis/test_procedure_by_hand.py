@@ -28,9 +28,9 @@ from smartshoe.diagnosis._procedure import (
 from smartshoe.diagnosis._result import Rival
 from smartshoe.diagnosis._session import Scale, prepare
 from smartshoe.diagnosis._verdict import names_in, not_explained_of, sentence_of, verdict_of
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of
+from smartshoe.diagnosis._zero import Zero, offsets
 from smartshoe.errors import UsageError
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
 

@@ -27,9 +27,9 @@ from smartshoe.diagnosis._verdict import (
     sentence_of,
     verdict_of,
 )
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of
+from smartshoe.diagnosis._zero import Zero, offsets
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]

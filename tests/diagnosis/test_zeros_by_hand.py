@@ -17,9 +17,9 @@ from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._session import Scale
-from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, shift_of, zeros_of
+from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, zeros_of
 from smartshoe.integrity import OneClock
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Channel, Recording

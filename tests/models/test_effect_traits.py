@@ -169,6 +169,17 @@ def test_what_is_seen_at_rest_moves_the_reading_without_load() -> None:
             assert abs(out[-1] - load[-1]) > 1e-5, one.name
 
 
+def test_one_latency_is_the_lag_between_two_clocks_and_one_their_rate() -> None:
+    of_clocks = [one for one in EVERY if one.between_clocks]
+    assert {one.between_clocks for one in of_clocks} == {"lag", "rate"}
+    assert len(of_clocks) == 2
+    for one in of_clocks:
+        assert one.is_latency
+        assert len(one.parameters) == 1
+        at_once, later = one.late_s(np.array([0.5]), 0.0), one.late_s(np.array([0.5]), 10.0)
+        assert (at_once, later) == ((0.5, 0.5) if one.between_clocks == "lag" else (0.0, 5.0))
+
+
 def test_a_shift_adds_its_one_value() -> None:
     at = Conditions(0.02 * np.arange(3), np.array([0.0, 0.5, 1.0]), 0.02)
     shifts = {one.name: one for one in EVERY if one.shifts}

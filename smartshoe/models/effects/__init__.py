@@ -3,11 +3,13 @@
 from smartshoe.models.effects._sensor_evidence import NoiseEffect
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.catalogue import (
+    between_clocks,
     blocks,
     catalogue,
     effect,
     in_words,
     is_told_from_its_family,
+    shift_of,
     told_apart_by,
 )
 from smartshoe.models.effects.effect import Conditions, CoreEffect, CStep, Effect, EffectParameter, Inverse, Place
@@ -27,6 +29,7 @@ __all__ = [
     "Memoryless",
     "NoiseEffect",
     "Place",
+    "between_clocks",
     "blocks",
     "by",
     "c_number",
@@ -34,5 +37,6 @@ __all__ = [
     "effect",
     "in_words",
     "is_told_from_its_family",
+    "shift_of",
     "told_apart_by",
 ]
