@@ -114,7 +114,9 @@ def diagnose(
         return _refused(everything, integrity, list(left_out.values()), decided)
     usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
     found = _diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
-    return replace(found, limits=(*_without(everything, count, left_out), *found.limits))
+    reasons = tuple(left_out.values())
+    limits = (*(f"left out: {why}" for why in reasons), *_without(everything, count, left_out), *found.limits)
+    return replace(found, limits=limits, left_out=reasons)
 
 
 def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
@@ -130,8 +132,11 @@ def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
 
 
 def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
-    """What is said of recordings that lack or are left out, by place; the first ``count`` were to be fitted."""
-    said = [f"left out: {why}" for why in left_out.values()]
+    """What is said where recordings that others need are ``left_out``, by place, or were not given at all.
+
+    The first ``count`` were to be fitted.
+    """
+    said = []
     names = {recordings[k].name for k in left_out}
     for one in pastless([one for k, one in enumerate(recordings) if k not in left_out]):
         earlier = one.metadata["continues"]

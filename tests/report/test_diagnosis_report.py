@@ -626,12 +626,13 @@ def test_structure_that_no_test_could_have_shown_is_not_called_none() -> None:
 def test_limits_come_before_recordings_that_were_left_out_and_none_is_cut_off(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    left_out = tuple(f"left out: r{k}.csv: the load stands still" for k in range(90))
+    left_out = tuple(f"r{k}.csv: the load stands still" for k in range(90))
     limits = tuple(f"limit number {k} of the data" for k in range(20))
-    print_diagnosis(replace(case("unexplained"), limits=(*left_out, *limits)))
+    said_first = (f"left out: {why}" for why in left_out)
+    print_diagnosis(replace(case("unexplained"), limits=(*said_first, *limits), left_out=left_out))
     said = capsys.readouterr().out
     assert all(limit in said for limit in limits)
-    assert said.index(limits[-1]) < said.index("r0.csv: the load stands still") < said.index("and 78 more")
+    assert said.index(limits[-1]) < said.index("\n- r0.csv: the load stands still") < said.index("and 78 more")
 
 
 def test_the_terminal_tells_of_a_name_how_far_it_is_this_one(capsys: pytest.CaptureFixture[str]) -> None:
