@@ -118,7 +118,7 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
     alike = [one for one in names if one.effect.mechanism == name.effect.mechanism != ""]
     if name.effect.is_memoryless and not name.kind_only:
         alike += [one for one in names if one.effect.is_memoryless and one.kind_only]
-    surest = max(alike, key=lambda one: one.kind, default=name)
+    surest = max(alike, key=lambda one: one.kind_probability, default=name)
     if surest is name or name.member.size > thresholds.law_departure * surest.member.size:
         return None
     said, other = (one.effect.name.replace("_", " ") for one in (name, surest))

@@ -443,4 +443,4 @@ def test_a_member_is_named_from_what_is_material_and_sure_on() -> None:
     sure = probability_of_kind(_member(), 0.002, STANDARD)
     for least, is_sure in ((sure, True), (sure + 1e-9, False)):
         (name,) = names_of([_member()], 0.002, replace(STANDARD, least_confidence=least))
-        assert (name.is_sure, name.kind) == (is_sure, sure if is_sure else 0.5)
+        assert (name.is_sure, name.kind_probability) == (is_sure, sure if is_sure else 0.5)

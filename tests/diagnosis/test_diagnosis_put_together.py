@@ -176,7 +176,9 @@ def _run_diagnosis(parts: Any) -> Any:
 
 def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, kind: float = 0.9) -> Any:
     known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
-    return SimpleNamespace(name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind=kind)
+    return SimpleNamespace(
+        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind_probability=kind
+    )
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:

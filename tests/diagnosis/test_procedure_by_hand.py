@@ -289,8 +289,8 @@ def _told(
     name: Any = SimpleNamespace(
         member=member,
         effect=one,
-        kind=kind,
-        law=0.6,
+        kind_probability=kind,
+        law_probability=0.6,
         equivalents=("orifice_leak",),
         kind_only=kind_only,
         is_sure=is_sure,
