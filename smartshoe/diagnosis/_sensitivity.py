@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import lfilter
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
@@ -24,6 +23,7 @@ from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.signals.lags import lagged
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,9 +364,3 @@ def _factors(session: Session, thresholds: Thresholds) -> Array:
     elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
     found = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5]
     return np.asfortranarray(np.column_stack(found))
-
-
-def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
-    """``signal`` (n,) through a first-order lag, started in steady state."""
-    keep = float(np.exp(-step_s / tau_s))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=np.array([keep * signal[0]]))[0])

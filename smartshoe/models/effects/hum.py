@@ -12,9 +12,9 @@ from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLE
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
+from smartshoe.signals.noise import MAINS_HZ
 
 LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect
-MAINS_HZ = (50.0, 60.0)
 HARMONICS = 7
 MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
 NEIGHBOURS = 60  # bins on either side that give the floor
