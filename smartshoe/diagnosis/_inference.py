@@ -85,14 +85,14 @@ def infer(
     """
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
-    given, evidence, best = searched(plain.model, sessions, thresholds)
+    evidence, best = searched(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
     # Within one, nothing validates anything.
     can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
         return Inference(plain, weighed(likelihood, plain.model), likelihood, (), screening, likeness, (), can_validate)
-    begun = State(given, evidence, best, plain)
+    begun = State(evidence, best, plain)
     if is_stretched(plain.model):
         begun = simpler(with_a_latency(begun, sessions), begun, sessions)
     state = _sought(begun, sessions, progress)
@@ -296,7 +296,7 @@ def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> Stat
         return None
     likelihood = begun.likelihood(sessions)
     evidence, best = evidence_about(path[0], sessions, begun.evidence)
-    return State(evidence.given, evidence, best, fit(likelihood, path[0]), state.banned)
+    return State(evidence, best, fit(likelihood, path[0]), state.banned)
 
 
 def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Judged] | None:
@@ -316,7 +316,7 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
         if best.score >= nothing.score:
             continue
         one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
-        judged = _judged(State(begun.given, begun.evidence, best, one), plain, sessions)
+        judged = _judged(State(begun.evidence, best, one), plain, sessions)
         removed = before**2 - error_of(sessions, judged.fit.model) ** 2
         if not judged.is_stepped_down and removed > thresholds.tolerable**2:
             standing.append((begun.given.candidates[k].effect, judged))

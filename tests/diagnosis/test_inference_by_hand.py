@@ -111,9 +111,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
-    monkeypatch.setattr(
-        _inference, "searched", lambda *given: ("given", SimpleNamespace(noise_sd=0.1), SimpleNamespace())
-    )
+    monkeypatch.setattr(_inference, "searched", lambda *given: (SimpleNamespace(noise_sd=0.1), SimpleNamespace()))
     monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
@@ -356,7 +354,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: errors[model])
     monkeypatch.setattr(_inference, "with_members", lambda given, best, model, likelihood: f"n{best.members[0]}")
     monkeypatch.setattr(_inference, "fit", lambda likelihood, model: SimpleNamespace(model=model))
-    monkeypatch.setattr(_inference, "State", lambda given, evidence, best, fit: fit)
+    monkeypatch.setattr(_inference, "State", lambda evidence, best, fit: fit)
     monkeypatch.setattr(
         _inference,
         "_judged",
