@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._sensitivity import nuisances
+from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
@@ -34,8 +34,7 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     seen = columns[mask]
     variance = float(np.var(residual[mask])) if mask.any() else 0.0
     of_state = variance / max(abs(model.relaxing_share * model.gain), 1e-6) ** 2 + 1e-9
-    own = [variance] * (len(session.gain_parts) + len(session.zero_changes))
-    inner = seen.T @ seen + np.diag([1e-9, of_state, *own, *[of_state] * len(session.gap_ends)])
+    inner = seen.T @ seen + a_nuisance_each(session, offset=1e-9, past=of_state, change=variance, gap=of_state)
     found = np.asarray(np.linalg.solve(inner, seen.T @ residual[mask]), dtype=np.float64)
     return found, columns @ found
 

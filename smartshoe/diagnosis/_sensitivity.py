@@ -118,9 +118,14 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
     sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    own = [1.0] * (len(session.gain_parts) + len(session.zero_changes))
-    gaps = [1.0 / max(held * float(np.max(session.conditions.load)), 1e-6) ** 2] * len(session.gap_ends)
-    return np.diag([0.0, 1.0 / sd**2, *own, *gaps])
+    gap_sd = max(held * float(np.max(session.conditions.load)), 1e-6)
+    return a_nuisance_each(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
+
+
+def a_nuisance_each(session: Session, *, offset: float, past: float, change: float, gap: float) -> Array:
+    """(2 + k, 2 + k) diagonal: a number for each column of `nuisances`, in their order."""
+    changes = [change] * (len(session.gain_parts) + len(session.zero_changes))
+    return np.diag([offset, past, *changes, *[gap] * len(session.gap_ends)])
 
 
 @dataclass(frozen=True, eq=False)
