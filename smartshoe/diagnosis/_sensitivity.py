@@ -117,8 +117,8 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     """
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
-    sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    gap_sd = max(held * float(np.max(session.conditions.load)), 1e-6)
+    sd = max(held * max(begun, thresholds.unknown_past), FLOOR)
+    gap_sd = max(held * float(np.max(session.conditions.load)), FLOOR)
     return a_nuisance_each(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
 
 
