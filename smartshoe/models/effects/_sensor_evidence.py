@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -32,12 +32,6 @@ class SensorEvidence:
     threshold: float
     says: str
     strength: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The contract's object."""
-        return {
-            "statistic": self.statistic, "value": self.value, "threshold": self.threshold, "says": self.says,
-        }  # fmt: skip
 
 
 class NoiseEffect(Effect):
