@@ -227,10 +227,10 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     )
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
-    extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0)
     likelihood: Any = SimpleNamespace(sessions=())
+    extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0, likelihood=likelihood)
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
-    found = members_of(evidence, best, ("z",), likelihood, extended)
+    found = members_of(evidence, best, ("z",), extended)
     assert [(m.name, m.departed, m.fall) for m in found] == [("dead_band", 0.7, 70.0), ("linear_leak", 0.3, 30.0)]
     assert [m.size for m in found] == pytest.approx([sizes["dead_band"], sizes["linear_leak"]])
     assert [m.likeness for m in found] == pytest.approx([math.sqrt(0.5)] * 2)
@@ -244,7 +244,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     assert set(asked) == {4}
     sizes["linear_leak"] *= 3.0
     ways["linear_leak"] *= -1.0
-    (leak, _) = members_of(evidence, best, (), likelihood, extended)
+    (leak, _) = members_of(evidence, best, (), extended)
     assert [(law.effect, law.margin) for law in leak.laws] == [("orifice_leak", 15.0)]
     assert leak.likeness == 0.0  # the other pulls against it
 
