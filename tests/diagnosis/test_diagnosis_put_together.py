@@ -17,7 +17,7 @@ from smartshoe.diagnosis._force import Compensation, ForceError
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._prepared import prepared
-from smartshoe.diagnosis._procedure import _diagnosed
+from smartshoe.diagnosis._procedure import diagnosed
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity import OneClock
 from smartshoe.models.effects import effect, shift_of
@@ -169,7 +169,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
 def _run_diagnosis(parts: Any) -> Any:
     said: list[str] = []
     integrity: Any = SimpleNamespace(faults=(FAULT,))
-    result = _diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
+    result = diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
     assert said == ["judging on held-out data"]
     return result
 
@@ -275,7 +275,7 @@ def test_what_the_extended_model_does_away_with_for_certain_is_not_good_enough_w
     said: list[str] = []
     given = STANDARD if material is None else replace(STANDARD, material=material)
     integrity: Any = SimpleNamespace(faults=(FAULT,))
-    told = _diagnosed(["recordings"], 1, integrity, given, said.append)  # type: ignore[list-item]
+    told = diagnosed(["recordings"], 1, integrity, given, said.append)  # type: ignore[list-item]
     assert told.verdict == verdict
 
 

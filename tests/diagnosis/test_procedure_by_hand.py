@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
 from smartshoe.diagnosis._causes import _against, _held_out_evidence, cause_of, zero_cause_of
+from smartshoe.diagnosis._diagnose import _outside, _refused
 from smartshoe.diagnosis._held_out import Errors, Gain, own_of
 from smartshoe.diagnosis._limits import refusals_of
 from smartshoe.diagnosis._naming import confidence_of
 from smartshoe.diagnosis._procedure import (
     _goodness,
-    _outside,
     _percent_less,
-    _refused,
     _trace,
     _with_offset,
 )

@@ -13,9 +13,10 @@ from scipy.signal import lsim
 
 from smartshoe import Recording, compensate, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
+from smartshoe.diagnosis._diagnose import _outside
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._lack_of_fit import LackOfFit
-from smartshoe.diagnosis._procedure import _outside, _with_offset
+from smartshoe.diagnosis._procedure import _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Session, full_scale, prepare
 from smartshoe.diagnosis._verdict import (
