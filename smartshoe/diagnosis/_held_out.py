@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from sys import float_info
 
 import numpy as np
 from scipy.special import stdtrit
@@ -19,8 +20,6 @@ from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import finite_or_none
-
-LEAST = float(np.finfo(float).tiny)  # squared error, so that none has a logarithm
 
 
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
@@ -159,11 +158,11 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | N
 
 
 def _log_ratio(before: Array | float, after: Array | float) -> Array:
-    """Logarithm of a squared error over another."""
-    return np.asarray(np.log(np.maximum(after, LEAST) / np.maximum(before, LEAST)))
+    """Logarithm of a squared error over another; no error counts as the least number there is."""
+    return np.asarray(np.log(np.maximum(after, float_info.min) / np.maximum(before, float_info.min)))
 
 
 def _percent(log_ratio: Array | float) -> Array:
     """By how much an error falls whose square changes so; the interval of few cycles may be beyond any number."""
-    most = -0.5 * math.log(LEAST)
+    most = -0.5 * math.log(float_info.min)
     return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), most))))

@@ -25,7 +25,7 @@ from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
-SAID = 4  # changes of a gain, or a zero, that are said one by one
+SAID = 4  # of many of a kind, as changes of a gain, that are told one by one
 
 
 def parted_clocks(

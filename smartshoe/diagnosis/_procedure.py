@@ -15,6 +15,7 @@ from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._limits import (
+    SAID,
     elsewhere_of,
     end_of_range_of,
     own_gains_of,
@@ -53,8 +54,6 @@ from smartshoe.models.effects import catalogue, shift_of
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
-
-NEAREST = 4  # effects that are told where none is named
 
 
 @on_one_thread
@@ -254,7 +253,7 @@ def _left_of_what_was_fitted(
 
 def _nearest(found: Inference) -> tuple[Rival, ...]:
     """The few effects that take most off by themselves; flexible blocks are none."""
-    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:NEAREST])
+    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:SAID])
 
 
 def _zeros(
