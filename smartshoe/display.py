@@ -83,6 +83,15 @@ def significant(value: float | None, digits: int = 4) -> str:
     return "–" if value is None or value != value else f"{value:.{digits}g}"
 
 
+def moment(time_s: float, digits: int = 6) -> str:
+    """A time of a recording in seconds: ``digits`` digits, and of later ones as many decimals as that leaves of 100 s.
+
+    A clock that counts from 1970 has ten digits before its decimal point, of which six tell no stretch from another.
+    """
+    late = abs(time_s) >= 10.0 ** (digits - 1)
+    return f"{time_s:.{digits - 3}f}".rstrip("0").rstrip(".") if late else f"{time_s:.{digits}g}"
+
+
 def panels(count: int, *, height: float = 2.6) -> tuple[Figure, list[Axes]]:
     """A figure of ``count`` axes below each other, outside pyplot: nothing stays open."""
     from matplotlib.figure import Figure

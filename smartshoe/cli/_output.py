@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -22,11 +22,12 @@ figures_option = click.option(
 )
 
 
-def require_writable(*files: str | None, folder: str | None = None) -> None:
-    """Refuse with `UsageError`, before anything is computed, what could not be written at the end.
+def require_writable(*files: str | None, folder: str | None = None, read: Iterable[str] = ()) -> None:
+    """Refuse with `UsageError`, before anything is computed, what could not be written at the end, or should not be.
 
     ``files`` are to be written (None: not asked for, ``-``: stdout), some of them perhaps in ``folder``, which is made
-    where it is missing.
+    where it is missing. None of them may be one of those that are ``read``, which a result would replace, or another
+    result.
     """
     from smartshoe.errors import UsageError
 
@@ -35,6 +36,7 @@ def require_writable(*files: str | None, folder: str | None = None) -> None:
         there = next(place for place in (made, *made.parents) if place.exists())
         if not there.is_dir():
             raise UsageError(f"{folder} cannot be made a folder, {there} is a file: choose another --out")
+    taken = {Path(path).resolve(): "is read, and the result would replace it" for path in read}
     for path in files:
         if path is None or path == "-":
             continue
@@ -43,6 +45,10 @@ def require_writable(*files: str | None, folder: str | None = None) -> None:
             raise UsageError(f"{path} cannot be written, there is no folder {parent}: choose one that exists")
         if Path(path).is_dir():
             raise UsageError(f"{path} is a directory: give the name of a file to write")
+        place = Path(path).resolve()
+        if place in taken and (place.is_file() or not place.exists()):  # a device keeps nothing
+            raise UsageError(f"{path} {taken[place]}: give another name to write to")
+        taken[place] = "is to hold two results"
 
 
 def emit_json(result: dict[str, Any], path: str | None) -> bool:

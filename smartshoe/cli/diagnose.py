@@ -78,7 +78,8 @@ def command(
     from smartshoe.errors import NotIdentifiableError, SmartShoeError, UsageError
     from smartshoe.files.atomic import make_folder
 
-    require_writable(json_path, calibration_path, folder=out_folder)
+    read = (*files, *held_out, *([] if design_path is None else [design_path]))
+    require_writable(json_path, calibration_path, folder=out_folder, read=read)
     if design_path is not None:
         if files or held_out:
             raise UsageError("--design asks about protocols, before anything is measured: name no FILE beside it")
@@ -112,8 +113,8 @@ def command(
             if folder is not None and is_new:
                 folder.rmdir()  # nothing is left behind of what was not done
             raise
-        title = _title(recordings, unit)
         fitted, judges = _used(found, recordings, others)
+        title = _title(fitted, unit)
         written: dict[str, Path] = {}
         if folder is not None:
             step("writing the report")
@@ -198,7 +199,8 @@ def _check(files: tuple[str, ...], held_out: tuple[str, ...]) -> None:
 
 def _title(recordings: list[Recording], unit: str | None) -> str:
     names = dict.fromkeys(recording.unit for recording in recordings if recording.unit)
-    return unit or ", ".join(names) or recordings[0].name
+    first, count = recordings[0].name, len(recordings)
+    return unit or ", ".join(names) or (first if count == 1 else f"{first} and {count - 1} more")
 
 
 def _used(

@@ -100,7 +100,7 @@ def command(
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
-    require_writable(json_path, c3d_path, folder=out_folder)
+    require_writable(json_path, c3d_path, folder=out_folder, read=(*files, *calibration_paths))
     if body_weight_n is not None and 0.0 < body_weight_n < LEAST_WEIGHT_N:
         click.echo(
             f"warning: a body weight of {body_weight_n:g} N is {body_weight_n / 9.80665:.1f} kg: if it is in kg, give"

@@ -33,7 +33,7 @@ def command(
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
-    require_writable(json_path, folder=out_folder)
+    require_writable(json_path, folder=out_folder, read=[scenario])
     with progress() as step:
         step("reading the scenario")
         from smartshoe.kernels import warm_up

@@ -72,8 +72,10 @@ def _against(rivals: Sequence[Rival]) -> list[Statement]:
     if not rivals:
         return []
     nearest = rivals[0]
-    how = f"less likely by {nearest.margin:,.0f}" if nearest.margin >= 0.5 else "as likely"
-    says = f"{nearest.effect.replace('_', ' ')}, the nearest other, is {how} ({nearest.by})"
+    measure = "-2 log likelihood, by its fit" if nearest.by == "fit" else "-2 log evidence"
+    way = "less likely" if nearest.margin > 0.0 else "likelier"
+    how = f"{way} by {abs(nearest.margin):,.0f} of {measure}" if abs(nearest.margin) >= 0.5 else "as likely"
+    says = f"{nearest.effect.replace('_', ' ')}, the nearest other, is {how}"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 

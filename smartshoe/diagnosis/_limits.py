@@ -19,6 +19,7 @@ from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import listed
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import Zero
+from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect
@@ -215,13 +216,13 @@ def zero_changes_said(changes: Sequence[ZeroChange]) -> list[str]:
     return [
         f"the zero jumps, in shares of full scale, {_when(changes)}, as where a unit slips, water moves in a line or"
         " the room warms:"
-        " jumps that are not seen may imitate any effect, so that no cause is more than half sure, and no model"
+        " jumps that are not seen may imitate any effect of the unit, so that none is more than half sure, and no model"
         " foresees those of another recording"
     ]
 
 
 def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
-    few = [f"by {100 * one.share:+.2g} % at {one.begins_s:.4g} s in {one.recording}" for one in changes[:SAID]]
+    few = [f"by {100 * one.share:+.2g} % at {moment(one.begins_s, 4)} s in {one.recording}" for one in changes[:SAID]]
     return f"{', '.join(few)}{f' and {len(changes) - SAID} more' if len(changes) > SAID else ''}"
 
 

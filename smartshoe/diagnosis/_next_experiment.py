@@ -16,6 +16,7 @@ from smartshoe.diagnosis._members import begun_with
 from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Session
+from smartshoe.display import moment
 from smartshoe.models.effects import Conditions, effect, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
 from smartshoe.protocol import Protocol
@@ -115,8 +116,8 @@ def _again(found: Inference) -> str:
     for what, changes in (("gain", changes_of(found.own_gains)), ("zero", found.zero_changes)):
         if changes:
             return (
-                f"record {changes[0].recording} again, and watch unit, cable and logger at {changes[0].begins_s:.4g} s:"
-                f" whether the {what} changes there each time"
+                f"record {changes[0].recording} again, and watch unit, cable and logger at"
+                f" {moment(changes[0].begins_s, 4)} s: whether the {what} changes there each time"
             )
     return (
         "record one of these again twice, once without moving the unit and once after taking it out and putting it"

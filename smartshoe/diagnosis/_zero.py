@@ -131,8 +131,10 @@ def zeros_of(
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
     if abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
         return ()  # the reading agrees with the load, and the unit bears it
-    is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
     commanded = any(one.recording.command_n is not None for one in sessions if one.fitted.any())
+    if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
+        return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
+    is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
     borne = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):
         return (Zero(sensor, borne, reading_sd, abs(borne), (machine.name,), True),)  # no cause more is needed

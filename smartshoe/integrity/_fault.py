@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.display import moment
 from smartshoe.recording import Recording
 
 Severity = Literal["minor", "material", "fatal"]
@@ -37,7 +38,7 @@ class DataFault:
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``diagnose --json`` lists under ``data_faults``."""
-        where = f"{self.label}, {self.start_s:.6g}-{self.stop_s:.6g} s"
+        where = f"{self.label}, {moment(self.start_s)}-{moment(self.stop_s)} s"
         return {"kind": self.kind, "where": where, "share": self.share, "says": self.says}
 
 

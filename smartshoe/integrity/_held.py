@@ -48,6 +48,7 @@ def held(view: View, bad: Mask) -> Mask:
     log_chance = _log_chance(view, bad, starts, stops)
     sure = log_chance < _rarely_honest(log_chance, y.size, view.thresholds)
     sure |= _caught_up(view, starts, stops)
+    sure |= _stuck(view, bad, starts, stops)
     for first, last in zip(starts[sure], stops[sure], strict=True):
         at[first + 1 : last + 1] = True
     return at
@@ -215,4 +216,33 @@ def _caught_up(view: View, starts: Index, stops: Index) -> Mask:
         part = load[first : first + max(3 * (last - first) // 4, 1) + 1]
         moved = float(np.max(np.abs(part - part[0]))) - noise
         out[i] = view.thresholds.clear * view.gain * moved > abs(float(jump[last]))
+    return out
+
+
+def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
+    """(runs,) runs beside noise over which the load goes through more than a share of its span: half of it, by `clear`.
+
+    They need not end: a channel that freezes stays so until the recording does, and catches up with nothing. A dead
+    band, a friction and a saturation stand still as well, but as a rail beyond which there is no reading, for less of
+    the load, or without noise.
+    """
+    y, load, given = view.reading.values, view.load.values, view.thresholds
+    out = np.zeros(starts.size, dtype=bool)
+    sound = np.sort(y[~bad])
+    if sound.size <= 2 * given.few:
+        return out
+    inside = (y[starts] > sound[given.few - 1]) & (y[starts] < sound[-given.few])
+    span = float(np.ptp(load))
+    beside = given.few * given.local
+    for i in np.flatnonzero(inside & (stops - starts > given.few)):
+        first, last = int(starts[i]), int(stops[i])
+        near = max(y[max(first - beside, 0) : first + 1], y[last : last + beside + 1], key=len)
+        if near.size <= given.local:
+            continue
+        second = np.diff(near, 2)
+        product = second[1:] * second[:-1]
+        alternates = np.sum(product < 0.0) > np.sqrt(given.clear) * np.sum(product > 0.0)  # noise, not curvature
+        least = toggling(given) * view.reading.local_step[first]
+        if alternates and float(np.std(second)) / SECOND_DIFFERENCE > least:
+            out[i] = given.clear * float(np.ptp(load[first : last + 1])) > span
     return out

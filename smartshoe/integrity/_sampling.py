@@ -17,10 +17,8 @@ def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
     """Kind ``short_recording``: fatal, since so little shows nothing."""
     if len(recording) >= thresholds.least_samples:
         return
-    says = (
-        f"the recording holds {len(recording)} samples in {recording.duration_s:.3g} s: give at least"
-        f" {thresholds.least_samples} samples"
-    )
+    held = f"{len(recording)} samples in {recording.duration_s:.3g} s" if len(recording) > 1 else "one sample"
+    says = f"the recording holds {held}: give at least {thresholds.least_samples} samples"
     yield Finding("short_recording", np.ones(len(recording), dtype=bool), says, "fatal", True, says)
 
 
@@ -32,12 +30,19 @@ def missing_samples(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
             if not absent.any():
                 continue
             starts, stops = runs_of(absent)
-            longest = int((stops - starts).max())
+            count, longest = int(absent.sum()), int((stops - starts).max())
+            if count == 1:
+                found = "one sample: it is left out"
+            elif starts.size == 1:
+                found = f"{count} samples in a row: they are left out"
+            elif longest == 1:
+                found = f"{count} samples, each alone: they are left out"
+            else:
+                found = f"{count} samples, in {starts.size} stretches of up to {longest}: they are left out"
             yield Finding(
                 "missing_samples",
                 absent,
-                f"the {what} {channel.name} is missing in {int(absent.sum())} samples, in {starts.size} stretches of"
-                f" up to {longest}: they are left out",
+                f"the {what} {channel.name} is missing in {found}",
                 "minor" if absent.mean() < thresholds.faulty_share else "material",
                 True,
             )

@@ -13,7 +13,8 @@ from numba import njit
 
 _LAX = {"reassoc", "contract", "nsz"}  # sums may be reordered; nothing is assumed of NaN
 _BISECTIONS = 50
-STEPS, CLOSE = 60, 1e-9  # of Newton's for a first loading: a step that is less leaves about its square
+SOLVED = 1e-14  # of full scale: what an inverse may leave of its equation
+STEPS, CLOSE = 60, 1e-9  # of Newton's and the like; a step of Newton's that is less leaves about its square
 EASED = 1e-3  # of the width: within it the corner of a root is rounded
 NO_LOAD = 1e30  # stands for a load before the first one
 CYCLE_ENDS = 0.05  # of the cycle's height
@@ -82,21 +83,35 @@ def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ig
 
 @njit(cache=True)
 def relays_undone(signal, strength, half_widths, closed, open_, levelling, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out - strength relays(out) = ``signal`` (n,), by bisection; ``state`` moves on."""
-    trial = np.empty(half_widths.size)
+    """out (n,) with out - strength relays(out) = ``signal`` (n,); ``state`` moves on.
+
+    By the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counting half.
+    """
+    moved = np.empty(half_widths.size)
     for k in range(signal.size):
         y = signal[k]
         low, high = y - 2.0 * strength, y + 2.0 * strength
-        for _ in range(_BISECTIONS):
-            f = 0.5 * (low + high)
-            for i in range(trial.size):
-                trial[i] = state[i]
-            if f - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, trial) < y:
-                low = f
+        f, under, over, stays = low, 0.0, 0.0, 0
+        for i in range(STEPS):  # first the ends
+            moved[:] = state
+            left = f - y - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, moved)
+            if i == 0:
+                under, f = left, high
+                continue
+            if i == 1:
+                over = left
+            elif abs(left) <= SOLVED:
+                break
+            elif left < 0.0:
+                low, under = f, left
+                over *= 0.5 if stays == 1 else 1.0
+                stays = 1
             else:
-                high = f
-        f = 0.5 * (low + high)
-        _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, state)
+                high, over = f, left
+                under *= 0.5 if stays == -1 else 1.0
+                stays = -1
+            f = low - under * (high - low) / (over - under) if over > under else y
+        state[:] = moved
         out[k] = f
 
 

@@ -167,11 +167,47 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_read(
     assert [path.name for path in tmp_path.iterdir()] == ["here.txt"]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "identify t.csv --json t.csv",
+        "identify other.csv t.csv --calibration ./t.csv",
+        "validate t.csv --calibration c.json --json t.csv",
+        "validate other.csv --calibration t.csv --json t.csv",
+        "diagnose t.csv --json t.csv",
+        "diagnose t.csv --calibration link.csv",
+        "diagnose other.csv --hold-out t.csv --out new --json t.csv",
+        "diagnose other.csv --json same.json --calibration same.json",
+        "diagnose --design t.csv --json t.csv",
+        "gait t.csv --json t.csv",
+        "gait other.csv --calibration t.csv --c3d t.csv",
+        "check t.csv --json t.csv",
+        "run t.csv --json t.csv",
+        "sweep t.csv --out new --json t.csv",
+        "study t.csv --out new --json t.csv",
+    ],
+)
+def test_a_result_replaces_neither_what_is_read_nor_another_result(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.csv").write_text("measured once")
+    (tmp_path / "link.csv").symlink_to("t.csv")
+    assert run_command(words.split()) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(
+        r"error: \S+ is (read, and the result would replace it|to hold two results): give another name", said
+    )
+    assert (tmp_path / "t.csv").read_text() == "measured once"
+    assert {path.name for path in tmp_path.iterdir()} == {"t.csv", "link.csv"}
+
+
 def test_a_result_may_lie_in_the_folder_that_is_made(table: Path, tmp_path: Path) -> None:
     from smartshoe.cli._output import require_writable
 
     require_writable(str(tmp_path / "new" / "x.json"), "-", None, folder=str(tmp_path / "new"))
     require_writable("x.json", "/dev/null", folder=str(table.parent / "a" / "b"))
+    require_writable("/dev/null", "/dev/null", "-", "-", read=["/dev/null", "-"])
 
 
 def test_places_that_cannot_be_written_end_in_status_2(

@@ -147,6 +147,22 @@ def test_what_was_left_out_is_listed_neither_in_the_page_nor_in_the_calibration(
     assert f"fitted: {first} · judged on: {second} ·" in (out / "diagnosis.html").read_text(encoding="utf-8")
 
 
+def test_recordings_of_no_unit_are_headed_by_one_of_those_that_were_used_and_how_many_more(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dead, plain = _dead(tmp_path / "dead.csv"), []
+    for file in files:
+        recording = smartshoe.read(file)
+        plain.append(str(tmp_path / f"plain_{file.name}"))
+        columns = (recording.time_s, recording.force_n, recording.sensor.values)
+        np.savetxt(
+            plain[-1], np.column_stack(columns), delimiter=",", header="time_s,force_n,pressure_mbar", comments=""
+        )
+    for given, heading in (([str(dead), plain[0]], "plain_first"), (plain, "plain_first and 1 more")):
+        assert run_command(["diagnose", *given]) == 0
+        assert capsys.readouterr().out.startswith(f"{heading}: On data that was not fitted")
+
+
 def test_a_file_given_twice_is_one_experiment_in_the_limits_the_page_and_the_calibration(
     files: tuple[Path, Path], tmp_path: Path
 ) -> None:

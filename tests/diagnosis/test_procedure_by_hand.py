@@ -321,10 +321,10 @@ def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monke
     )
     assert (size.value, gained.value) == (pytest.approx(1.23), pytest.approx(50.0))
     assert (rival.value, rival.threshold) == (7.0, 0.0)
-    assert rival.says == "orifice leak, the nearest other, is less likely by 7 (fit)"
+    assert rival.says == "orifice leak, the nearest other, is less likely by 7 of -2 log likelihood, by its fit"
     cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 95.0),))  # of another kind there is the evidence alone
     assert cause.rivals == (Rival("delay", 90.0, "evidence"), Rival("orifice_leak", 95.0, "fit"))
-    assert cause.evidence[-1].says == "delay, the nearest other, is less likely by 90 (evidence)"
+    assert cause.evidence[-1].says == "delay, the nearest other, is less likely by 90 of -2 log evidence"
 
 
 def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -392,15 +392,27 @@ def test_no_rival_is_a_block_of_free_form(monkeypatch: pytest.MonkeyPatch) -> No
     near = (SimpleNamespace(effect="flexible_lag", margin=3.0), SimpleNamespace(effect="dead_band", margin=70.0))
     cause = _told(monkeypatch, exposed, laws=(("flexible_leak", 1.0),), alternatives=near)
     assert cause.rivals == (Rival("dead_band", 70.0, "evidence"), Rival("delay", 90.0, "evidence"))
-    assert cause.evidence[-1].says == "dead band, the nearest other, is less likely by 70 (evidence)"
+    assert cause.evidence[-1].says == "dead band, the nearest other, is less likely by 70 of -2 log evidence"
 
 
-@pytest.mark.parametrize(("margin", "said"), [(0.6, "less likely by 1"), (0.0, "as likely"), (-3.0, "as likely")])
-def test_a_rival_that_fits_no_worse_is_as_likely(monkeypatch: pytest.MonkeyPatch, margin: float, said: str) -> None:
+@pytest.mark.parametrize(
+    ("margin", "said"),
+    [
+        (0.6, "less likely by 1 of -2 log likelihood, by its fit"),
+        (0.0, "as likely"),
+        (-0.4, "as likely"),
+        (-3.0, "likelier by 3 of -2 log likelihood, by its fit"),
+    ],
+)
+def test_a_rival_that_fits_as_well_is_as_likely_and_one_that_fits_better_likelier(
+    monkeypatch: pytest.MonkeyPatch, margin: float, said: str
+) -> None:
     cause = _told(monkeypatch, effect("linear_leak").exposed_by, laws=(("orifice_leak", margin),))
     (rival,) = (one for one in cause.evidence if one.statistic == "margin to the nearest rival")
-    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, is {said} (fit)")
+    assert (rival.value, rival.says) == (margin, f"orifice leak, the nearest other, is {said}")
     assert _against(()) == []
+    (far,) = _against([Rival("delay", 278533.0, "evidence")])
+    assert far.says == "delay, the nearest other, is less likely by 278,533 of -2 log evidence"
 
 
 @pytest.mark.parametrize(("signal", "factor", "unit"), [("reading", -140.0, "mbar"), ("load", 800.0, "N")])

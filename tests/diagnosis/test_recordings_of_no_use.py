@@ -47,7 +47,7 @@ def _as(one: Recording, name: str) -> Recording:
 BAD = {
     "name its column with --sensor (columns: film)": _as(OTHER, "film"),
     "reference load": OTHER.without("force"),
-    "1 samples": OTHER.taken(slice(0, 1)),
+    "one sample": OTHER.taken(slice(0, 1)),
     "constant": _constant(OTHER),
 }
 

@@ -406,8 +406,10 @@ def test_of_zeros_that_change_the_largest_changes_are_said() -> None:
     assert said.startswith(
         "the zero jumps, in shares of full scale, by +3 % at 7.5 s in a, by +1.5 % at 15 s in a, by +1 % at 22.5 s in"
         " a, by +0.75 % at 30 s in a and 2 more, as where a unit slips, water moves in a line or the room warms: jumps"
-        " that are not seen may imitate any effect, so that no cause is more than half sure,"
+        " that are not seen may imitate any effect of the unit, so that none is more than half sure,"
     )
+    (late,) = zero_changes_said([ZeroChange("a", 1_700_000_007.54, 0.03)])
+    assert "by +3 % at 1700000007.5 s in a" in late
     assert zero_changes_said([]) == []
 
 

@@ -85,6 +85,7 @@ def test_both_zeros_are_told_where_they_differ_the_larger_first() -> None:
     assert [one.effect.name for one in found] == ["load_cell_tare", "zero_offset"]
     # Where they are as large and of one sign the unit bears that load.
     assert _zeros(_run(tare=0.03, offset=0.03)) == {}
+    assert _zeros(_run(tare=0.03, offset=0.035)) == {}
     assert set(_zeros(_run(tare=0.03, offset=-0.03))) == {"load_cell_tare", "zero_offset"}
 
 

@@ -61,8 +61,11 @@ def test_a_zero_is_named_from_so_many_of_its_deviations_on(monkeypatch: pytest.M
 def test_a_reading_that_agrees_with_the_load_or_is_far_off_is_no_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     both = MANY * math.sqrt(2.0) * STANDARD.zero_sd
     for by, is_named in ((0.999, False), (1.001, True)):
-        assert bool(_seen(monkeypatch, [(0.05, 0.05 + by * both, 0.0)])) is is_named
-        assert bool(_seen(monkeypatch, [(0.05, 0.05 - by * both, 0.0)])) is is_named
+        for way in (-by, by):
+            assert bool(_seen(monkeypatch, [(0.004, 0.004 + way * both, 0.0)])) is is_named
+            # A larger load is borne, and read by a curve: a tare and an offset of one size would be a coincidence.
+            assert bool(_seen(monkeypatch, [(0.05, 0.05 * (1.0 + way * STANDARD.same), 0.0)])) is is_named
+    assert [*_seen(monkeypatch, [(-0.05, -0.045, 0.0)])] == ["load", "reading"]  # nothing bears what pulls
     for reading, is_named in ((0.3001, False), (0.2999, True), (-0.3001, False)):
         assert bool(_seen(monkeypatch, [(0.0, reading, 0.0)])) is is_named
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from test_integrity_clean import simulated
@@ -103,6 +103,25 @@ def test_held_samples(protocol, seed, noise_percent, length, share):
         recall, false = recall_and_false(found, bad, touched)
         assert recall >= RECALL
         assert false < FALSELY_MASKED
+
+
+@settings(max_examples=12)
+@given(SEEDS, NOISES_PERCENT, st.floats(0.55, 0.95), st.booleans())
+def test_a_channel_that_freezes_is_held_until_the_end_or_since_the_beginning(seed, noise_percent, share, is_end):
+    """It catches up with nothing, so that the load alone tells; at no rail, where a dead band stands still as well."""
+    recording = recorded(dynamic_protocol(), seed, noise_percent)
+    reading = recording.sensor.values.copy()
+    at = round((share if is_end else 1.0 - share) * reading.size)
+    frozen = slice(at, None) if is_end else slice(None, at + 1)
+    assume(0.1 < (reading[at] - reading.min()) / np.ptp(reading) < 0.8)  # nearer the top it passes for saturation
+    assume(np.ptp(recording.load.values[frozen]) > 0.6 * np.ptp(recording.load.values))
+    reading[frozen] = reading[at]
+    found = examine([with_reading(recording, reading)])
+    assert "held_samples" in kinds(found)
+    masked = np.zeros(reading.size, dtype=bool)
+    masked[frozen] = True
+    assert np.mean(found.usable[0][masked]) < FALSELY_MASKED
+    assert np.mean(~found.usable[0][~masked]) < FALSELY_MASKED
 
 
 @settings(max_examples=12)

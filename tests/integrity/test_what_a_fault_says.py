@@ -6,8 +6,11 @@ import re
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from smartshoe.display import moment
 from smartshoe.integrity import examine
 from smartshoe.recording import Recording
 
@@ -64,6 +67,28 @@ def test_a_gap_is_one_and_several_are_counted(missing: tuple[tuple[int, int], ..
     assert _said(_pressed(READING).taken(kept)) == ("gaps", said)
 
 
+@pytest.mark.parametrize(("count", "held"), [(1, "one sample"), (2, "2 samples in 0.01 s")])
+def test_a_recording_of_one_sample_holds_one(count: int, held: str) -> None:
+    few = _pressed(READING).taken(np.arange(TIME_S.size) < count)
+    assert _said(few) == ("short_recording", f"the recording holds {held}: give at least 100 samples")
+
+
+@pytest.mark.parametrize(
+    ("gone", "said"),
+    [
+        (((500, 501),), "one sample: it is left out"),
+        (((500, 503),), "3 samples in a row: they are left out"),
+        (((500, 501), (700, 701)), "2 samples, each alone: they are left out"),
+        (((500, 503), (700, 701)), "4 samples, in 2 stretches of up to 3: they are left out"),
+    ],
+)
+def test_one_missing_sample_is_one_and_stretches_are_counted(gone: tuple[tuple[int, int], ...], said: str) -> None:
+    holey = READING.copy()
+    for first, stop in gone:
+        holey[first:stop] = np.nan
+    assert _said(_pressed(holey)) == ("missing_samples", f"the reading pressure is missing in {said}")
+
+
 def test_a_reading_that_repeats_once_is_one_and_several_are_told_with_the_longest_row() -> None:
     reading = np.rint((TRIANGLE + 1e-4 * NOISE[0]) / 1e-5) * 1e-5
     reading[1234] = reading[1233]
@@ -107,3 +132,21 @@ def test_two_clocks_are_said_with_the_lag_and_what_to_do() -> None:
     (late_s,) = re.findall(r"^load and reading come from two clocks: the reading is ([\d.]+) s late, more", said)
     assert float(late_s) == pytest.approx(0.35, abs=0.02)
     assert said.endswith("more than the unit's relaxation explains (record both by one clock)")
+
+
+@pytest.mark.parametrize(
+    ("begins_s", "said"), [(0.0, "10-20 s"), (1e5, "100010-100020 s"), (1.7e9, "1700000010-1700000020 s")]
+)
+def test_where_a_fault_lies_is_told_on_a_clock_that_counts_from_any_day(begins_s: float, said: str) -> None:
+    reading = _changed(READING, (1000, 0.3), (2000, 0.3))
+    late = Recording.from_arrays(
+        time_s=TIME_S + begins_s, force_n=800.0 * TRIANGLE, pressure_mbar=100.0 * reading, name="late"
+    )
+    (fault,) = examine([late]).faults
+    assert fault.to_dict()["where"] == f"late, {said}"
+
+
+@given(at_s=st.floats(-1e9, 2e9))
+def test_a_moment_is_told_to_the_millisecond(at_s: float) -> None:
+    assert float(moment(at_s)) == pytest.approx(at_s, rel=0.0, abs=1e-3)
+    assert "e" not in moment(at_s) or abs(at_s) < 1e-3

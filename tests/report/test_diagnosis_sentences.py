@@ -6,15 +6,19 @@ import math
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from diagnoses_made import BASELINE, LEAK_CAUSE, PLAY_CAUSE, case
+from diagnoses_made import BASELINE, LEAK, LEAK_CAUSE, PLAY_CAUSE, case
 from hypothesis import given
 from hypothesis import strategies as st
 
 from smartshoe.diagnosis import Gain
 from smartshoe.diagnosis._result import Rival
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
+    Row,
     comparison,
     gain_sentence,
     interval,
@@ -53,16 +57,20 @@ def test_effects_without_a_name_are_told_and_free_forms_as_such() -> None:
 
 def test_a_force_that_the_extended_model_gives_back_worse_is_the_baselines() -> None:
     made = case("one cause")
-    (row,) = [one for one in comparison(made) if one.name.startswith("error of the compensated force")]
-    assert row.after.endswith(" N")
-    assert row.change.endswith(" %")
-    (row,) = [
-        one
-        for one in comparison(replace(made, force_model=BASELINE))
-        if one.name.startswith("error of the compensated")
-    ]
-    assert row.before.endswith(" N")
-    assert (row.after, row.change) == ("by the baseline, see the limits", "")
+
+    def row(by: ExtendedModel | None) -> Row:
+        rows = comparison(replace(made, force_model=by))
+        return next(one for one in rows if one.name.startswith("error of the compensated force"))
+
+    own = row(None)
+    assert own.after.endswith(" N")
+    assert own.change.endswith(" %")
+    with_zero = BASELINE.with_part(effect("zero_offset"), np.array([0.01]))  # so that it gives readings as logged
+    for plain_model in (BASELINE, with_zero):
+        assert row(plain_model).before == own.before
+        assert (row(plain_model).after, row(plain_model).change) == ("by the baseline, see the limits", "")
+    # One effect is passed over and others are undone: it is no baseline, and its error is that of the result.
+    assert row(with_zero.with_part(*LEAK)) == own
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ class PlayHysteresis(Effect):
         return signal - float(values[0]) * out
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """The load whose loop gives the output, by bisection; exact."""
+        """The load whose loop gives the output, by false position; exact."""
         from smartshoe.kernels.memory import relays_undone
 
         strength, levelling = float(values[0]), float(values[3])
@@ -103,12 +103,14 @@ def _weights(half_widths: Array, width: float, spread: float, levelling: float, 
 
 
 def _c_body(states: list[str], strength: float, levelling: float, closed: Array, open_: Array) -> str:
+    from smartshoe.kernels.memory import SOLVED, STEPS
+
     count = len(states)
 
     def row(values: Array) -> str:
         return ", ".join(c_number(value) for value in values)
 
-    bent = c_number(2.0 / 3.0 * levelling)
+    bent, whole = c_number(2.0 / 3.0 * levelling), c_number(strength)
     load = "".join(f"    state[{k}] = {state};\n" for k, state in enumerate(states))
     save = "".join(f"    {state} = moved[{k}];\n" for k, state in enumerate(states))
     return f"""{{
@@ -116,14 +118,11 @@ def _c_body(states: list[str], strength: float, levelling: float, closed: Array,
     static const double closed[{count}] = {{{row(closed)}}};
     static const double open[{count}] = {{{row(open_)}}};
     double state[{count}], moved[{count}];
-    double low = x - {c_number(2.0 * strength)}, high = x + {c_number(2.0 * strength)};
-    double v = x;
-    int i, k;
-{load}    for (k = 0; k <= 50; k++) {{
-        double z = 0.0, g, above;
-        v = 0.5 * (low + high);
-        g = v > 0.0 ? v : 0.0;
-        above = g * g * (1.0 - {bent} * g);
+    double low = x - 2.0 * {whole}, high = x + 2.0 * {whole}, under = 0.0, over = 0.0, v = low;
+    int i, k, stays = 0;
+{load}    for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
+        double left = v - x, g = v > 0.0 ? v : 0.0;
+        const double above = g * g * (1.0 - {bent} * g);
         for (i = 0; i < {count}; i++) {{
             const double reach = g - 2.0 * half[i];
             double place = state[i] > reach ? state[i] : reach;
@@ -132,17 +131,31 @@ def _c_body(states: list[str], strength: float, levelling: float, closed: Array,
             moved[i] = place;
             down = reach > 0.0 ? reach : 0.0;
             up = place > 0.0 ? place : 0.0;
-            z += closed[i] * (0.5 * (above + down * down * (1.0 - {bent} * down)) - up * up * (1.0 - {bent} * up));
-            z += open[i] * (g - half[i] - place);
+            left -= {whole} * closed[i]
+                * (0.5 * (above + down * down * (1.0 - {bent} * down)) - up * up * (1.0 - {bent} * up));
+            left -= {whole} * open[i] * (g - half[i] - place);
         }}
-        if (k == 50) {{
+        if (k == 0) {{
+            under = left;
+            v = high;
+            continue;
+        }}
+        if (k == 1) {{
+            over = left;
+        }} else if (fabs(left) <= {SOLVED}) {{
             break;
-        }}
-        if (v - {c_number(strength)} * z < x) {{
+        }} else if (left < 0.0) {{
             low = v;
+            under = left;
+            over *= stays == 1 ? 0.5 : 1.0;
+            stays = 1;
         }} else {{
             high = v;
+            over = left;
+            under *= stays == -1 ? 0.5 : 1.0;
+            stays = -1;
         }}
+        v = over > under ? low - under * (high - low) / (over - under) : x;
     }}
     x = v;
 {save}}}"""
