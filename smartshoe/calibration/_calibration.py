@@ -19,7 +19,7 @@ from smartshoe.calibration._reader import Reader, parsed
 from smartshoe.errors import InputError, MissingChannelError, UnitError, UsageError
 from smartshoe.files.atomic import json_text, write_text
 from smartshoe.files.logs.accepted import RecordingLike, recording_of
-from smartshoe.models.effects import effect
+from smartshoe.models.effects import shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.first_order import simulate, steps
 from smartshoe.models.parameter import Parameter, finite_or_none
@@ -104,7 +104,7 @@ class Calibration:
         linear = ExtendedModel(1.0, share, self.a1, load_n, reading, self.reading_unit.symbol)
         if self.offset == 0.0:
             return linear
-        return linear.with_part(effect("zero_offset"), np.array([self.offset / reading]))
+        return linear.with_part(shift_of("reading"), np.array([self.offset / reading]))
 
     def to_dict(self) -> dict[str, Any]:
         """The file's object, schema smartshoe.calibration/1; no NaN, no infinity.

@@ -1,7 +1,7 @@
 """What a simulation gets wrong, why, and what mending it gains: `diagnose`."""
 
+from smartshoe.diagnosis._diagnose import diagnose
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.diagnosis._procedure import diagnose
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Trace
 from smartshoe.integrity.thresholds import Thresholds, described
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity import Integrity, OneClock
-from smartshoe.models.effects import Effect, effect
+from smartshoe.models.effects import Effect, between_clocks
 from smartshoe.recording import Channel, Recording
 
 
@@ -41,7 +41,7 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
     plain = Aligned(recordings, masks, (), (), places)
     if not lags.any() and not rates.any():
         return plain
-    delay, drift = effect("delay"), effect("clock_drift")
+    delay, drift = between_clocks("lag"), between_clocks("rate")
     shared = integrity.one_clock
     if shared is not None and abs(shared.before_s) < delay.parameters[0].upper:
         late, parting = (delay, np.array([shared.before_s])), (drift, np.array([shared.rate]))

@@ -124,10 +124,10 @@ def _fits_from(
     """Fits of what a linearisation about each start asks for, and of the ``breadth`` likeliest effects alone."""
     likelihood, found = state.likelihood(sessions), []
     for start in starts:
-        given, evidence, best = searched(start, sessions, state.thresholds)
+        evidence, best = searched(start, sessions, state.thresholds)
         alone = [evidence.posterior((k,)) for k in additions(evidence, (), breadth)] if breadth else []
         few = dict.fromkeys((best, *alone))  # what is asked for is often one of these
-        found += [fit(likelihood, with_members(given, one, start, likelihood), FEW_STEPS) for one in few]
+        found += [fit(likelihood, with_members(evidence.given, one, start, likelihood), FEW_STEPS) for one in few]
     return found
 
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from smartshoe.diagnosis._sensitivity import lagged, marginal
+from smartshoe.diagnosis._sensitivity import marginal
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
+from smartshoe.signals.lags import lagged
 
 USUAL = ExtendedModel(1.0, 0.08, 0.22, 800.0, 100.0, "mbar")  # like the paper's four units (Table 1)
 _, SHARE, RATE = BASELINE

@@ -44,7 +44,7 @@ def cause_of(
     )
     by = None if law is None else law.fit
     values = parameters_of(by or found.fit, name.effect.name if by else member.name, scale)
-    sure = confidence_of(name, thresholds), name.law
+    sure = confidence_of(name, thresholds), name.law_probability
     return Cause(name.effect, *sure, name.equivalents, values, evidence, won, member.size, rivals, member.name)
 
 
@@ -89,9 +89,9 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
             else "it is larger than all that is left, or than what small imperfections add up to"
         )
         says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
-        return [Statement("confidence of its kind", name.kind, thresholds.least_confidence, says)]
+        return [Statement("confidence of its kind", name.kind_probability, thresholds.least_confidence, says)]
     if name.kind_only:
-        is_certain = name.kind >= thresholds.least_confidence
+        is_certain = name.kind_probability >= thresholds.least_confidence
         says = (
             "the kind is sure, the law is not: no equation of it fits better than others"
             if is_certain

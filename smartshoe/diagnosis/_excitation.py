@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from smartshoe.diagnosis._session import LEAST_WINDOW, Session, have_later_cycle
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import LATER_CYCLES
-from smartshoe.signals.loading import turning_points
+from smartshoe.signals.loading import rises_of
 from smartshoe.signals.masks import runs_of
 
 
@@ -145,7 +144,7 @@ class _Rise(NamedTuple):
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
     load, step_s = session.conditions.load, session.conditions.step_s
     span = min(1.0, max(float(np.ptp(load)), 1e-9))
-    for first, last in pairwise(turning_points(load, thresholds.cycle * span)):
+    for first, last in rises_of(load, thresholds.cycle * span):
         rise = float(load[last] - load[first])
         if rise < thresholds.cycle * span or load[last] <= 0.0:
             continue

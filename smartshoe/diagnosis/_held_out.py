@@ -9,18 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from sys import float_info
 
 import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._sensitivity import nuisances
+from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import finite_or_none
-
-LEAST = float(np.finfo(float).tiny)  # squared error, so that none has a logarithm
 
 
 def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Array, Array]:
@@ -34,8 +33,7 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     seen = columns[mask]
     variance = float(np.var(residual[mask])) if mask.any() else 0.0
     of_state = variance / max(abs(model.relaxing_share * model.gain), 1e-6) ** 2 + 1e-9
-    own = [variance] * (len(session.gain_parts) + len(session.zero_changes))
-    inner = seen.T @ seen + np.diag([1e-9, of_state, *own, *[of_state] * len(session.gap_ends)])
+    inner = seen.T @ seen + a_nuisance_each(session, offset=1e-9, past=of_state, change=variance, gap=of_state)
     found = np.asarray(np.linalg.solve(inner, seen.T @ residual[mask]), dtype=np.float64)
     return found, columns @ found
 
@@ -160,11 +158,11 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | N
 
 
 def _log_ratio(before: Array | float, after: Array | float) -> Array:
-    """Logarithm of a squared error over another."""
-    return np.asarray(np.log(np.maximum(after, LEAST) / np.maximum(before, LEAST)))
+    """Logarithm of a squared error over another; no error counts as the least number there is."""
+    return np.asarray(np.log(np.maximum(after, float_info.min) / np.maximum(before, float_info.min)))
 
 
 def _percent(log_ratio: Array | float) -> Array:
     """By how much an error falls whose square changes so; the interval of few cycles may be beyond any number."""
-    most = -0.5 * math.log(LEAST)
+    most = -0.5 * math.log(float_info.min)
     return np.asarray(100.0 * (1.0 - np.exp(np.minimum(0.5 * np.asarray(log_ratio), most))))

@@ -53,7 +53,7 @@ from smartshoe.models.extended import ExtendedModel
 
 @dataclass(frozen=True, eq=False)
 class Inference:
-    """``baseline`` and ``fit``: the plain and the extended model; ``likelihood`` they were fitted by.
+    """``baseline`` and ``fit``: the plain and the extended model, each with the likelihood it was fitted by.
 
     ``members``, largest first; ``screening``: what each effect alone would take off the baseline's score, and
     ``likeness`` (k, k) of the same k, `Evidence.likeness`; ``undone``: members that fit by their difference, of which
@@ -64,7 +64,6 @@ class Inference:
 
     baseline: Fit
     fit: Fit
-    likelihood: Likelihood
     members: tuple[Member, ...]
     screening: tuple[tuple[str, float], ...]
     likeness: Array
@@ -85,14 +84,14 @@ def infer(
     """
     progress("fitting the baseline")
     plain = least_squares(start, sessions, thresholds)
-    given, evidence, best = searched(plain.model, sessions, thresholds)
+    evidence, best = searched(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
     # Within one, nothing validates anything.
     can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
     if not (is_unit and can_validate):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
-        return Inference(plain, weighed(likelihood, plain.model), likelihood, (), screening, likeness, (), can_validate)
-    begun = State(given, evidence, best, plain)
+        return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), can_validate)
+    begun = State(evidence, best, plain)
     if is_stretched(plain.model):
         begun = simpler(with_a_latency(begun, sessions), begun, sessions)
     state = _sought(begun, sessions, progress)
@@ -109,7 +108,7 @@ def infer(
             beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
         if foretells(beside.fit.model, plain.model, state, sessions, gained):
             return replace(beside, baseline=plain)
-        return replace(beside, baseline=plain, fit=weighed(beside.likelihood, plain.model), members=(), alone=None)
+        return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
@@ -139,7 +138,6 @@ def infer(
     return Inference(
         plain,
         found.fit,
-        found.likelihood,
         members,
         screening,
         likeness,
@@ -175,7 +173,6 @@ class _Judged:
     evidence: Evidence
     best: Posterior
     fit: Fit
-    likelihood: Likelihood
     refused: tuple[str, ...]
     undone: tuple[str, ...]
     is_stepped_down: bool
@@ -185,11 +182,11 @@ class _Judged:
         candidates, own = self.evidence.given.candidates, plain.model.names
         best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
         refused = (*self.refused, *(name for name in self.fit.model.names if name not in own))
-        return replace(self, fit=weighed(self.likelihood, plain.model), best=best, refused=refused, undone=())
+        return replace(self, fit=weighed(self.fit.likelihood, plain.model), best=best, refused=refused, undone=())
 
     def members(self) -> tuple[Member, ...]:
         """Each effect weighed against its alternatives."""
-        return members_of(self.evidence, self.best, self.refused, self.likelihood, self.fit)
+        return members_of(self.evidence, self.best, self.refused, self.fit)
 
 
 def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
@@ -236,7 +233,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = len(extra) < following
-    return _Judged(evidence, best, extended, likelihood, tuple(refused), left, is_stepped_down)
+    return _Judged(evidence, best, extended, tuple(refused), left, is_stepped_down)
 
 
 def _likeliest(
@@ -269,7 +266,7 @@ def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) 
     """
     members = found.members()
     while (less := _redundant(members, plain, found.evidence.thresholds)) is not None:
-        refitted = fit(found.likelihood, less.without.model)
+        refitted = fit(found.fit.likelihood, less.without.model)
         evidence, best = evidence_about(refitted.model, sessions, found.evidence)
         found = replace(found, fit=refitted, evidence=evidence, best=best)
         members = found.members()
@@ -296,7 +293,7 @@ def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> Stat
         return None
     likelihood = begun.likelihood(sessions)
     evidence, best = evidence_about(path[0], sessions, begun.evidence)
-    return State(evidence.given, evidence, best, fit(likelihood, path[0]), state.banned)
+    return State(evidence, best, fit(likelihood, path[0]), state.banned)
 
 
 def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Judged] | None:
@@ -316,7 +313,7 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
         if best.score >= nothing.score:
             continue
         one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
-        judged = _judged(State(begun.given, begun.evidence, best, one), plain, sessions)
+        judged = _judged(State(begun.evidence, best, one), plain, sessions)
         removed = before**2 - error_of(sessions, judged.fit.model) ** 2
         if not judged.is_stepped_down and removed > thresholds.tolerable**2:
             standing.append((begun.given.candidates[k].effect, judged))

@@ -70,7 +70,7 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
             continue  # roughly, and most are far from it
         anew, best = evidence_about(fitted.model, sessions, evidence)
         if own.score - best.score >= evidence.odds:
-            changed.append(State(anew.given, anew, best, fitted))
+            changed.append(State(anew, best, fitted))
     yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]
 
 

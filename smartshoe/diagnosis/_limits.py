@@ -21,13 +21,12 @@ from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.core import USUAL_WALL_RATIO
+from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
 from smartshoe.models.effects import Effect
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
-STIFFEST_WALL_RATIO = 1.78  # of the paper's four units (Table 1)
-SAID = 4  # changes of a gain, or a zero, that are said one by one
+SAID = 4  # of many of a kind, as changes of a gain, that are told one by one
 
 
 def parted_clocks(
@@ -119,7 +118,7 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
     alike = [one for one in names if one.effect.mechanism == name.effect.mechanism != ""]
     if name.effect.is_memoryless and not name.kind_only:
         alike += [one for one in names if one.effect.is_memoryless and one.kind_only]
-    surest = max(alike, key=lambda one: one.kind, default=name)
+    surest = max(alike, key=lambda one: one.kind_probability, default=name)
     if surest is name or name.member.size > thresholds.law_departure * surest.member.size:
         return None
     said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
@@ -144,17 +143,18 @@ def wall_ratio_of(model: ExtendedModel, sessions: Sequence[Session], thresholds:
     """What is said of a leak, or of heat, beside a wall and a gas of which nothing says how stiff each is."""
     if model.wall_ratio != USUAL_WALL_RATIO:  # one is known
         return None
+    softest, stiffest = PAPER_WALL_RATIOS
     gauges = [one.recording for one in sessions if one.recording.sensor.unit.quantity == "pressure"]
     if any("effective_area_m2" in one.metadata for one in gauges):
         least, most = WALL_RATIOS
         mend = f"mend effective_area_m2: the declared one makes an N beyond {least:g} to {most:g}, which no tube has"
-    elif apart(sessions, model, replace(model, wall_ratio=STIFFEST_WALL_RATIO)) > thresholds.material:
+    elif apart(sessions, model, replace(model, wall_ratio=stiffest)) > thresholds.material:
         mend = "declare effective_area_m2"
     else:
         return None
     return (
         f"how stiff the wall is beside the gas is not known (N = {model.wall_ratio:g} is taken, units of the paper have"
-        f" 1.51 to {STIFFEST_WALL_RATIO:g}): rates of leaks and times of heat go with it, beyond their intervals"
+        f" {softest:g} to {stiffest:g}): rates of leaks and times of heat go with it, beyond their intervals"
         f" ({mend})"
     )
 

@@ -71,9 +71,8 @@ class Member:
         return self.effect.name
 
 
-def members_of(
-    evidence: Evidence, best: Posterior, refused: Sequence[str], likelihood: Likelihood, extended: Fit
-) -> tuple[Member, ...]:
+def members_of(evidence: Evidence, best: Posterior, refused: Sequence[str], extended: Fit) -> tuple[Member, ...]:
+    likelihood = extended.likelihood
     chosen, thresholds = [evidence.given.candidates[member] for member in best.members], evidence.thresholds
     less = [fit(likelihood, _without(one.name, extended.model), FEW_STEPS) for one in chosen]
     whole = _left(likelihood, extended)

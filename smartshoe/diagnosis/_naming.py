@@ -16,18 +16,18 @@ from smartshoe.models.effects import Effect, catalogue
 
 @dataclass(frozen=True, eq=False)
 class Name:
-    """``kind``: by its odds, that it is this effect or one of ``equivalents``, which nothing tells from it.
+    """``kind_probability``: by its odds, that it is this effect or one of ``equivalents``, which nothing tells from it.
 
-    ``law``: that it is this effect and not its nearest rival in the family, one half in a dead heat. ``kind_only``: its
-    family is what was found; its equation follows no better than others of the family. ``is_sure``: that it is of this
-    family. ``by``: the law as it was fitted in the place of a flexible block, which stays in the model, since the law
-    departs by more than a little and by no more than laws do.
+    ``law_probability``: that it is this effect and not its nearest rival in the family, one half in a dead heat.
+    ``kind_only``: its family is what was found; its equation follows no better than others of the family. ``is_sure``:
+    that it is of this family. ``by``: the law as it was fitted in the place of a flexible block, which stays in the
+    model, since the law departs by more than a little and by no more than laws do.
     """
 
     member: Member
     effect: Effect
-    kind: float
-    law: float
+    kind_probability: float
+    law_probability: float
     equivalents: tuple[str, ...]
     kind_only: bool = False
     is_sure: bool = True
@@ -68,11 +68,11 @@ def names_of(
     likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
-        is_firm = not is_clocked and any(one.kind >= thresholds.least_confidence for one in likely)
+        is_firm = not is_clocked and any(one.kind_probability >= thresholds.least_confidence for one in likely)
         return tuple(
             one
             for one in likely
-            if one.is_sure or (is_firm and one.kind > 0.5 and one.member.size > thresholds.tolerable)
+            if one.is_sure or (is_firm and one.kind_probability > 0.5 and one.member.size > thresholds.tolerable)
         )
     larger = tuple(one for one in likely if one.member.size > left)
     if larger and is_followed:
@@ -141,7 +141,7 @@ def _nearest_of_kind(block: Member) -> Effect:
 
 
 def _doubted(name: Name) -> Name:
-    return replace(name, kind=min(name.kind, 0.5), is_sure=False)
+    return replace(name, kind_probability=min(name.kind_probability, 0.5), is_sure=False)
 
 
 def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
@@ -163,9 +163,10 @@ def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, law
 
 def confidence_of(name: Name, thresholds: Thresholds) -> float:
     """That it is what it is named, or one of its equivalents: more than by its odds where it is sure, else no more."""
-    if not name.is_sure or name.kind < thresholds.least_confidence:
-        return name.kind
-    return name.kind / (name.kind + (1.0 - name.kind) * math.exp(-thresholds.named_odds))
+    kind = name.kind_probability
+    if not name.is_sure or kind < thresholds.least_confidence:
+        return kind
+    return kind / (kind + (1.0 - kind) * math.exp(-thresholds.named_odds))
 
 
 def probability_of_law(one: Member, thresholds: Thresholds) -> tuple[float, tuple[str, ...]]:

@@ -72,7 +72,7 @@ def next_experiment(
     other = _in_place_of(found, part, rival)
     margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
     peak_n = found.fit.model.full_scale_load_n
-    noise_sd = found.likelihood.noise_sd
+    noise_sd = found.fit.likelihood.noise_sd
     finest = min(sessions, key=lambda one: one.conditions.step_s)
     expected = {
         name: expected_margin(truth, other, made(peak_n), noise_sd, finest) for name, made in EXPERIMENTS.items()
@@ -128,7 +128,7 @@ def _again(found: Inference) -> str:
 def _in_place_of(found: Inference, name: str, rival: str) -> Fit:
     """The fit with ``rival`` in the place of an effect."""
     less = found.fit.model.without(name)
-    return fit(found.likelihood, begun_with(effect(rival), less, found.likelihood))
+    return fit(found.fit.likelihood, begun_with(effect(rival), less, found.fit.likelihood))
 
 
 def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:

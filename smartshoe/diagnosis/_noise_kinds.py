@@ -7,17 +7,9 @@ from collections.abc import Sequence
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects.coloured_noise import ColouredNoise
-from smartshoe.models.effects.coloured_noise import evidence as wandering
-from smartshoe.models.effects.heteroscedastic_noise import HeteroscedasticNoise
-from smartshoe.models.effects.heteroscedastic_noise import evidence as growing
-from smartshoe.models.effects.hum import Hum
-from smartshoe.models.effects.hum import evidence as humming
-from smartshoe.models.effects.timing_jitter import TimingJitter
-from smartshoe.models.effects.timing_jitter import evidence as jittering
+from smartshoe.models.effects import NoiseEffect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
-KINDS = {Hum: humming, TimingJitter: jittering, HeteroscedasticNoise: growing, ColouredNoise: wandering}
 # A sample that repeats the one before it lags like jitter; a dropout or a spike makes the variance follow the load.
 IMITATED_BY = frozenset({"held_samples", "dropouts", "spikes", "gaps", "uneven_sampling"})
 
@@ -35,6 +27,8 @@ def noise_kinds(
     Where structure is left that no effect has ``explained``, it would be taken for coloured noise. Where no load cycle
     repeats, the ``memory`` of what is left tells of it. Nothing weaker than ``material`` (share of full scale) counts.
     """
+    kinds = [one for one in catalogue().values() if isinstance(one, NoiseEffect)]
+    kinds.sort(key=lambda one: one.has_memory)  # what most looks like other things is told last
     found = []
     for session in fine:
         faults = {fault.kind for fault in known if fault.recording == session.index}
@@ -43,20 +37,21 @@ def noise_kinds(
         conditions = session.conditions
         prediction = model.simulate(conditions)
         residual = session.reading - prediction
-        for noise, evidence in KINDS.items():
-            if noise.name in faults or (noise is ColouredNoise and not explained):
+        for noise in kinds:
+            if noise.name in faults or (noise.has_memory and not explained):
                 continue
-            one = evidence(residual, conditions, prediction, conditions.step_s)
+            one = noise.evidence(residual, conditions, prediction)
             if one is not None and one.strength >= material:
                 found.append(_throughout(session, noise.name, one.says))
-    told = {fault.recording for fault in found if fault.kind == ColouredNoise.name}
+    remembering = next(one.name for one in kinds if one.has_memory)
+    told = {fault.recording for fault in found if fault.kind == remembering}
     if memory is not None and memory.is_noise and memory.rms >= material:
         says = (
             f"what is left is correlated over about {memory.tau_s:.2g} s, under any load alike: coloured noise of"
             f" {100 * memory.rms:.2g} % of full scale"
         )
         found += [
-            _throughout(session, ColouredNoise.name, says)
+            _throughout(session, remembering, says)
             for session in fine
             if session.fitted.any() and session.index not in told
         ]

@@ -1,21 +1,21 @@
-"""From recordings to a diagnosis: integrity, baseline, inference, what is left, what it is worth on held-out data."""
+"""From sound recordings to a diagnosis: baseline, inference, what is left, what it is worth on held-out data."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._causes import cause_of, zero_cause_of
-from smartshoe.diagnosis._characteristic import characteristic_of
-from smartshoe.diagnosis._force import compensation, force_of, not_undone_of
+from smartshoe.diagnosis._force import Compensation, compensation, force_of, not_undone_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
-from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
+from smartshoe.diagnosis._held_out import Errors, Gain, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._inference import Inference, infer
 from smartshoe.diagnosis._limits import (
+    SAID,
     elsewhere_of,
     end_of_range_of,
     own_gains_of,
@@ -30,8 +30,8 @@ from smartshoe.diagnosis._parameters import joint_parameters
 from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import beyond
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
-from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
-from smartshoe.diagnosis._session import Scale, Session, pastless
+from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
+from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
@@ -45,236 +45,200 @@ from smartshoe.diagnosis._verdict import (
     unexplained_of,
     verdict_of,
 )
-from smartshoe.diagnosis._withheld import causes_among
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of, zeros_of
-from smartshoe.diagnosis.decay import decay_of
-from smartshoe.errors import UsageError
-from smartshoe.files.logs.accepted import RecordingLike, recordings_of
-from smartshoe.integrity import Integrity, examine, twins
-from smartshoe.integrity.thresholds import Thresholds, decided_by
+from smartshoe.diagnosis._withheld import Chosen, causes_among
+from smartshoe.diagnosis._zero import Zero, offsets, zeros_of
+from smartshoe.integrity import DataFault, Integrity
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.models.effects import catalogue
+from smartshoe.models.effects import catalogue, shift_of
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 
-NEAREST = 4  # effects that are told where none is named
-
-
-def _silent(_: str) -> None:
-    return None
-
-
-def diagnose(
-    recordings: RecordingLike | Sequence[RecordingLike],
-    hold_out: RecordingLike | Sequence[RecordingLike] | None = None,
-    *,
-    material: float | None = None,
-    thresholds: Thresholds | None = None,
-    progress: Progress = _silent,
-) -> Diagnosis:
-    """What the baseline simulation of ``recordings`` gets wrong, why, and what mending it gains.
-
-    Parameters
-    ----------
-    recordings
-        Load and reading of one unit (recordings, paths or DataFrames), each a session of its own unless its metadata
-        ``continues`` names another.
-    hold_out
-        Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is.
-    material
-        Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given.
-    thresholds
-        Every number that decides.
-    progress
-        Called with a few words at each step.
-
-    Raises
-    ------
-    UsageError
-        Where no recording is given, of recordings of several units, and of numbers to decide by that are none. A
-        diagnosis that the data cannot support comes back with the verdict "refused" and the reason in ``limits``.
-    """
-    fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
-    if not fitted:
-        raise UsageError("diagnose was given no recording: give one at least")
-    if len(units := sorted({one.unit for one in (*fitted, *kept_out) if one.unit})) > 1:
-        raise UsageError(f"recordings of different units ({', '.join(units)}): diagnose one unit at a time")
-    decided = decided_by(thresholds, material)
-    everything, count = [*fitted, *kept_out], len(fitted)
-    integrity = examine(everything, decided)
-    everything = [*integrity.recordings]
-    useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
-    left_out = twins(everything) | dict(zip(useless, integrity.refusals, strict=True))
-    pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
-    if any(k < count for k in pulled):
-        return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
-    left_out |= pulled
-    if all(k in left_out for k in range(count)):
-        return _refused(everything, integrity, list(left_out.values()), decided)
-    usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
-    found = _diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
-    return replace(found, limits=(*_without(everything, count, left_out), *found.limits))
-
-
-def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
-    """Why a recording is none of a unit that is pressed, or None."""
-    low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
-    if not (low < 0 < high and min(-low, high) > thresholds.same * max(-low, high)):
-        return None
-    return (
-        f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
-        " which bears compression only (turn the sign of the load, set it to zero at rest, or take its mean out, if"
-        " that is what was meant)"
-    )
-
-
-def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
-    """What is said of recordings that lack or are left out, by place; the first ``count`` were to be fitted."""
-    said = [f"left out: {why}" for why in left_out.values()]
-    names = {recordings[k].name for k in left_out}
-    for one in pastless([one for k, one in enumerate(recordings) if k not in left_out]):
-        earlier = one.metadata["continues"]
-        why = f"which is not among the recordings: it is taken as the unit's first after a rest (give {earlier} too)"
-        if earlier in names:
-            why = "which is left out: it is taken as a session of its own"
-        elif earlier == one.name:
-            why = "which is itself: it is taken as the unit's first after a rest (name the recording before it)"
-        said.append(f"{one.label} continues {earlier}, {why}")
-    if count < len(recordings) and all(k in left_out for k in range(count, len(recordings))):
-        said.append("no recording to judge on is left: load cycles of those that are fitted are held out instead")
-    return said
-
-
-def _refused(
-    recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str], thresholds: Thresholds
-) -> Diagnosis:
-    sensors = recordings[0].sensors
-    unit = sensors[0].unit.symbol if sensors else ""
-    return Diagnosis(
-        "refused",
-        f"no diagnosis: {refusals[0]}",
-        unit,
-        0.0,
-        0.0,
-        data_faults=integrity.faults,
-        limits=(*refusals, *(said for one in recordings if (said := _seen(one, thresholds)) is not None)),
-        thresholds=thresholds,
-    )
-
-
-def _seen(recording: Recording, thresholds: Thresholds) -> str | None:
-    """What is known of a recording without a model."""
-    decay = decay_of(recording, thresholds)
-    return decay.says if decay is not None else characteristic_of(recording, thresholds)
-
 
 @on_one_thread
-def _diagnosed(
+def diagnosed(
     recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds, progress: Progress
 ) -> Diagnosis:
+    """What ``recordings`` say of their simulation; the first ``count`` are fitted, the others judge."""
     given = prepared(recordings, count, integrity, thresholds)
     sessions, fine, scale = given.sessions, given.fine, given.scale
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
-    extended = found.fit.model
-    plain, residuals = ([residual_of(one, model) for one in sessions] for model in (found.baseline.model, extended))
-    before = residual_structure(sessions, plain, thresholds)
-    after = residual_structure(sessions, residuals, thresholds)
-    within = _left_of_what_was_fitted(sessions, residuals, thresholds)
-    left = max(within.rms, within.size)
-    silent = given.is_no_unit or not found.can_validate
-    zeros = [] if silent else _zeros(found, given, left, thresholds, within.memory)
-    is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
-    named = causes_among(found, given, zeros, left, thresholds, is_followed=is_followed)
-    baseline, best = errors(fine, found.baseline.model), errors(fine, extended)
+    plain = found.baseline.model
+    left = _left_by(found, given, integrity.faults, thresholds)
+    off = [residual_of(one, found.fit.model) for one in fine]  # thinning makes noise of neighbours alike
+    extended = replace(found.fit.model, noise=fitted_rms(fine, off))
+    baseline, best = errors(fine, plain), errors(fine, extended)
+    named = _named(found, given, left, thresholds)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
     causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
-    off = [residual_of(one, extended) for one in fine]  # thinning makes noise of neighbours alike
-    extended = replace(extended, noise=fitted_rms(fine, off))
-    elsewhere = off_elsewhere(fine, off, max(within.size, beyond_noise(fine, off, thresholds)), thresholds)
-    known = known_error(integrity.faults, sessions, scale)
-    # Beside causes what is left is weighed against what was wrong.
-    is_shown = found.can_validate and (after.is_tested or bool(causes))
-    unproven = 0.0 if is_shown else not_shown_to_be_noise(fine, off, after, thresholds, known)
-    verdict: Verdict = "unexplained"
-    if not given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
-        follows = all(name.is_sure and not name.kind_only for name in named.names)
-        # What is followed is there, though of no kind with a name, or where too little is left to test for more.
-        least = max(thresholds.tolerable, thresholds.material, known)
-        gained = 0.0 if causes else won.certain_fall(scale)
-        besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
-        verdict = verdict_of(causes, before, after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides)
-    rest = unexplained_of(causes, before, after)
-    with_zero = _with_offset(extended, named.zeros, sessions, scale)
-    judged = left_where_judged(fine, off, thresholds)
-    structure = judged if unproven else min(max(after.rms, elsewhere), judged)
+    judged = _judged(found, given, left, off, named, causes, won, thresholds)
+    verdict, rest = judged.verdict, unexplained_of(causes, left.before, left.after)
+    of_held_out = left_where_judged(fine, off, thresholds)
+    structure = of_held_out if judged.unproven else min(max(left.after.rms, judged.elsewhere), of_held_out)
     noise_variance = max(best.rmse**2 - structure**2, 0.0)
-    explained = verdict in ("adequate", "explained") or after.is_noise
-    noise = noise_kinds(fine, extended, integrity.faults, explained, thresholds.material, within.memory)
+    explained = verdict in ("adequate", "explained")
+    noise = noise_kinds(
+        fine,
+        extended,
+        integrity.faults,
+        explained or left.after.is_noise,
+        thresholds.material,
+        left.within.memory,
+    )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
     parameters, covariance = joint_parameters(found.fit, scale)
-    force = compensation(fine, extended, found.baseline.model, thresholds)
-    ways = beyond(sessions, scale, thresholds) if won.is_loss or elsewhere else None
+    force = compensation(fine, extended, plain, thresholds)
+    says = sentence_of(
+        verdict,
+        names_in(causes, len(minor)),
+        baseline,
+        best,
+        not_explained_of(rest, judged.elsewhere, judged.unproven, thresholds),
+        thresholds,
+        worse=won.is_loss,
+        withheld=_is_silent(found, given) or bool(named.limits or found.zero_changes or found.own_gains),
+    )
     return Diagnosis(
         verdict,
-        sentence_of(
-            verdict,
-            names_in(causes, len(minor)),
-            baseline,
-            best,
-            not_explained_of(rest, elsewhere, unproven, thresholds),
-            thresholds,
-            worse=won.is_loss,
-            withheld=silent or bool(named.limits or found.zero_changes or found.own_gains),
-        ),
+        says,
         scale.unit.symbol,
         scale.load_n,
         abs(scale.reading),
         causes=tuple(causes),
         minor=minor,
         data_faults=(*integrity.faults, *noise),
-        baseline=_goodness(baseline, force.before.held_out_n, before, scale),
-        extended=_goodness(best, force.error.held_out_n, after, scale),
+        baseline=_goodness(baseline, force.before.held_out_n, left.before, scale),
+        extended=_goodness(best, force.error.held_out_n, left.after, scale),
         gain=None if best.is_empty else won,
         explainable_percent=_percent_less(noise_variance, baseline.rmse**2),
         explained_percent=_percent_less(best.rmse**2, baseline.rmse**2),
         rivals=causes[0].rivals if causes else _nearest(found),
         next_experiment=next_experiment(
-            found, causes, sessions, given.excitation, open_=verdict not in ("adequate", "explained"), worse=won.is_loss
+            found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
         ),
-        limits=(
-            *given.limits,
-            *([worse_of(won, ways)] if won.is_loss else []),
-            *([elsewhere_of(elsewhere, within.size, ways)] if elsewhere and not won.is_loss else []),
-            *force_of(force, thresholds),
-            *not_undone_of(force.model, fine[0].conditions.step_s),
-            *named.limits,
-            *(
-                said
-                for said in (
-                    end_of_range_of(extended),
-                    wall_ratio_of(extended, sessions, thresholds),
-                )
-                if said is not None
-            ),
-            *own_gains_of(found.own_gains),
-            *zero_changes_said(found.zero_changes),
-            *refusals_of(found),
-        ),
+        limits=_limits(found, given, named, extended, force, judged, left, thresholds),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
-        model=with_zero,
-        baseline_model=found.baseline.model,
+        model=_with_offset(extended, named.zeros, sessions, scale),
+        baseline_model=plain,
         force_model=_with_offset(force.model, named.zeros, sessions, scale) if force.passed_over else None,
         parameters=parameters,
         covariance=covariance,
-        traces=tuple(_trace(session, found.baseline.model, extended, scale) for session in fine),
+        traces=tuple(_trace(session, plain, extended, scale) for session in fine),
         thresholds=thresholds,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _LeftOver:
+    """What the plain model leaves ``before`` effects and the extended one ``after``; ``within`` what was fitted.
+
+    ``is_followed``: all effects together leave as little of what was fitted as laws do. ``known``: rms that faults of
+    the data add to it, a share of full scale.
+    """
+
+    before: ResidualStructure
+    after: ResidualStructure
+    within: ResidualStructure
+    is_followed: bool
+    known: float
+
+
+def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault], thresholds: Thresholds) -> _LeftOver:
+    sessions = given.sessions
+    models = found.baseline.model, found.fit.model
+    plain, residuals = ([residual_of(one, model) for one in sessions] for model in models)
+    before, after = (residual_structure(sessions, one, thresholds) for one in (plain, residuals))
+    within = _left_of_what_was_fitted(sessions, residuals, thresholds)
+    is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
+    return _LeftOver(before, after, within, is_followed, known_error(faults, sessions, given.scale))
+
+
+def _is_silent(found: Inference, given: Prepared) -> bool:
+    """Whether nothing may be named, whatever fits."""
+    return given.is_no_unit or not found.can_validate
+
+
+def _named(found: Inference, given: Prepared, left: _LeftOver, thresholds: Thresholds) -> Chosen:
+    """The causes in what was ``found``."""
+    most = max(left.within.rms, left.within.size)
+    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, thresholds, left.within.memory)
+    return causes_among(found, given, zeros, most, thresholds, is_followed=left.is_followed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Outcome:
+    """The verdict, by what was ``won``, what is ``elsewhere`` (`off_elsewhere`) and ``unproven``.
+
+    ``unproven`` is that of `not_shown_to_be_noise`.
+    """
+
+    verdict: Verdict
+    won: Gain
+    elsewhere: float
+    unproven: float
+
+
+def _judged(
+    found: Inference,
+    given: Prepared,
+    left: _LeftOver,
+    off: Sequence[Array],
+    named: Chosen,
+    causes: Sequence[Cause],
+    won: Gain,
+    thresholds: Thresholds,
+) -> _Outcome:
+    """By what is ``left``, and ``off`` at the full rate, (n,) each, and what was ``won`` on what is held out."""
+    fine, known = given.fine, left.known
+    elsewhere = off_elsewhere(fine, off, max(left.within.size, beyond_noise(fine, off, thresholds)), thresholds)
+    # Beside causes what is left is weighed against what was wrong.
+    is_shown = found.can_validate and (left.after.is_tested or bool(causes))
+    unproven = 0.0 if is_shown else not_shown_to_be_noise(fine, off, left.after, thresholds, known)
+    if given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
+        return _Outcome("unexplained", won, elsewhere, unproven)
+    follows = all(name.is_sure and not name.kind_only for name in named.names)
+    # What is followed is there, though of no kind with a name, or where too little is left to test for more.
+    least = max(thresholds.tolerable, thresholds.material, known)
+    gained = 0.0 if causes else won.certain_fall(given.scale)
+    besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
+    verdict = verdict_of(
+        causes, left.before, left.after, thresholds, follows, known, worse=won.is_loss, elsewhere=besides
+    )
+    return _Outcome(verdict, won, elsewhere, unproven)
+
+
+def _limits(
+    found: Inference,
+    given: Prepared,
+    named: Chosen,
+    extended: ExtendedModel,
+    force: Compensation,
+    judged: _Outcome,
+    left: _LeftOver,
+    thresholds: Thresholds,
+) -> tuple[str, ...]:
+    """All that limits the diagnosis, in sentences."""
+    won, elsewhere = judged.won, judged.elsewhere
+    ways = beyond(given.sessions, given.scale, thresholds) if won.is_loss or elsewhere else None
+    of_model = end_of_range_of(extended), wall_ratio_of(extended, given.sessions, thresholds)
+    return (
+        *given.limits,
+        *([worse_of(won, ways)] if won.is_loss else []),
+        *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_loss else []),
+        *force_of(force, thresholds),
+        *not_undone_of(force.model, given.fine[0].conditions.step_s),
+        *named.limits,
+        *(said for said in of_model if said is not None),
+        *own_gains_of(found.own_gains),
+        *zero_changes_said(found.zero_changes),
+        *refusals_of(found),
     )
 
 
@@ -289,7 +253,7 @@ def _left_of_what_was_fitted(
 
 def _nearest(found: Inference) -> tuple[Rival, ...]:
     """The few effects that take most off by themselves; flexible blocks are none."""
-    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:NEAREST])
+    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:SAID])
 
 
 def _zeros(
@@ -356,6 +320,3 @@ def _trace(session: Session, baseline: ExtendedModel, extended: ExtendedModel, s
         session.cycle,
         session.index,
     )
-
-
-__all__ = ["diagnose"]

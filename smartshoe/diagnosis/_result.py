@@ -178,6 +178,7 @@ class Diagnosis(Summarised):
     ``force_model`` is the plain one, each with its zero, where its inverse gives the load back and that of ``model``
     does not; None where that does. ``extended.force_rmse_n`` is of the one that `calibration` compensates by.
     ``screening``: effects and what each alone could take off the baseline's error (-2 log likelihood).
+    ``left_out``: which recordings were, and why, as ``limits`` begin with it.
     ``minor``: effects that stay in the model and are no causes: immaterial, unsure, undone by others, at a bound.
     ``leftover`` says where the remaining structure sits. ``parameters`` of all effects in the model, as
     ``effect.parameter``, with their ``covariance``.
@@ -199,6 +200,7 @@ class Diagnosis(Summarised):
     rivals: tuple[Rival, ...] = ()
     next_experiment: NextExperiment | None = None
     limits: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
     leftover: str | None = None
     screening: tuple[tuple[str, float], ...] = ()
     likeness: Array | None = None
@@ -209,6 +211,11 @@ class Diagnosis(Summarised):
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
     covariance: tuple[tuple[float, ...], ...] = ()
     thresholds: Thresholds = field(default_factory=Thresholds)
+
+    @property
+    def limits_of_the_rest(self) -> tuple[str, ...]:
+        """``limits``, but for those that say which recordings were ``left_out``."""
+        return self.limits[len(self.left_out) :]
 
     def calibration(self, *, unit: str = "", sample_rate_hz: float = 100.0, created: str = "") -> Calibration:
         """The extended model as a calibration, for `compensate`, `export` and a twin.

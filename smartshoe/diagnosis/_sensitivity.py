@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import lfilter
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
@@ -24,6 +23,7 @@ from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.signals.lags import lagged
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +117,15 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     """
     held = abs(model.relaxing_share) * abs(model.gain)
     begun = float(np.abs(session.conditions.load[0]))
-    sd = max(held * max(begun, thresholds.unknown_past), 1e-6)
-    own = [1.0] * (len(session.gain_parts) + len(session.zero_changes))
-    gaps = [1.0 / max(held * float(np.max(session.conditions.load)), 1e-6) ** 2] * len(session.gap_ends)
-    return np.diag([0.0, 1.0 / sd**2, *own, *gaps])
+    sd = max(held * max(begun, thresholds.unknown_past), FLOOR)
+    gap_sd = max(held * float(np.max(session.conditions.load)), FLOOR)
+    return a_nuisance_each(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
+
+
+def a_nuisance_each(session: Session, *, offset: float, past: float, change: float, gap: float) -> Array:
+    """(2 + k, 2 + k) diagonal: a number for each column of `nuisances`, in their order."""
+    changes = [change] * (len(session.gain_parts) + len(session.zero_changes))
+    return np.diag([offset, past, *changes, *[gap] * len(session.gap_ends)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,9 +369,3 @@ def _factors(session: Session, thresholds: Thresholds) -> Array:
     elapsed = 2.0 * time_s / max(float(time_s[-1]), step_s) - 1.0
     found = [linear, 1.5 * linear**2 - 0.5, direction, speed, elapsed, 1.5 * elapsed**2 - 0.5]
     return np.asfortranarray(np.column_stack(found))
-
-
-def lagged(signal: Array, step_s: float, tau_s: float) -> Array:
-    """``signal`` (n,) through a first-order lag, started in steady state."""
-    keep = float(np.exp(-step_s / tau_s))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], signal, zi=np.array([keep * signal[0]]))[0])

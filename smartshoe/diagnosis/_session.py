@@ -23,7 +23,7 @@ from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Conditions
 from smartshoe.models.effects.cycle_conditioning import half_way
 from smartshoe.recording import Channel, Recording
-from smartshoe.signals.loading import ramps, turning_points
+from smartshoe.signals.loading import ramps, rises_of
 from smartshoe.signals.masks import bridged, runs_of
 from smartshoe.units import Unit
 
@@ -286,47 +286,26 @@ def _session(
     thresholds: Thresholds,
     like: Session | None = None,
 ) -> Session:
-    time_s = recording.time_s - recording.time_s[0]
-    step_s = recording.sample_time_s
-    load_n, load_present = recording.force_n, recording.load.present
-    reading = _reading(recording, scale.unit)
-    good = usable & recording.sensor.present & load_present
-    reading = bridged(time_s, reading, good)
-    load_n = bridged(time_s, load_n, load_present)
-    known = load_present
-    extra = _logged_beside(recording, time_s, scale)
-    if not recording.is_uniform:
-        even = step_s * np.arange(int(time_s[-1] / step_s) + 1)
-        nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
-        is_near = np.abs(time_s[nearest] - even) < step_s
-        good, known = good[nearest] & is_near, known[nearest] & is_near
-        load_n, reading = np.interp(even, time_s, load_n), np.interp(even, time_s, reading)
-        extra = {name: np.interp(even, time_s, values) for name, values in extra.items()}
-        time_s = even
+    logged, step_s = _logged(recording, usable, scale), recording.sample_time_s
+    reading = scale.share(logged.reading)
     # Noise of the load must not be smoothed by the simulation alone, whatever the thinning.
-    weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), load_n.size))
-    quiet = like.quiet if like is not None else _quiet(load_n / scale.load_n, scale.share(reading), step_s, thresholds)
-    load = quiet.load
-    low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
-    base = min(low, thresholds.standing)
-    is_gauge = scale.unit.quantity == "pressure"
-    if is_gauge and begins_unloaded(load, scale.share(reading), step_s, thresholds):
-        base = min(low, float(load[0]))
-    reach = largest_of_noise(load.size, thresholds) * quiet.raw
-    beside = {name: smoothed(values, weights, factor) for name, values in extra.items()}
+    weights = kernel(1 if like is not None else min(max(factor, LEAST_WINDOW), reading.size))
+    quiet = like.quiet if like is not None else _quiet(logged.load_n / scale.load_n, reading, step_s, thresholds)
+    rest = _load_at_rest(quiet.load, reading, step_s, scale.unit, thresholds)
+    reach = largest_of_noise(quiet.load.size, thresholds) * quiet.raw
+    beside = {name: smoothed(values, weights, factor) for name, values in logged.beside.items()}
     conditions = Conditions(
-        time_s[::factor],
-        smoothed(_rests_levelled(load, base + 0.25 * thresholds.standing, reach), weights, factor),
+        logged.time_s[::factor],
+        smoothed(_rests_levelled(quiet.load, rest + 0.25 * thresholds.standing, reach), weights, factor),
         step_s * factor,
         quiet.left * float(np.sqrt(np.sum(weights**2))),
         temperature_k=beside.get("temperature_k"),
         neighbour=beside.get("neighbour"),
         before=before,
     )
-    there = smoothed(good.astype(float), weights, factor)
+    there = smoothed(logged.usable.astype(float), weights, factor)
     # A reading that is logged at a part of the load's rate never fills a window.
-    usual = float(np.median(there[there > 0.0])) if good.any() else 1.0
-    kept = there > 0.7 * usual
+    usual = float(np.median(there[there > 0.0])) if logged.usable.any() else 1.0
     load = conditions.load
     if like is None:
         held_out, cycle = np.zeros(load.size, dtype=bool), _cycles(conditions, thresholds)
@@ -337,19 +316,65 @@ def _session(
         recording,
         index,
         conditions,
-        smoothed(scale.share(reading), weights, factor),
-        kept,
+        smoothed(reading, weights, factor),
+        there > 0.7 * usual,
         held_out,
         cycle,
-        np.abs(load - base) < thresholds.standing,
+        np.abs(load - rest) < thresholds.standing,
         factor,
         quiet,
         gap_ends=tuple(
             int(end) // factor
-            for begin, end in zip(*runs_of(~known), strict=True)
-            if begin > 0 and end < known.size and (end - begin) * step_s > thresholds.settled_s
+            for begin, end in zip(*runs_of(~logged.load_known), strict=True)
+            if begin > 0 and end < logged.load_known.size and (end - begin) * step_s > thresholds.settled_s
         ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Logged:
+    """A recording on an even grid, (n,) each, bridged where samples are missing; ``reading`` in the scale's unit.
+
+    ``usable``: where load and reading are there and sound; ``load_known``: where the load is. ``beside``: temperature
+    and neighbour, as conditions have them, where they were logged.
+    """
+
+    time_s: Array
+    load_n: Array
+    reading: Array
+    usable: Mask
+    load_known: Mask
+    beside: dict[str, Array]
+
+
+def _logged(recording: Recording, usable: Mask, scale: Scale) -> _Logged:
+    time_s, step_s = recording.time_s - recording.time_s[0], recording.sample_time_s
+    known = recording.load.present
+    good = usable & recording.sensor.present & known
+    reading = bridged(time_s, _reading(recording, scale.unit), good)
+    load_n = bridged(time_s, recording.force_n, known)
+    beside = _logged_beside(recording, time_s, scale)
+    if recording.is_uniform:
+        return _Logged(time_s, load_n, reading, good, known, beside)
+    even = np.asarray(step_s * np.arange(int(time_s[-1] / step_s) + 1), dtype=np.float64)
+    nearest = np.clip(np.searchsorted(time_s, even - 0.5 * step_s), 0, time_s.size - 1)
+    is_near = np.abs(time_s[nearest] - even) < step_s
+    return _Logged(
+        even,
+        np.interp(even, time_s, load_n),
+        np.interp(even, time_s, reading),
+        good[nearest] & is_near,
+        known[nearest] & is_near,
+        {name: np.interp(even, time_s, values) for name, values in beside.items()},
+    )
+
+
+def _load_at_rest(load: Array, reading: Array, step_s: float, unit: Unit, thresholds: Thresholds) -> float:
+    """The load (n,) that a cell shows of an unloaded unit: its lowest, or what stands still, or its tare."""
+    low = float(np.quantile(load[:: max(1, load.size // 5000)], 0.02))
+    if unit.quantity == "pressure" and begins_unloaded(load, reading, step_s, thresholds):
+        return min(low, float(load[0]))
+    return min(low, thresholds.standing)
 
 
 def _quiet(load: Array, reading: Array, step_s: float, thresholds: Thresholds) -> Quiet:
@@ -434,8 +459,7 @@ def have_later_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> bo
 def _rises(conditions: Conditions, thresholds: Thresholds) -> int:
     def count() -> Array:
         load = conditions.load
-        points = turning_points(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9))
-        return np.array([sum(bool(load[b] > load[a]) for a, b in pairwise(points))])
+        return np.array([len(rises_of(load, thresholds.cycle * max(float(np.ptp(load)), 1e-9)))])
 
     return int(conditions.kept("rises", (thresholds.cycle,), count)[0])
 
@@ -444,9 +468,8 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
     load = conditions.load
     # Of full scale, or of the record's own span where that is less.
     threshold = thresholds.cycle * min(1.0, max(float(np.ptp(load)), 1e-9))
-    points = turning_points(load, threshold)
     # A cycle begins at the foot of a rise; the foot of a rest is its last sample at the low level.
-    feet = [p for p, q in pairwise(points) if load[q] - load[p] > threshold]
+    feet = [foot for foot, top in rises_of(load, threshold) if load[top] - load[foot] > threshold]
     starts = []
     for foot in feet:
         level = load[foot] + 0.25 * threshold
@@ -466,10 +489,9 @@ def _cycles(conditions: Conditions, thresholds: Thresholds) -> Index:
 def _left_behind(conditions: Conditions, thresholds: Thresholds) -> dict[str, float]:
     load = conditions.load
     before = conditions.before
-    rises = sum(load[b] > load[a] for a, b in pairwise(turning_points(load, thresholds.cycle)))
     return {
         "largest_load": max(before.get("largest_load", 0.0), float(load.max())),
-        "cycles": before.get("cycles", 0.0) + rises,
+        "cycles": before.get("cycles", 0.0) + len(rises_of(load, thresholds.cycle)),
         "way": before.get("way", 0.0) + float(half_way(conditions)[-1]),
         "time_s": before.get("time_s", 0.0) + float(conditions.time_s[-1]),
         "dose": before.get("dose", 0.0) + float(np.trapezoid(np.maximum(load, 0.0), conditions.time_s)),

@@ -23,12 +23,16 @@ class State:
     ``path``: models that it has been settled through.
     """
 
-    given: Linearised
     evidence: Evidence
     best: Posterior
     fit: Fit
     banned: tuple[str, ...] = ()
     path: tuple[ExtendedModel, ...] = ()
+
+    @property
+    def given(self) -> Linearised:
+        """The linearisation."""
+        return self.evidence.given
 
     @property
     def thresholds(self) -> Thresholds:
@@ -77,15 +81,15 @@ def searched(
     thresholds: Thresholds,
     banned: Sequence[str] = (),
     given: Linearised | None = None,
-) -> tuple[Linearised, Evidence, Posterior]:
+) -> tuple[Evidence, Posterior]:
     """A linearisation and the best set in it; one change only where the next effect is so large that it bends it."""
     given = linearised(model, sessions, thresholds) if given is None else given
     evidence = Evidence(given, given.noise_sd())
     start = _set_of(model, given)
     first = step(evidence, start, banned)
     if _bends(first, start, thresholds):
-        return given, evidence, first
-    return given, evidence, search(evidence, first.members, banned)
+        return evidence, first
+    return evidence, search(evidence, first.members, banned)
 
 
 def evidence_about(

@@ -60,7 +60,7 @@ def causes_among(
     rivals = seen.names
     seen = seen.without(lambda one: departure_of(one, rivals, thresholds))
     cycles = load_cycles(given.sessions, thresholds)
-    surest = sorted(seen.names, key=lambda one: -one.kind)[:cycles]
+    surest = sorted(seen.names, key=lambda one: -one.kind_probability)[:cycles]
     seen = seen.without(lambda one: None if one in surest else few_cycles_of(one, cycles))
     parted = parted_clocks(given.clocks, found.fit.model, given.sessions, thresholds)
     clocks = [] if parted is None else [effect for effect, _ in given.clocks]

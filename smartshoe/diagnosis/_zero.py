@@ -17,7 +17,7 @@ from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._session import Scale, Session, begins_unloaded
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
-from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.effects import Effect, shift_of
 from smartshoe.models.extended import ExtendedModel
 
 
@@ -36,11 +36,6 @@ class Zero:
     size: float
     alternatives: tuple[str, ...] = ()
     is_past: bool = False
-
-
-def shift_of(signal: str) -> Effect:
-    """The catalogue's effect that adds one value to the "load" or to the "reading"."""
-    return next(e for e in catalogue().values() if e.shifts == signal)
 
 
 def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:

@@ -10,6 +10,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.signals.lags import lagged
 
 RISES_WITH_LOAD = ("pressure", "force")
 
@@ -102,12 +103,7 @@ def _moves_with(load: Array, reading: Array, stride: float, thresholds: Threshol
 
 def of_load(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
     """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
-    from scipy.signal import lfilter
-
     f = (load - load.min()) / np.ptp(load)
-    columns = [f, f**2, f**3]
-    for tau_s in time_constants_s:
-        keep = float(np.exp(-step_s / tau_s))
-        columns.append(lfilter([1.0 - keep], [1.0, -keep], f, zi=[keep * f[0]])[0])
-    out: Array = np.stack(columns, axis=1)
+    lags = [lagged(f, step_s, float(tau_s)) for tau_s in time_constants_s]
+    out: Array = np.stack([f, f**2, f**3, *lags], axis=1)
     return out

@@ -12,9 +12,8 @@ from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._view import View, toggling
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
-from smartshoe.signals.noise import robust_sd
+from smartshoe.signals.noise import MAINS_HZ, robust_sd
 
-MAINS_HZ = (50.0, 60.0)
 HARMONICS = 3  # that a line is called by: half and twice as many changed no finding
 
 

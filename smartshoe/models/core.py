@@ -23,7 +23,8 @@ from smartshoe.arrays import Array
 from smartshoe.models.elements import Arm, Element, Heat, Leak
 
 MOST_SKEWED = 1e9  # condition of the modes' vectors
-USUAL_WALL_RATIO = 1.6  # N of the paper's four units: 1.51 to 1.78 (Table 1)
+PAPER_WALL_RATIOS = 1.51, 1.78  # least and largest N of the paper's four units (Table 1)
+USUAL_WALL_RATIO = 1.6
 
 
 class Core:

@@ -69,6 +69,11 @@ def turning_points(load_n: Array, threshold_n: float) -> list[int]:
     return points
 
 
+def rises_of(load_n: Array, threshold_n: float) -> list[tuple[int, int]]:
+    """The samples of foot and top of each rise of a load (n,) between its `turning_points`."""
+    return [(a, b) for a, b in pairwise(turning_points(load_n, threshold_n)) if load_n[b] > load_n[a]]
+
+
 def ramps(time_s: Array, load_n: Array) -> list[Ramp]:
     """The ramps of a record that span at least 30 % of its load range, in order of time.
 

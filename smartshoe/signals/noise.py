@@ -11,6 +11,7 @@ from smartshoe.arrays import Array
 
 NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal law
 NORMAL_QUARTILE = 0.6744897501960817  # and the half of it: the median of the absolute value
+MAINS_HZ = (50.0, 60.0)
 UNIFORM_SD = 1.0 / math.sqrt(12.0)  # of what is anywhere within one step: a rounded value, a time in its interval
 
 

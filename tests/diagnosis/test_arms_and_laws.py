@@ -56,7 +56,7 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
     half_way: dict[int, _Fitted] = {}
     gone_on: list[str] = []
     falls: dict[str, float] = {}
-    posterior = SimpleNamespace(posterior=lambda members: "ab"[members[0]])
+    posterior = SimpleNamespace(posterior=lambda members: "ab"[members[0]], given="given")
 
     def fitted(likelihood: Any, given: Any, steps: int | None = None) -> Any:
         if steps is None:
@@ -71,7 +71,7 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
         half_way[id(found.model)] = found
         return found
 
-    monkeypatch.setattr(_arms, "searched", lambda start, sessions, thresholds: ("given", posterior, "best"))
+    monkeypatch.setattr(_arms, "searched", lambda start, sessions, thresholds: (posterior, "best"))
     monkeypatch.setattr(_arms, "additions", lambda evidence, members, breadth: [0, 1])
     monkeypatch.setattr(_arms, "with_members", lambda given, one, start, likelihood: (start, one))
     monkeypatch.setattr(_arms, "fit", fitted)
@@ -137,7 +137,7 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
     def searched(start: ExtendedModel, sessions: Any, thresholds: Any) -> Any:
         starts.append((start.names, start.relaxing_share, start.relaxation_rate_per_s))
         leaks.extend(float(part.values[0]) for part in start.parts)
-        return "given", None, "best"
+        return SimpleNamespace(given="given"), "best"
 
     costs = {1.0 / 0.3: 50.0, 1.0 / 3.0: 45.0, 1.0 / 30.0: 100.0, 0.2: 40.0}
 

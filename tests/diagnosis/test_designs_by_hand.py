@@ -198,7 +198,7 @@ def test_a_rival_begins_at_the_likeliest_of_its_shapes(monkeypatch: pytest.Monke
 
     likelihood: Any = SimpleNamespace(sessions=sessions, cost=cost)
     found: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=MODEL.with_part("delay", np.array([0.1]))), likelihood=likelihood
+        fit=SimpleNamespace(model=MODEL.with_part("delay", np.array([0.1])), likelihood=likelihood)
     )
     given, model = _in_place_of(found, "delay", "second_relaxation")  # type: ignore[misc]
     assert given is likelihood
@@ -244,7 +244,7 @@ def _next(
     monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: "unseen")
     model = MODEL.with_part("linear_leak").with_part("dead_band")
     found: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=model), likelihood=SimpleNamespace(noise_sd=0.01), can_validate=can_validate,
+        fit=SimpleNamespace(model=model, likelihood=SimpleNamespace(noise_sd=0.01)), can_validate=can_validate,
         own_gains=own_gains, zero_changes=zero_changes,
     )  # fmt: skip
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
@@ -366,7 +366,7 @@ def test_a_law_that_a_block_stands_for_is_parted_from_its_rival_in_the_blocks_pl
     monkeypatch.setattr(_next_experiment, "_in_place_of", in_place)
     monkeypatch.setattr(_next_experiment, "expected_margin", lambda *given: seen.append(given[:2]) or 1e3)
     found: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=MODEL.with_part("flexible_curve")), likelihood=SimpleNamespace(noise_sd=0.01)
+        fit=SimpleNamespace(model=MODEL.with_part("flexible_curve"), likelihood=SimpleNamespace(noise_sd=0.01))
     )
     for law, rival in (("contact_area", "wall_hardening"), ("dead_band", "saturation")):
         fitted.clear()
@@ -443,4 +443,4 @@ def test_a_member_is_named_from_what_is_material_and_sure_on() -> None:
     sure = probability_of_kind(_member(), 0.002, STANDARD)
     for least, is_sure in ((sure, True), (sure + 1e-9, False)):
         (name,) = names_of([_member()], 0.002, replace(STANDARD, least_confidence=least))
-        assert (name.is_sure, name.kind) == (is_sure, sure if is_sure else 0.5)
+        assert (name.is_sure, name.kind_probability) == (is_sure, sure if is_sure else 0.5)

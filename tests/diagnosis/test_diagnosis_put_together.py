@@ -17,10 +17,10 @@ from smartshoe.diagnosis._force import Compensation, ForceError
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._prepared import prepared
-from smartshoe.diagnosis._procedure import _diagnosed
-from smartshoe.diagnosis._zero import Zero, shift_of
+from smartshoe.diagnosis._procedure import diagnosed
+from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity import OneClock
-from smartshoe.models.effects import effect
+from smartshoe.models.effects import effect, shift_of
 
 Array = NDArray[np.float64]
 
@@ -169,14 +169,16 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
 def _run_diagnosis(parts: Any) -> Any:
     said: list[str] = []
     integrity: Any = SimpleNamespace(faults=(FAULT,))
-    result = _diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
+    result = diagnosed(["recordings"], 1, integrity, STANDARD, said.append)  # type: ignore[list-item]
     assert said == ["judging on held-out data"]
     return result
 
 
 def _name(name: str, kind_only: bool = False, size: float = 0.1, is_sure: bool = True, kind: float = 0.9) -> Any:
     known, member = effect("delay" if name == "turned" else name), SimpleNamespace(size=size, name=name)
-    return SimpleNamespace(name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind=kind)
+    return SimpleNamespace(
+        name=name, kind_only=kind_only, is_sure=is_sure, effect=known, member=member, kind_probability=kind
+    )
 
 
 def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
@@ -273,7 +275,7 @@ def test_what_the_extended_model_does_away_with_for_certain_is_not_good_enough_w
     said: list[str] = []
     given = STANDARD if material is None else replace(STANDARD, material=material)
     integrity: Any = SimpleNamespace(faults=(FAULT,))
-    told = _diagnosed(["recordings"], 1, integrity, given, said.append)  # type: ignore[list-item]
+    told = diagnosed(["recordings"], 1, integrity, given, said.append)  # type: ignore[list-item]
     assert told.verdict == verdict
 
 

@@ -332,7 +332,7 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
         # Only one change where it bends: the next linearisation may tell another.
         assert (len(again.best.members) == 1) is bends
     name = state.chosen[0].name
-    _, _, without = searched(plain.model, given.sessions, STANDARD, (name,))
+    _, without = searched(plain.model, given.sessions, STANDARD, (name,))
     assert name not in {given.candidates[m].name for m in without.members}
 
 

@@ -92,9 +92,8 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         model.parts = told.parts.get(one.name, ())
         return SimpleNamespace(
             members=lambda: told.members,
-            fit=SimpleNamespace(model=model),
+            fit=SimpleNamespace(model=model, likelihood="likelihood"),
             evidence="evidence",
-            likelihood="likelihood",
             refused=told.refused.get(one.name, ()),
             undone=(),
             is_stepped_down=one.name in told.stepped,
@@ -111,9 +110,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: told.errors.get(model, 1.0))
     monkeypatch.setattr(_inference, "least_squares", lambda *given: plain)
-    monkeypatch.setattr(
-        _inference, "searched", lambda *given: ("given", SimpleNamespace(noise_sd=0.1), SimpleNamespace())
-    )
+    monkeypatch.setattr(_inference, "searched", lambda *given: (SimpleNamespace(noise_sd=0.1), SimpleNamespace()))
     monkeypatch.setattr(_inference, "_screening", lambda evidence: ("screening", "likeness"))
     monkeypatch.setattr(_inference, "independent", lambda *given: told.independent)
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
@@ -149,7 +146,7 @@ def test_of_one_cycle_or_no_unit_nothing_is_inferred(flow: Any) -> None:
     for flow.independent, is_unit, can_validate in ((1, True, False), (2, False, True), (1, False, False)):
         found = flow.infer(is_unit)
         assert (found.members, found.refused, found.can_validate) == ((), (), can_validate)
-        assert (found.screening, found.likeness, found.likelihood) == ("screening", "likeness", "likelihood")
+        assert (found.screening, found.likeness) == ("screening", "likeness")
         assert found.baseline is found.fit
 
 
@@ -221,17 +218,18 @@ def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(mon
 
     def fit(likelihood: Any, model: Any) -> Any:
         asked.append((likelihood, model))
-        return SimpleNamespace(model=model)
+        return SimpleNamespace(model=model, likelihood=likelihood)
 
     def about(model: Any, sessions: Any, evidence: Any) -> Any:
         return SimpleNamespace(thresholds=STANDARD, of=model, before=evidence.of, sessions=sessions), f"best of {model}"
 
     monkeypatch.setattr(_inference, "fit", fit)
     monkeypatch.setattr(_inference, "evidence_about", about)
-    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, refused, likelihood, fit: sets[fit.model])
+    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, refused, fit: sets[fit.model])
     plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
     first: Any = SimpleNamespace(thresholds=STANDARD, of="whole")
-    begun = _Judged(first, "best", SimpleNamespace(model="whole"), "likelihood", ("refused",), ("undone",), True)  # type: ignore[arg-type]
+    whole: Any = SimpleNamespace(model="whole", likelihood="likelihood")
+    begun = _Judged(first, "best", whole, ("refused",), ("undone",), True)  # type: ignore[arg-type]
 
     def without() -> tuple[Any, Any]:
         return _without_redundant(begun, plain, "sessions")  # type: ignore[arg-type]
@@ -315,13 +313,13 @@ def test_where_none_is_sure_that_is_told_which_does_most_alone(flow: Any) -> Non
     assert flow.infer().alone is None
     part = SimpleNamespace(effect="a curve")
     judged = SimpleNamespace(
-        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))), likelihood="of alone",
+        fit=SimpleNamespace(model=SimpleNamespace(parts=(part,), names=("curve",))),
         undone=(), members=lambda: ("curve",),
     )  # fmt: skip
     flow.alone = "a curve", judged
     found = flow.infer()
     assert (found.alone, found.fit, found.members) == ("a curve", judged.fit, ("curve",))
-    assert (found.likelihood, found.refused) == ("of alone", ("b",))
+    assert found.refused == ("b",)
     flow.parts = {"settled first": (part, part)}
     found = flow.infer()
     assert (found.alone, found.fit.model, found.members) == ("a curve", "settled first", flow.members)
@@ -356,7 +354,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     monkeypatch.setattr(_inference, "error_of", lambda sessions, model: errors[model])
     monkeypatch.setattr(_inference, "with_members", lambda given, best, model, likelihood: f"n{best.members[0]}")
     monkeypatch.setattr(_inference, "fit", lambda likelihood, model: SimpleNamespace(model=model))
-    monkeypatch.setattr(_inference, "State", lambda given, evidence, best, fit: fit)
+    monkeypatch.setattr(_inference, "State", lambda evidence, best, fit: fit)
     monkeypatch.setattr(
         _inference,
         "_judged",
@@ -448,7 +446,7 @@ class _Judge:
             _inference,
             "fit",
             lambda likelihood, model, *steps: SimpleNamespace(
-                model=model, how=steps, cost=self.costs.get(model.names, 0.0)
+                model=model, how=steps, cost=self.costs.get(model.names, 0.0), likelihood=likelihood
             ),
         )
         monkeypatch.setattr(_inference, "weighed", lambda *given: self.plain)

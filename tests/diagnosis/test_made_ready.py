@@ -14,8 +14,8 @@ from test_diagnosis_parts import MODEL
 
 from smartshoe import Recording
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
+from smartshoe.diagnosis._diagnose import _without
 from smartshoe.diagnosis._jittered import jitter_s
-from smartshoe.diagnosis._procedure import _without
 from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
 from smartshoe.diagnosis._session import (
     Scale,

@@ -75,14 +75,14 @@ def test_a_rival_that_leaves_as_much_as_laws_usually_depart_is_one_standard_devi
 def test_a_name_is_as_sure_as_its_kind_and_its_law_shared_with_the_nearest_rival(margin: float) -> None:
     one = member(size=0.1, laws=(("orifice_leak", margin),))
     name = only(names_of([one], 0.0, STANDARD))
-    assert name.kind == probability_of_kind(one, 0.0, STANDARD)
-    assert (name.law, name.equivalents) == probability_of_law(one, STANDARD)
-    assert 0.5 <= name.law <= 1.0
+    assert name.kind_probability == probability_of_kind(one, 0.0, STANDARD)
+    assert (name.law_probability, name.equivalents) == probability_of_law(one, STANDARD)
+    assert 0.5 <= name.law_probability <= 1.0
 
 
 def test_a_dead_heat_of_two_laws_is_one_half() -> None:
     name = only(names_of([member(size=0.1, laws=(("orifice_leak", 0.0),))], 0.0, STANDARD))
-    assert (name.law, name.equivalents) == (0.5, ("orifice_leak",))
+    assert (name.law_probability, name.equivalents) == (0.5, ("orifice_leak",))
 
 
 def test_a_kind_of_one_law_is_told_by_its_kind_alone() -> None:
@@ -141,9 +141,9 @@ def test_a_flexible_block_is_named_by_the_nearest_law_with_all_others_beside_it(
     assert name.kind_only
     assert name.effect.name == "contact_area"
     assert {name.effect.name, *name.equivalents} == family - {"gas_compression", "wall_hardening"}
-    assert name.kind == probability_of_kind(name.member, 0.0, STANDARD, lawless=True)
-    assert name.kind < probability_of_kind(name.member, 0.0, STANDARD)
-    assert name.law == pytest.approx(1.0 / (len(family) - 2))
+    assert name.kind_probability == probability_of_kind(name.member, 0.0, STANDARD, lawless=True)
+    assert name.kind_probability < probability_of_kind(name.member, 0.0, STANDARD)
+    assert name.law_probability == pytest.approx(1.0 / (len(family) - 2))
 
 
 @pytest.mark.parametrize(("of", "law"), [("static_curve", "dead_band"), ("zero", "permanent_set")])
@@ -159,9 +159,9 @@ def test_a_law_within_departures_gives_a_block_its_name_and_its_kin_are_weighed_
         assert name.kind_only is not is_law
         if is_law:
             assert (name.effect.name, name.by, name.member) == (law, one.laws[0], one)
-            assert name.kind == probability_of_kind(one, 0.0, STANDARD)
+            assert name.kind_probability == probability_of_kind(one, 0.0, STANDARD)
             as_law = member(law, laws=rivals[:1] if of == "zero" else rivals, fall=1000.0 - margin)
-            assert (name.law, name.equivalents) == probability_of_law(as_law, STANDARD)
+            assert (name.law_probability, name.equivalents) == probability_of_law(as_law, STANDARD)
             assert name.equivalents == (("zero_drift",) if of == "zero" else ("saturation", "wall_hardening"))
         else:
             assert name.by is None
@@ -177,8 +177,8 @@ def test_a_curve_that_no_law_follows_is_named_by_the_nearest_of_all_curves() -> 
         ("contact_area", "saturation"),
         True,
     )
-    assert name.kind == probability_of_kind(one, 0.0, STANDARD, lawless=True)
-    assert name.law == pytest.approx(1.0 / 3.0)
+    assert name.kind_probability == probability_of_kind(one, 0.0, STANDARD, lawless=True)
+    assert name.law_probability == pytest.approx(1.0 / 3.0)
 
 
 def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_most() -> None:
@@ -193,7 +193,7 @@ def test_where_nothing_else_is_named_that_is_which_does_most_alone_half_sure_at_
     assert names_of([curve, other], left, STANDARD) == ()
     name = only(names_of([curve, other], left, STANDARD, alone=effect("saturation")))
     assert name.effect.name == "contact_area"
-    assert name.kind < 0.5
+    assert name.kind_probability < 0.5
     assert not name.is_sure
     assert names_of([curve, other], left, STANDARD, alone=effect("linear_leak")) == ()
     small = replace(curve, size=STANDARD.tolerable)
@@ -225,7 +225,7 @@ def test_a_kind_without_a_law_is_half_sure_at_most_or_as_sure_as_a_name_must_be(
         one = member(block, size=0.06, departed=departed, laws=margins)
         name = only(names_of([one], 0.03, STANDARD))
         kind = probability_of_kind(one, 0.03, STANDARD, lawless=True)
-        assert name.kind == (kind if kind >= STANDARD.least_confidence else min(kind, 0.5))
+        assert name.kind_probability == (kind if kind >= STANDARD.least_confidence else min(kind, 0.5))
         seen.add((kind >= STANDARD.least_confidence, kind > 0.5))
     assert seen == {(True, True), (False, True), (False, False)}
 
@@ -243,7 +243,7 @@ def test_a_block_of_a_family_of_one_law_is_as_sure_as_that_law() -> None:
     (block,) = blocks()["gain_drift"]
     name = only(names_of([member(block)], 0.0, STANDARD))
     assert (name.effect.name, name.equivalents, name.kind_only) == ("gain_drift", (), True)
-    assert name.kind == probability_of_kind(name.member, 0.0, STANDARD)
+    assert name.kind_probability == probability_of_kind(name.member, 0.0, STANDARD)
 
 
 def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:
@@ -253,15 +253,15 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
     assert [one.member for one in names_of([fast, slow], 0.0, STANDARD, is_clocked=True)] == [fast]
     told = names_of([slow, doubted], 0.0, STANDARD, is_clocked=True, is_followed=True)
     assert [(one.member, one.is_sure) for one in told] == [(slow, False), (doubted, False)]
-    assert told[0].kind == 0.5
-    assert told[1].kind == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
+    assert told[0].kind_probability == 0.5
+    assert told[1].kind_probability == probability_of_kind(doubted, 0.0, STANDARD) < 0.5
 
 
 def test_beside_zeros_that_change_at_moments_none_is_more_than_half_sure() -> None:
     sure = member("play_hysteresis", size=0.05)
-    assert only(names_of([sure], 0.0, STANDARD)).kind > 0.5
+    assert only(names_of([sure], 0.0, STANDARD)).kind_probability > 0.5
     (told,) = names_of([sure], 0.0, STANDARD, is_unsteady=True)  # larger than what is left, and not to be ruled out
-    assert (told.kind, told.is_sure) == (0.5, False)
+    assert (told.kind_probability, told.is_sure) == (0.5, False)
     assert not names_of([member(size=0.05, departed=9.0)], 0.06, STANDARD, is_unsteady=True)
 
 
@@ -271,7 +271,7 @@ def test_where_none_is_sure_but_all_follow_those_are_named_that_move_more_than_w
     name = only(names_of(doubted, 0.03, STANDARD, is_followed=True))
     assert name.effect.name == "linear_leak"
     assert not name.is_sure
-    assert name.kind == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
+    assert name.kind_probability == probability_of_kind(doubted[0], 0.03, STANDARD) < STANDARD.least_confidence
 
 
 def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cannot_be_ruled_out() -> None:
@@ -280,9 +280,9 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cann
     )  # fmt: skip
     assert 0.5 < probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     name = only(names_of([less, likely], 0.03, STANDARD))
-    assert (name.member, name.kind, name.is_sure) == (likely, 0.5, False)
+    assert (name.member, name.kind_probability, name.is_sure) == (likely, 0.5, False)
     open_ = replace(likely, departed=3.5)
-    assert only(names_of([open_], 0.03, STANDARD)).kind == probability_of_kind(open_, 0.03, STANDARD) < 0.5
+    assert only(names_of([open_], 0.03, STANDARD)).kind_probability == probability_of_kind(open_, 0.03, STANDARD) < 0.5
     assert probability_of_kind(small, 0.03, STANDARD) < STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     assert not names_of([small, less], 0.03, STANDARD)  # the largest can be ruled out
     assert not names_of([likely], 0.051, STANDARD)  # and more is left than it explains
@@ -294,7 +294,7 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_t
     assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
-    assert told[0].kind == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
+    assert told[0].kind_probability == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     assert only(names_of([less, sure], 0.03, STANDARD, is_followed=True)).member is sure
     assert only(names_of([likely, sure], 0.03, STANDARD, is_clocked=True)).member is sure
     # One that moves no more than a good unit's imperfections do may be another's shadow.
@@ -310,7 +310,7 @@ def test_beside_a_kind_that_no_law_follows_nothing_is_named_for_its_size() -> No
     for size, count in ((0.06, 1), (0.6, 2)):  # the larger, the surer also without a law
         named = names_of([replace(curve, size=size), likely], 0.03, STANDARD)
         assert named[0].is_sure
-        assert (named[0].kind >= STANDARD.least_confidence) == (count == 2)
+        assert (named[0].kind_probability >= STANDARD.least_confidence) == (count == 2)
         assert len(named) == count
 
 

@@ -14,23 +14,22 @@ from numpy.typing import NDArray
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds, _causes
 from smartshoe.diagnosis._causes import _against, _held_out_evidence, cause_of, zero_cause_of
+from smartshoe.diagnosis._diagnose import _outside, _refused
 from smartshoe.diagnosis._held_out import Errors, Gain, own_of
 from smartshoe.diagnosis._limits import refusals_of
 from smartshoe.diagnosis._naming import confidence_of
 from smartshoe.diagnosis._procedure import (
     _goodness,
-    _outside,
     _percent_less,
-    _refused,
     _trace,
     _with_offset,
 )
 from smartshoe.diagnosis._result import Rival
 from smartshoe.diagnosis._session import Scale, prepare
 from smartshoe.diagnosis._verdict import names_in, not_explained_of, sentence_of, verdict_of
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of
+from smartshoe.diagnosis._zero import Zero, offsets
 from smartshoe.errors import UsageError
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
 
@@ -289,8 +288,8 @@ def _told(
     name: Any = SimpleNamespace(
         member=member,
         effect=one,
-        kind=kind,
-        law=0.6,
+        kind_probability=kind,
+        law_probability=0.6,
         equivalents=("orifice_leak",),
         kind_only=kind_only,
         is_sure=is_sure,

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from test_diagnosis_parts import recording, sessions_of
 
 from smartshoe.diagnosis._experiments import EXPERIMENTS, multisine, shuffled_loads
-from smartshoe.diagnosis._sensitivity import lagged, marginal, nuisances
+from smartshoe.diagnosis._sensitivity import marginal, nuisances
 from smartshoe.models.extended import ExtendedModel
+from smartshoe.signals.lags import lagged
 
 UNIT = ExtendedModel(1.0, 0.3, 0.25, 800.0, 140.0, "mbar", (), 1.5)
 

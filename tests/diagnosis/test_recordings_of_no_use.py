@@ -113,8 +113,9 @@ def test_a_load_that_pulls_refuses_where_it_is_fitted_and_is_left_out_where_it_i
     found = diagnose(GOOD, hold_out=[pulled, OTHER])
     assert found.verdict == "adequate"
     assert [(trace.name, trace.recording) for trace in found.traces] == [("good", 0), ("other", 2)]
-    (said,) = (one for one in found.limits if one.startswith("left out: pulled:"))
-    assert "from -4" in said
+    (said,) = found.left_out
+    assert found.limits == (f"left out: {said}", *found.limits_of_the_rest)
+    assert said.startswith("pulled: the load runs from -4")
     assert "set it to zero at rest" in said  # what is a cell's zero, and no pull
 
 

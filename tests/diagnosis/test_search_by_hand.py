@@ -134,7 +134,7 @@ def test_what_is_so_large_that_it_bends_is_taken_by_itself(monkeypatch: pytest.M
     given: Any = SimpleNamespace(candidates=[candidate("a"), candidate("b")], noise_sd=lambda: 0.5)
     told: list[Any] = []
     monkeypatch.setattr(_state, "linearised", lambda *args: given)
-    monkeypatch.setattr(_state, "Evidence", lambda given, noise_sd: ("evidence", noise_sd))
+    monkeypatch.setattr(_state, "Evidence", lambda made, noise_sd: ("evidence", noise_sd) if made is given else None)
     monkeypatch.setattr(_state, "search", lambda evidence, members, banned: told.append((members, banned)) or "all")
     model: Any = SimpleNamespace(names=("a",))
     for size, answer in ((0.01, "all"), (0.0101, "first")):
@@ -147,8 +147,7 @@ def test_what_is_so_large_that_it_bends_is_taken_by_itself(monkeypatch: pytest.M
 
         monkeypatch.setattr(_state, "step", stepped)
         found = _state.searched(model, [], STANDARD, ("z",))
-        assert found[:2] == (given, ("evidence", 0.5))
-        assert found[2] == (first if answer == "first" else "all")
+        assert found == (("evidence", 0.5), first if answer == "first" else "all")
         assert seen == [(("evidence", 0.5), (0,), ("z",))]
     assert told == [((0, 1), ("z",))]
 
@@ -228,10 +227,10 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     )
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
-    extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0)
     likelihood: Any = SimpleNamespace(sessions=())
+    extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0, likelihood=likelihood)
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
-    found = members_of(evidence, best, ("z",), likelihood, extended)
+    found = members_of(evidence, best, ("z",), extended)
     assert [(m.name, m.departed, m.fall) for m in found] == [("dead_band", 0.7, 70.0), ("linear_leak", 0.3, 30.0)]
     assert [m.size for m in found] == pytest.approx([sizes["dead_band"], sizes["linear_leak"]])
     assert [m.likeness for m in found] == pytest.approx([math.sqrt(0.5)] * 2)
@@ -245,7 +244,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     assert set(asked) == {4}
     sizes["linear_leak"] *= 3.0
     ways["linear_leak"] *= -1.0
-    (leak, _) = members_of(evidence, best, (), likelihood, extended)
+    (leak, _) = members_of(evidence, best, (), extended)
     assert [(law.effect, law.margin) for law in leak.laws] == [("orifice_leak", 15.0)]
     assert leak.likeness == 0.0  # the other pulls against it
 

@@ -33,8 +33,8 @@ from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Scale
 from smartshoe.diagnosis._validation import cancelling
 from smartshoe.diagnosis._verdict import known_error, verdict_of
-from smartshoe.diagnosis._zero import Zero, _is_past, creeping, shift_of
-from smartshoe.models.effects import effect
+from smartshoe.diagnosis._zero import Zero, _is_past, creeping
+from smartshoe.models.effects import effect, shift_of
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR, Unit, unit
 

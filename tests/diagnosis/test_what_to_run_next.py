@@ -187,7 +187,7 @@ def test_a_rival_is_fitted_in_the_place_of_an_effect() -> None:
     truth = MODEL.with_part(effect("sensor_lag"), np.array([0.05, 0.0]))
     sessions, _ = sessions_of(recording(truth))
     likelihood = likelihood_of(sessions)
-    found: Any = type("Found", (), {"fit": fit(likelihood, truth), "likelihood": likelihood})
+    found: Any = type("Found", (), {"fit": fit(likelihood, truth)})
     rival = _in_place_of(found, "sensor_lag", "delay")
     assert rival.model.names == ("delay",)
     assert rival.model.parts[0].values[0] == pytest.approx(0.05, rel=0.2)  # late by as much

@@ -13,9 +13,10 @@ from scipy.signal import lsim
 
 from smartshoe import Recording, compensate, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds
+from smartshoe.diagnosis._diagnose import _outside
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._lack_of_fit import LackOfFit
-from smartshoe.diagnosis._procedure import _outside, _with_offset
+from smartshoe.diagnosis._procedure import _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
 from smartshoe.diagnosis._session import Session, full_scale, prepare
 from smartshoe.diagnosis._verdict import (
@@ -27,9 +28,9 @@ from smartshoe.diagnosis._verdict import (
     sentence_of,
     verdict_of,
 )
-from smartshoe.diagnosis._zero import Zero, offsets, shift_of
+from smartshoe.diagnosis._zero import Zero, offsets
 from smartshoe.errors import NotIdentifiableError
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.extended import ExtendedModel
 
 Array = NDArray[np.float64]

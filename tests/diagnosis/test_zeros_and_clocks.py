@@ -16,7 +16,6 @@ from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._limits import wall_ratio_of
-from smartshoe.diagnosis._sensitivity import lagged
 from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
 from smartshoe.errors import InputError
@@ -25,6 +24,7 @@ from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
+from smartshoe.signals.lags import lagged
 
 Array = NDArray[np.float64]
 

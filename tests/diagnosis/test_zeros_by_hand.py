@@ -12,14 +12,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from smartshoe.diagnosis import Thresholds, _noise_kinds, _zero
+from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._session import Scale
-from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, shift_of, zeros_of
+from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, zeros_of
 from smartshoe.integrity import OneClock
-from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects import Conditions, effect, shift_of
 from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Channel, Recording
@@ -300,15 +300,15 @@ def _kinds(monkeypatch: pytest.MonkeyPatch, sessions: list[Any], **given: Any) -
     asked: list[Any] = []
 
     def evidence(kind: str, strength: float) -> Any:
-        def told(residual: Array, conditions: Any, prediction: Array, step_s: float) -> Any:
-            asked.append((float(residual[0]), float(prediction[0]), step_s))
+        def told(self: Any, residual: Array, conditions: Any, prediction: Array) -> Any:
+            asked.append((float(residual[0]), float(prediction[0]), conditions.step_s))
             return SimpleNamespace(strength=strength, says=f"says {kind}")
 
         return told
 
     strengths = {"hum": 0.5, "timing_jitter": 0.1, "heteroscedastic_noise": 0.0999, "coloured_noise": 0.3}
-    told = {noise: evidence(noise.name, strengths[noise.name]) for noise in _noise_kinds.KINDS}
-    monkeypatch.setattr(_noise_kinds, "KINDS", told)
+    for kind, strength in strengths.items():
+        monkeypatch.setattr(type(effect(kind)), "evidence", evidence(kind, strength))
     model: Any = SimpleNamespace(simulate=lambda conditions: np.full(20, 1.0))
     asked_with = {"known": [], "explained": True, "material": 0.1, "memory": None, **given}
     found = noise_kinds(sessions, model, **asked_with)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import ast
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -169,6 +169,17 @@ def test_what_is_seen_at_rest_moves_the_reading_without_load() -> None:
             assert abs(out[-1] - load[-1]) > 1e-5, one.name
 
 
+def test_one_latency_is_the_lag_between_two_clocks_and_one_their_rate() -> None:
+    of_clocks = [one for one in EVERY if one.between_clocks]
+    assert {one.between_clocks for one in of_clocks} == {"lag", "rate"}
+    assert len(of_clocks) == 2
+    for one in of_clocks:
+        assert one.is_latency
+        assert len(one.parameters) == 1
+        at_once, later = one.late_s(np.array([0.5]), 0.0), one.late_s(np.array([0.5]), 10.0)
+        assert (at_once, later) == ((0.5, 0.5) if one.between_clocks == "lag" else (0.0, 5.0))
+
+
 def test_a_shift_adds_its_one_value() -> None:
     at = Conditions(0.02 * np.arange(3), np.array([0.0, 0.5, 1.0]), 0.02)
     shifts = {one.name: one for one in EVERY if one.shifts}
@@ -177,16 +188,28 @@ def test_a_shift_adds_its_one_value() -> None:
         np.testing.assert_allclose(one.apply(at.load, at, np.array([0.125])), at.load + 0.125, rtol=0, atol=0)
 
 
-def test_no_other_room_knows_an_effect_by_name() -> None:
-    """In models, compensation, export and store a name stands only where an effect is taken from the catalogue."""
-    named = re.compile(rf"""(?<!effect\()["']({"|".join(one.name for one in EVERY)})["'](?!:)""")
+def _decisions(path: Path) -> Iterator[ast.expr]:
+    """What an expression of a file compares, matches, or asks a catalogue, a model or an effect's module for."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.Compare():
+                yield from (node.left, *node.comparators)
+            case ast.MatchValue():
+                yield node.value
+            case ast.Call(func=ast.Name(id="effect") | ast.Attribute(attr="with_part" | "without" | "part")):
+                yield from node.args[:1]
+
+
+def test_no_other_room_decides_by_an_effects_name() -> None:
+    """A fault of the data, or a parameter of a fit, may be called the same."""
+    names = {one.name for one in EVERY}
     known = [
-        f"{path.relative_to(ROOT)}: {line.strip()}"
-        for room in ("models", "compensation", "store")
-        for path in (ROOT / room).rglob("*.py")
-        if path.parent.name != "effects"
-        for line in path.read_text(encoding="utf-8").splitlines()
-        if named.search(line)
+        f"{path.relative_to(ROOT)}:{one.lineno}: {one.value}"
+        for path in sorted(ROOT.rglob("*.py"))
+        if path.parent != ROOT / "models" / "effects"
+        for decided in _decisions(path)
+        for one in ast.walk(decided)
+        if isinstance(one, ast.Constant) and one.value in names
     ]
     assert not known
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -12,19 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from smartshoe.models.effects import (
-    Conditions,
-    coloured_noise,
-    heteroscedastic_noise,
-    hum,
-    timing_jitter,
-)
-from smartshoe.models.effects._sensor_evidence import SLOPE, growing_noise
+from smartshoe.models.effects import Conditions, NoiseEffect, catalogue, hum
+from smartshoe.models.effects._sensor_evidence import SLOPE, SensorEvidence, growing_noise
 from smartshoe.models.first_order import lag
 
 STEP_S = 0.01
 FLOOR = 0.001
-TESTS = {"coloured": coloured_noise, "growing": heteroscedastic_noise, "jitter": timing_jitter, "hum": hum}
+TESTS = {name: one for name, one in catalogue().items() if isinstance(one, NoiseEffect)}
 
 
 def _load(repeats: int) -> np.ndarray:
@@ -47,8 +40,8 @@ class Case:
         self.slope = np.gradient(self.prediction, STEP_S)
         self.conditions = Conditions(self.time_s, self.load, STEP_S)
 
-    def found(self, test: ModuleType, residual: np.ndarray) -> coloured_noise.Evidence | None:
-        evidence = test.evidence(residual, self.conditions, self.prediction, STEP_S)
+    def found(self, test: NoiseEffect, residual: np.ndarray) -> SensorEvidence | None:
+        evidence = test.evidence(residual, self.conditions, self.prediction)
         assert evidence is None or evidence.value > evidence.threshold
         return evidence
 
@@ -95,7 +88,7 @@ def test_an_unmodelled_cause_is_no_noise(misfit: Callable[[], np.ndarray]) -> No
 def test_coloured_noise_is_found_with_its_strength(seed: int, strength: float, tau_s: float) -> None:
     rng = np.random.default_rng(seed)
     residual = _white(rng) + _coloured(rng, strength, tau_s)
-    evidence = CASE.found(coloured_noise, residual)
+    evidence = CASE.found(TESTS["coloured_noise"], residual)
     assert evidence is not None
     # 50 s of repeats hold some sixty independent stretches of the longest memory.
     assert evidence.strength == pytest.approx(strength, rel=0.4)
@@ -105,7 +98,7 @@ def test_without_repeats_nothing_is_said_of_coloured_noise() -> None:
     single = Case(repeats=1)
     keep = np.exp(-STEP_S / 0.3)
     noise = lfilter([0.01], [1.0, -keep], np.random.default_rng(3).standard_normal(single.n))
-    assert single.found(coloured_noise, noise) is None
+    assert single.found(TESTS["coloured_noise"], noise) is None
 
 
 @settings(max_examples=6, deadline=None)
@@ -113,10 +106,10 @@ def test_without_repeats_nothing_is_said_of_coloured_noise() -> None:
 def test_noise_that_grows_with_pressure_is_told_from_jitter(seed: int, strength: float) -> None:
     rng = np.random.default_rng(seed)
     residual = _white(rng) + strength * CASE.prediction * rng.standard_normal(CASE.n)
-    evidence = CASE.found(heteroscedastic_noise, residual)
+    evidence = CASE.found(TESTS["heteroscedastic_noise"], residual)
     assert evidence is not None
     assert evidence.strength == pytest.approx(strength, rel=0.25)
-    jitter = CASE.found(timing_jitter, residual)
+    jitter = CASE.found(TESTS["timing_jitter"], residual)
     # Its own false alarms apart: one in a thousand.
     assert jitter is None or jitter.value < 4.0 < evidence.value
 
@@ -127,10 +120,10 @@ def test_jitter_is_told_from_noise_that_grows_with_pressure(seed: int, jitter_s:
     rng = np.random.default_rng(seed)
     moved = np.interp(CASE.time_s + jitter_s * rng.standard_normal(CASE.n), CASE.time_s, CASE.prediction)
     residual = _white(rng) + moved - CASE.prediction
-    evidence = CASE.found(timing_jitter, residual)
+    evidence = CASE.found(TESTS["timing_jitter"], residual)
     assert evidence is not None
     assert evidence.strength == pytest.approx(jitter_s * np.max(np.abs(CASE.slope)), rel=0.25)
-    growing = CASE.found(heteroscedastic_noise, residual)
+    growing = CASE.found(TESTS["heteroscedastic_noise"], residual)
     assert growing is None or growing.value < 4.0 < evidence.value
 
 
@@ -139,17 +132,17 @@ def test_jitter_within_what_a_time_stamp_leaves_open_is_not_told() -> None:
     moved = np.interp(CASE.time_s + 0.15 * STEP_S * rng.standard_normal(CASE.n), CASE.time_s, CASE.prediction)
     residual = 0.2 * _white(rng) + moved - CASE.prediction
     assert growing_noise(residual, CASE.prediction, STEP_S, SLOPE) is not None
-    assert CASE.found(timing_jitter, residual) is None
+    assert CASE.found(TESTS["timing_jitter"], residual) is None
 
 
 def test_ringing_and_a_coarse_lattice_are_no_jitter() -> None:
     rng = np.random.default_rng(8)
     kicks = np.diff(CASE.load, 2, prepend=0.0, append=CASE.load[-1])
     ringing = lfilter([0.5], [1.0, -2.0 * 0.98 * np.cos(0.5), 0.98**2], kicks)
-    assert CASE.found(timing_jitter, 0.2 * FLOOR * rng.standard_normal(CASE.n) + ringing) is None
+    assert CASE.found(TESTS["timing_jitter"], 0.2 * FLOOR * rng.standard_normal(CASE.n) + ringing) is None
     reading = np.round((CASE.prediction + 0.1 * FLOOR * rng.standard_normal(CASE.n)) / 0.002) * 0.002
-    assert CASE.found(timing_jitter, reading - CASE.prediction) is None
-    assert CASE.found(heteroscedastic_noise, reading - CASE.prediction) is None
+    assert CASE.found(TESTS["timing_jitter"], reading - CASE.prediction) is None
+    assert CASE.found(TESTS["heteroscedastic_noise"], reading - CASE.prediction) is None
 
 
 @settings(max_examples=10, deadline=None)
@@ -165,7 +158,7 @@ def test_a_tone_is_found_to_a_fraction_of_a_bin(seed: int, strength: float, tone
     nyquist_hz = 0.5 / STEP_S
     if nyquist_hz - logged_hz < 2 * bin_hz:
         return  # as much of the tone as its phase leaves, possibly nothing
-    found = hum.evidence(residual, CASE.conditions, CASE.prediction, STEP_S)
+    found = hum.Hum().evidence(residual, CASE.conditions, CASE.prediction)
     assert found is not None
     assert found.frequency_hz == pytest.approx(logged_hz, abs=0.25 * bin_hz)
     assert np.hypot(found.cosine, found.sine) == pytest.approx(strength, rel=0.15)
@@ -179,7 +172,7 @@ def test_a_tone_is_found_to_a_fraction_of_a_bin(seed: int, strength: float, tone
 
 def test_a_tone_at_half_the_sampling_rate_is_found() -> None:
     residual = _white(np.random.default_rng(2)) + 0.0005 * np.cos(2 * np.pi * 50.0 * CASE.time_s)
-    found = hum.evidence(residual, CASE.conditions, CASE.prediction, STEP_S)
+    found = hum.Hum().evidence(residual, CASE.conditions, CASE.prediction)
     assert found is not None
     assert 50.0 in found.sources
     assert found.frequency_hz == pytest.approx(50.0, abs=0.01)
@@ -188,9 +181,9 @@ def test_a_tone_at_half_the_sampling_rate_is_found() -> None:
 def test_a_tone_that_the_load_has_is_the_loads() -> None:
     tone = np.sin(2 * np.pi * 7.0 * CASE.time_s)
     residual = _white(np.random.default_rng(2)) + 0.001 * tone
-    test = partial(hum.evidence, residual, CASE.conditions)
-    assert test(CASE.prediction, STEP_S) is not None
-    assert test(CASE.prediction + 0.1 * tone, STEP_S) is None
+    test = partial(hum.Hum().evidence, residual, CASE.conditions)
+    assert test(CASE.prediction) is not None
+    assert test(CASE.prediction + 0.1 * tone) is None
 
 
 @pytest.mark.parametrize(
@@ -205,7 +198,7 @@ def test_a_tone_that_the_load_has_is_the_loads() -> None:
 def test_what_comes_and_goes_is_no_tone(noise: Callable[[np.random.Generator], np.ndarray]) -> None:
     rng = np.random.default_rng(6)
     for _ in range(5):
-        assert CASE.found(hum, _white(rng) + noise(rng)) is None
+        assert CASE.found(TESTS["hum"], _white(rng) + noise(rng)) is None
 
 
 @settings(max_examples=10, deadline=None)
@@ -218,8 +211,8 @@ def test_what_is_quieter_while_the_load_rests_is_no_tone(seed: int, tone_hz: flo
     assert 0.1 < resting.mean() < 0.4
     white = FLOOR * rng.standard_normal(case.n)
     tone = 0.004 * np.sin(2.0 * np.pi * tone_hz * case.time_s)
-    assert case.found(hum, white + np.where(resting, quieter * tone, tone)) is None
-    assert case.found(hum, white + tone) is not None
+    assert case.found(TESTS["hum"], white + np.where(resting, quieter * tone, tone)) is None
+    assert case.found(TESTS["hum"], white + tone) is not None
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from math import pi, sqrt
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects.effect import Conditions, EffectParameter
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter
 
 FALSE_ALARMS = 1e-3
 """Rate at which each test finds something in white Gaussian noise."""
@@ -32,11 +33,22 @@ class SensorEvidence:
     says: str
     strength: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """The contract's object."""
-        return {
-            "statistic": self.statistic, "value": self.value, "threshold": self.threshold, "says": self.says,
-        }  # fmt: skip
+
+class NoiseEffect(Effect):
+    """Noise that a test finds in what a model leaves; never a cause by its waveform.
+
+    ``has_memory``: True where it remembers, as structure does that no effect has explained.
+    """
+
+    is_physical: ClassVar[bool] = False
+    has_memory: ClassVar[bool] = False
+
+    @abstractmethod
+    def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
+        """What a model's ``residual`` (n,) beside its ``prediction`` (n,), in shares of full scale, shows of it.
+
+        None of nothing, at one false alarm in 1000.
+        """
 
 
 class Waveformless:

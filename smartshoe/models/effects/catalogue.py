@@ -13,7 +13,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import PLACES, Effect
@@ -97,6 +97,16 @@ def effect(name: str) -> Effect:
     if found is None:
         raise UsageError(f"there is no effect {name!r}: use one of {', '.join(_found())}")
     return found
+
+
+def shift_of(signal: Literal["load", "reading"]) -> Effect:
+    """The effect that adds one value to the "load" or to the "reading"."""
+    return next(one for one in catalogue().values() if one.shifts == signal)
+
+
+def between_clocks(what: Literal["lag", "rate"]) -> Effect:
+    """The effect whose one value is the "lag" of one clock behind another, or how their "rate" differs."""
+    return next(one for one in catalogue().values() if one.between_clocks == what)
 
 
 def told_apart_by(one: Effect, other: Effect) -> frozenset[Exposure]:

@@ -35,6 +35,7 @@ class ClockDrift(Effect):
         "sensor_lag": by("repeats", "steps"),
     }
     is_latency = True
+    between_clocks = "rate"
     branch = "rates of two clocks"
     why_not_undone = "a stream of readings cannot be moved to another time: shift whole recordings instead"
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_evidence import SensorEvidence, Waveformless
-from smartshoe.models.effects.effect import Conditions, Effect
+from smartshoe.models.effects._sensor_evidence import NoiseEffect, SensorEvidence, Waveformless
+from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.effects.exposure import by
 
 MEMORIES = (1.5, 4.0, 12.0, 40.0, 120.0, 400.0)  # samples: the test looks at each
@@ -19,11 +19,12 @@ SAME_PEAK = 0.05
 CORNER = 0.1  # of the noise: a prediction that bends more from one sample to the next
 
 
-class ColouredNoise(Waveformless, Effect):
+class ColouredNoise(Waveformless, NoiseEffect):
     """Noise of a correlation time: the sensor's own, or whatever has no place in the catalogue and never repeats."""
 
     name, family, stage, place = "coloured_noise", "noise", "sensor", "sensor"
     says = "slow noise that differs from one equal load cycle to the next"
+    has_memory = True
     exposed_by = by("repeats")
     separated_by = {
         "gain_drift": by("repeats"),
@@ -32,48 +33,46 @@ class ColouredNoise(Waveformless, Effect):
         "zero_drift": by("repeats"),
     }
 
+    def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
+        """Whether what differs between equal load cycles is correlated in time; None without, or without repeats.
 
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
-    """Whether what differs between equal load cycles is correlated in time; None without, or without repeats.
-
-    ``residual`` and ``prediction`` (n,) in shares of full scale, ``sample_time_s`` apart. Differences between cycles
-    hold neither a misfit that repeats nor (by regression) drifts of zero, gain and clock. In them, a score test of
-    white noise against first-order noise of several memories, at one false alarm in 1000. It is meant for the
-    residual of a model that was chosen: a strong cause without a place in it, with a memory of the past, leaves
-    differences as well.
-    """
-    covariance, pairs, lengths = np.zeros(0), np.zeros(0), []
-    for series, bias, counted in _differences(residual, conditions, prediction):
-        n = series.size
-        own = _autocovariance(series) + bias
-        size = max(n, covariance.size)
-        covariance = np.pad(covariance, (0, size - covariance.size)) + np.pad(own, (0, size - n))
-        pairs = np.pad(pairs, (0, size - pairs.size)) + np.pad(counted, (0, size - n))
-        lengths.append(n)
-    total = round(float(pairs[0])) if lengths else 0
-    if total < LEAST_INDEPENDENT * 4 or covariance[0] <= 0.0:
-        return None
-    variance = float(covariance[0]) / total
-    best: tuple[float, float, float, float] | None = None
-    for memory in MEMORIES:
-        if total < LEAST_INDEPENDENT * memory or max(lengths) < 2 * memory:
-            continue
-        lags = np.arange(1, min(int(6 * memory) + 2, covariance.size))
-        weight = np.exp(-lags / memory)
-        value = float(weight @ covariance[lags]) / (variance * math.sqrt(float(weight**2 @ pairs[lags])))
-        threshold = QUANTILE + _skewness(memory, total) * (QUANTILE**2 - 1.0) / 6.0
-        if best is None or value - threshold > best[0] - best[1]:
-            power = float(weight @ covariance[lags]) / float(weight**2 @ pairs[lags])
-            best = value, threshold, memory, power
-    if best is None or best[0] <= best[1]:
-        return None
-    value, threshold, memory, power = best
-    strength, tau_s = math.sqrt(power), memory * sample_time_s
-    says = (
-        f"what differs between equal load cycles is correlated over about {tau_s:.2g} s: "
-        f"coloured noise of {100 * strength:.2g} % of full scale"
-    )
-    return SensorEvidence("first_order_noise_score", value, threshold, says, strength)
+        Differences between cycles hold neither a misfit that repeats nor (by regression) drifts of zero, gain and
+        clock. In them, a score test of white noise against first-order noise of several memories. It is meant for the
+        residual of a model that was chosen: a strong cause without a place in it, with a memory of the past, leaves
+        differences as well.
+        """
+        covariance, pairs, lengths = np.zeros(0), np.zeros(0), []
+        for series, bias, counted in _differences(residual, conditions, prediction):
+            n = series.size
+            own = _autocovariance(series) + bias
+            size = max(n, covariance.size)
+            covariance = np.pad(covariance, (0, size - covariance.size)) + np.pad(own, (0, size - n))
+            pairs = np.pad(pairs, (0, size - pairs.size)) + np.pad(counted, (0, size - n))
+            lengths.append(n)
+        total = round(float(pairs[0])) if lengths else 0
+        if total < LEAST_INDEPENDENT * 4 or covariance[0] <= 0.0:
+            return None
+        variance = float(covariance[0]) / total
+        best: tuple[float, float, float, float] | None = None
+        for memory in MEMORIES:
+            if total < LEAST_INDEPENDENT * memory or max(lengths) < 2 * memory:
+                continue
+            lags = np.arange(1, min(int(6 * memory) + 2, covariance.size))
+            weight = np.exp(-lags / memory)
+            value = float(weight @ covariance[lags]) / (variance * math.sqrt(float(weight**2 @ pairs[lags])))
+            threshold = QUANTILE + _skewness(memory, total) * (QUANTILE**2 - 1.0) / 6.0
+            if best is None or value - threshold > best[0] - best[1]:
+                power = float(weight @ covariance[lags]) / float(weight**2 @ pairs[lags])
+                best = value, threshold, memory, power
+        if best is None or best[0] <= best[1]:
+            return None
+        value, threshold, memory, power = best
+        strength, tau_s = math.sqrt(power), memory * conditions.step_s
+        says = (
+            f"what differs between equal load cycles is correlated over about {tau_s:.2g} s: "
+            f"coloured noise of {100 * strength:.2g} % of full scale"
+        )
+        return SensorEvidence("first_order_noise_score", value, threshold, says, strength)
 
 
 def _skewness(memory: float, total: int) -> float:

@@ -25,6 +25,7 @@ class Delay(Effect):
         "sensor_lag": by("steps", "multisine"),
     }
     is_latency = True
+    between_clocks = "lag"
     branch = "delay"
     why_not_undone = "a stream of readings cannot be moved to another time: shift whole recordings instead"
 

@@ -185,6 +185,7 @@ class Effect(ABC):
     ``is_latency``: True where the reading comes late, or early, and is changed in nothing else.
     ``is_seen_at_rest``: True where the reading without load shows the effect's size.
     ``shifts``: "load" or "reading" where the effect adds its one value to it, whatever the time and the load.
+    ``between_clocks``: "lag" or "rate" where the one value of a latency is what two clocks differ by.
     ``is_leak``: True where air leaves the tube, so that an inverse sums up what is gone from the readings.
     ``why_not_undone``: half a sentence for a physical effect without an inverse.
     ``is_flexible``: True for a block that follows any member of its family and is none: it is never named as a cause;
@@ -212,6 +213,7 @@ class Effect(ABC):
     is_latency: ClassVar[bool] = False
     is_seen_at_rest: ClassVar[bool] = False
     shifts: ClassVar[Literal["load", "reading"] | None] = None
+    between_clocks: ClassVar[Literal["lag", "rate"] | None] = None
     is_leak: ClassVar[bool] = False
     why_not_undone: ClassVar[str] = "it has no inverse that runs on a stream of readings"
     is_flexible: ClassVar[bool] = False

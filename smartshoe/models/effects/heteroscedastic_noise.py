@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_evidence import ONE_SIDED, PRESSURE, SensorEvidence, Waveformless, growing_noise
-from smartshoe.models.effects.effect import Conditions, Effect
+from smartshoe.models.effects._sensor_evidence import (
+    ONE_SIDED,
+    PRESSURE,
+    NoiseEffect,
+    SensorEvidence,
+    Waveformless,
+    growing_noise,
+)
+from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.effects.exposure import by
 
 
-class HeteroscedasticNoise(Waveformless, Effect):
+class HeteroscedasticNoise(Waveformless, NoiseEffect):
     """Noise whose variance has a part in proportion to the pressure's square (a noisy supply, a noisy gain)."""
 
     name, family, stage, place = "heteroscedastic_noise", "noise", "sensor", "sensor"
@@ -18,15 +25,11 @@ class HeteroscedasticNoise(Waveformless, Effect):
         "timing_jitter": by("holds"),
     }
 
-
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
-    """Whether the variance of ``residual`` (n,) grows with ``prediction`` (n,), its growth with the slope apart.
-
-    Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000.
-    """
-    found = growing_noise(residual, prediction, sample_time_s, PRESSURE)
-    if found is None:
-        return None
-    value, strength, _ = found
-    says = f"the noise grows with pressure: {100 * strength:.2g} % of full scale are added at the largest pressure"
-    return SensorEvidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)
+    def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
+        """Whether the variance of ``residual`` grows with ``prediction``, its growth with the slope apart."""
+        found = growing_noise(residual, prediction, conditions.step_s, PRESSURE)
+        if found is None:
+            return None
+        value, strength, _ = found
+        says = f"the noise grows with pressure: {100 * strength:.2g} % of full scale are added at the largest pressure"
+        return SensorEvidence("log_variance_on_pressure", value, ONE_SIDED, says, strength)

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, SensorEvidence
+from smartshoe.models.effects._sensor_evidence import FALSE_ALARMS, LEAST_SAMPLES, NoiseEffect, SensorEvidence
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
+from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
+from smartshoe.signals.noise import MAINS_HZ
 
 LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect
-MAINS_HZ = (50.0, 60.0)
 HARMONICS = 7
 MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
 NEIGHBOURS = 60  # bins on either side that give the floor
@@ -42,7 +42,7 @@ class HumEvidence(SensorEvidence):
     sources: tuple[float, ...]
 
 
-class Hum(Effect):
+class Hum(NoiseEffect):
     """+ a sinusoid. 50 Hz sits at the Nyquist frequency of a 100 Hz log; 60 Hz comes out at 40 Hz there."""
 
     name, family, stage, place = "hum", "noise", "logger", "logger"
@@ -58,7 +58,6 @@ class Hum(Effect):
         "coloured_noise": by("idle"),
         "spikes": by("repeats"),
     }
-    is_physical = False
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The signal and the tone."""
@@ -73,6 +72,46 @@ class Hum(Effect):
             f"x -= {c_number(cosine)} * cos({angle}) + {c_number(sine)} * sin({angle});",
         )
 
+    def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> HumEvidence | None:
+        """The strongest line in the spectrum of ``residual`` (n,), `HumEvidence`; None where no line stands out.
+
+        Each bin of the periodogram over the mean of its neighbours, which has an F distribution where the noise is
+        locally flat (Fisher's test with a local floor), at one false alarm in 1000 for the whole spectrum; on the whole
+        record and on averages over segments of it, since the mains wander. A line that the ``prediction`` (n,) has as
+        well is the load's, one that comes and goes is ringing, and one that is quieter while the load rests is what the
+        load's moving makes.
+        """
+        best: tuple[float, float, float, float] | None = None
+        levelled = _levelled(residual) if residual.size >= LEAST_SAMPLES else residual
+        for length in sorted({residual.size, min(residual.size, 2048)}):
+            if length < LEAST_SAMPLES:
+                continue
+            found = _line(levelled, prediction, length, conditions.step_s)
+            if found is not None and (best is None or found[0] < best[0]):
+                best = found
+        if best is None:
+            return None
+        _, ratio, threshold, near_hz = best
+        frequency = _refined(residual, near_hz, conditions.step_s)
+        if not _is_steady(residual, frequency, conditions.step_s):
+            return None
+        if not _stands_at_rest(residual, conditions.load, frequency, conditions.step_s):
+            return None
+        cosine, sine = _amplitudes(residual, frequency, conditions.step_s)
+        sources = tuple(
+            mains * harmonic
+            for mains in MAINS_HZ
+            for harmonic in range(1, HARMONICS + 1)
+            if abs(alias_hz(mains * harmonic, conditions.step_s) - frequency)
+            <= MAINS_TOLERANCE * mains * harmonic + 1.0 / (residual.size * conditions.step_s)
+        )
+        strength = math.sqrt(0.5 * (cosine**2 + sine**2))
+        origin = (
+            f", where {' or '.join(f'{source:g}' for source in sources)} Hz of the mains come out" if sources else ""
+        )
+        says = f"a tone of {100 * math.hypot(cosine, sine):.2g} % of full scale at {frequency:.4g} Hz{origin}"
+        return HumEvidence("line_over_floor", ratio, threshold, says, strength, frequency, cosine, sine, sources)
+
 
 def _tone(time_s: Array, cosine: float, sine: float, frequency: float) -> Array:
     if cosine == 0.0 and sine == 0.0:
@@ -85,45 +124,6 @@ def alias_hz(frequency_hz: float, sample_time_s: float) -> float:
     """Where a tone comes out in a log with that sample time: 0 to the Nyquist frequency."""
     turns = frequency_hz * sample_time_s
     return abs(turns - round(turns)) / sample_time_s
-
-
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> HumEvidence | None:
-    """The strongest line in the spectrum of ``residual`` (n,), `HumEvidence`; None where no line stands out.
-
-    Each bin of the periodogram over the mean of its neighbours, which has an F distribution where the noise is
-    locally flat (Fisher's test with a local floor), at one false alarm in 1000 for the whole spectrum; on the whole
-    record and on averages over segments of it, since the mains wander. A line that the ``prediction`` (n,) has as
-    well is the load's, one that comes and goes is ringing, and one that is quieter while the load rests is what the
-    load's moving makes.
-    """
-    best: tuple[float, float, float, float] | None = None
-    levelled = _levelled(residual) if residual.size >= LEAST_SAMPLES else residual
-    for length in sorted({residual.size, min(residual.size, 2048)}):
-        if length < LEAST_SAMPLES:
-            continue
-        found = _line(levelled, prediction, length, sample_time_s)
-        if found is not None and (best is None or found[0] < best[0]):
-            best = found
-    if best is None:
-        return None
-    _, ratio, threshold, near_hz = best
-    frequency = _refined(residual, near_hz, sample_time_s)
-    if not _is_steady(residual, frequency, sample_time_s):
-        return None
-    if not _stands_at_rest(residual, conditions.load, frequency, sample_time_s):
-        return None
-    cosine, sine = _amplitudes(residual, frequency, sample_time_s)
-    sources = tuple(
-        mains * harmonic
-        for mains in MAINS_HZ
-        for harmonic in range(1, HARMONICS + 1)
-        if abs(alias_hz(mains * harmonic, sample_time_s) - frequency)
-        <= MAINS_TOLERANCE * mains * harmonic + 1.0 / (residual.size * sample_time_s)
-    )
-    strength = math.sqrt(0.5 * (cosine**2 + sine**2))
-    origin = f", where {' or '.join(f'{source:g}' for source in sources)} Hz of the mains come out" if sources else ""
-    says = f"a tone of {100 * math.hypot(cosine, sine):.2g} % of full scale at {frequency:.4g} Hz{origin}"
-    return HumEvidence("line_over_floor", ratio, threshold, says, strength, frequency, cosine, sine, sources)
 
 
 def _powers(signal: Array, length: int) -> Array:

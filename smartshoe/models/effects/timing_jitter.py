@@ -5,13 +5,20 @@ from __future__ import annotations
 from math import sqrt
 
 from smartshoe.arrays import Array
-from smartshoe.models.effects._sensor_evidence import ONE_SIDED, SLOPE, SensorEvidence, Waveformless, growing_noise
-from smartshoe.models.effects.effect import Conditions, Effect
+from smartshoe.models.effects._sensor_evidence import (
+    ONE_SIDED,
+    SLOPE,
+    NoiseEffect,
+    SensorEvidence,
+    Waveformless,
+    growing_noise,
+)
+from smartshoe.models.effects.effect import Conditions
 from smartshoe.models.effects.exposure import by
 from smartshoe.signals.noise import UNIFORM_SD
 
 
-class TimingJitter(Waveformless, Effect):
+class TimingJitter(Waveformless, NoiseEffect):
     """A random error of each sample's time: noise of the size abs(P') times the jitter."""
 
     name, family, stage, place = "timing_jitter", "noise", "logger", "logger"
@@ -21,19 +28,17 @@ class TimingJitter(Waveformless, Effect):
         "heteroscedastic_noise": by("holds"),
     }
 
+    def evidence(self, residual: Array, conditions: Conditions, prediction: Array) -> SensorEvidence | None:
+        """Whether the variance of ``residual`` grows with the slope of ``prediction``, its growth with the size apart.
 
-def evidence(residual: Array, conditions: Conditions, prediction: Array, sample_time_s: float) -> SensorEvidence | None:
-    """Whether the variance of ``residual`` (n,) grows with the slope of ``prediction`` (n,), that with its size apart.
-
-    Both in shares of full scale, ``sample_time_s`` apart. None where it does not, at one false alarm in 1000, or by no
-    more than a time stamp leaves open: where within its interval a sample lies.
-    """
-    found = _found(residual, prediction, sample_time_s)
-    if found is None:
-        return None
-    value, strength, sd_s = found
-    says = f"the noise grows with the slope of the pressure, as from {1e3 * sd_s:.2g} ms of jitter in the sampling"
-    return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
+        None, too, where it does so by no more than a time stamp leaves open: where within its interval a sample lies.
+        """
+        found = _found(residual, prediction, conditions.step_s)
+        if found is None:
+            return None
+        value, strength, sd_s = found
+        says = f"the noise grows with the slope of the pressure, as from {1e3 * sd_s:.2g} ms of jitter in the sampling"
+        return SensorEvidence("log_variance_on_slope", value, ONE_SIDED, says, strength)
 
 
 def jitter_s(residual: Array, prediction: Array, sample_time_s: float) -> float:

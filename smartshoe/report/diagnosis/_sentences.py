@@ -25,7 +25,6 @@ HEADINGS = {
 }
 SUREST = 0.99
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
-LEFT_OUT = "left out: "  # as limits of recordings that are of no use begin
 
 
 def listed(names: Sequence[str], last: str = "or") -> str:

@@ -13,7 +13,6 @@ from smartshoe.diagnosis.design import Design
 from smartshoe.models.effects import in_words
 from smartshoe.report.diagnosis._sentences import (
     HEADINGS,
-    LEFT_OUT,
     comparison,
     fault_text,
     for_this_one,
@@ -60,9 +59,8 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
         _line(console, shares_text(diagnosis))
     _several(console, "faults of the data", [fault_text(fault) for fault in diagnosis.data_faults])
     # What is left out is a line a recording, of which there may be many: what limits the rest comes before it.
-    left_out = [said for said in diagnosis.limits if said.startswith(LEFT_OUT)]
-    _several(console, "limits of this data", [said for said in diagnosis.limits if said not in left_out], most=None)
-    _several(console, "recordings that were left out", [said.removeprefix(LEFT_OUT) for said in left_out])
+    _several(console, "limits of this data", diagnosis.limits_of_the_rest, most=None)
+    _several(console, "recordings that were left out", diagnosis.left_out)
     if diagnosis.next_experiment is not None:
         _several(console, "what to do next", [diagnosis.next_experiment.says])
 

@@ -1,0 +1,133 @@
+"""What recordings may be diagnosed, and what is said of those that may not; `diagnose`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from smartshoe.diagnosis._characteristic import characteristic_of
+from smartshoe.diagnosis._procedure import diagnosed
+from smartshoe.diagnosis._result import Diagnosis
+from smartshoe.diagnosis._session import pastless
+from smartshoe.diagnosis._settling import Progress
+from smartshoe.diagnosis.decay import decay_of
+from smartshoe.errors import UsageError
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of
+from smartshoe.integrity import Integrity, examine, twins
+from smartshoe.integrity.thresholds import Thresholds, decided_by
+from smartshoe.recording import Recording
+
+
+def _silent(_: str) -> None:
+    return None
+
+
+def diagnose(
+    recordings: RecordingLike | Sequence[RecordingLike],
+    hold_out: RecordingLike | Sequence[RecordingLike] | None = None,
+    *,
+    material: float | None = None,
+    thresholds: Thresholds | None = None,
+    progress: Progress = _silent,
+) -> Diagnosis:
+    """What the baseline simulation of ``recordings`` gets wrong, why, and what mending it gains.
+
+    Parameters
+    ----------
+    recordings
+        Load and reading of one unit (recordings, paths or DataFrames), each a session of its own unless its metadata
+        ``continues`` names another.
+    hold_out
+        Recordings to judge on. They select nothing and are never fitted; without them every third load cycle is.
+    material
+        Share of the full-scale reading below which nothing counts; that of ``thresholds`` where it is not given.
+    thresholds
+        Every number that decides.
+    progress
+        Called with a few words at each step.
+
+    Raises
+    ------
+    UsageError
+        Where no recording is given, of recordings of several units, and of numbers to decide by that are none. A
+        diagnosis that the data cannot support comes back with the verdict "refused" and the reason in ``limits``.
+    """
+    fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
+    if not fitted:
+        raise UsageError("diagnose was given no recording: give one at least")
+    if len(units := sorted({one.unit for one in (*fitted, *kept_out) if one.unit})) > 1:
+        raise UsageError(f"recordings of different units ({', '.join(units)}): diagnose one unit at a time")
+    decided = decided_by(thresholds, material)
+    everything, count = [*fitted, *kept_out], len(fitted)
+    integrity = examine(everything, decided)
+    everything = [*integrity.recordings]
+    useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
+    left_out = twins(everything) | dict(zip(useless, integrity.refusals, strict=True))
+    pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
+    if any(k < count for k in pulled):
+        return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
+    left_out |= pulled
+    if all(k in left_out for k in range(count)):
+        return _refused(everything, integrity, list(left_out.values()), decided)
+    usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
+    found = diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
+    reasons = tuple(left_out.values())
+    limits = (*(f"left out: {why}" for why in reasons), *_without(everything, count, left_out), *found.limits)
+    return replace(found, limits=limits, left_out=reasons)
+
+
+def _outside(recording: Recording, thresholds: Thresholds) -> str | None:
+    """Why a recording is none of a unit that is pressed, or None."""
+    low, high = (float(value) for value in np.percentile(recording.force_n, [1, 99]))
+    if not (low < 0 < high and min(-low, high) > thresholds.same * max(-low, high)):
+        return None
+    return (
+        f"{recording.label}: the load runs from {low:.4g} to {high:.4g} N: the catalogue is of a unit that is pressed,"
+        " which bears compression only (turn the sign of the load, set it to zero at rest, or take its mean out, if"
+        " that is what was meant)"
+    )
+
+
+def _without(recordings: Sequence[Recording], count: int, left_out: Mapping[int, str]) -> list[str]:
+    """What is said where recordings that others need are ``left_out``, by place, or were not given at all.
+
+    The first ``count`` were to be fitted.
+    """
+    said = []
+    names = {recordings[k].name for k in left_out}
+    for one in pastless([one for k, one in enumerate(recordings) if k not in left_out]):
+        earlier = one.metadata["continues"]
+        why = f"which is not among the recordings: it is taken as the unit's first after a rest (give {earlier} too)"
+        if earlier in names:
+            why = "which is left out: it is taken as a session of its own"
+        elif earlier == one.name:
+            why = "which is itself: it is taken as the unit's first after a rest (name the recording before it)"
+        said.append(f"{one.label} continues {earlier}, {why}")
+    if count < len(recordings) and all(k in left_out for k in range(count, len(recordings))):
+        said.append("no recording to judge on is left: load cycles of those that are fitted are held out instead")
+    return said
+
+
+def _refused(
+    recordings: Sequence[Recording], integrity: Integrity, refusals: Sequence[str], thresholds: Thresholds
+) -> Diagnosis:
+    sensors = recordings[0].sensors
+    unit = sensors[0].unit.symbol if sensors else ""
+    return Diagnosis(
+        "refused",
+        f"no diagnosis: {refusals[0]}",
+        unit,
+        0.0,
+        0.0,
+        data_faults=integrity.faults,
+        limits=(*refusals, *(said for one in recordings if (said := _seen(one, thresholds)) is not None)),
+        thresholds=thresholds,
+    )
+
+
+def _seen(recording: Recording, thresholds: Thresholds) -> str | None:
+    """What is known of a recording without a model."""
+    decay = decay_of(recording, thresholds)
+    return decay.says if decay is not None else characteristic_of(recording, thresholds)

@@ -1,0 +1,147 @@
+"""What is said of a diagnosis, alike on the page and on a terminal: numbers, shares, the comparison."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnoses_made import BASELINE, LEAK, LEAK_CAUSE, PLAY_CAUSE, case
+from hypothesis import given
+from hypothesis import strategies as st
+
+from smartshoe.diagnosis import Gain
+from smartshoe.diagnosis._result import Rival
+from smartshoe.models.effects import effect
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.models.parameter import Parameter
+from smartshoe.report.diagnosis._sentences import (
+    Row,
+    comparison,
+    gain_sentence,
+    interval,
+    listed,
+    parameter_text,
+    shares,
+    shares_text,
+    sure,
+    two_numbers,
+    unnamed,
+    why_this_one,
+)
+
+percent = st.floats(-50.0, 150.0)
+
+
+def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weighed_by() -> None:
+    text = "no other effect of the catalogue does as well; the nearest, zero drift, is less likely by 88 (−2 log, by"
+    assert why_this_one(LEAK_CAUSE) == f"{text} evidence)"
+    assert why_this_one(replace(LEAK_CAUSE, rivals=(Rival("zero_drift", 88.0, "fit"),))) == f"{text} its fit)"
+    assert why_this_one(replace(LEAK_CAUSE, rivals=())) == "no other effect of the catalogue comes near"
+    several = replace(PLAY_CAUSE, equivalents=("bouc_wen_hysteresis", "dead_band"))
+    assert why_this_one(several) == (
+        "bouc wen hysteresis and dead band cannot be ruled out, since no equation is exact: take the name as one of 3"
+    )
+
+
+def test_effects_without_a_name_are_told_and_free_forms_as_such() -> None:
+    made = case("one cause")
+    assert unnamed(made) == ""
+    assert unnamed(replace(made, minor=("sensor_lag",))) == "sensor lag"
+    assert unnamed(replace(made, minor=("sensor_lag", "flexible_curve", "delay"))) == (
+        "curve of free form, delay and sensor lag"
+    )
+
+
+def test_a_force_that_the_extended_model_gives_back_worse_is_the_baselines() -> None:
+    made = case("one cause")
+
+    def row(by: ExtendedModel | None) -> Row:
+        rows = comparison(replace(made, force_model=by))
+        return next(one for one in rows if one.name.startswith("error of the compensated force"))
+
+    own = row(None)
+    assert own.after.endswith(" N")
+    assert own.change.endswith(" %")
+    with_zero = BASELINE.with_part(effect("zero_offset"), np.array([0.01]))  # so that it gives readings as logged
+    for plain_model in (BASELINE, with_zero):
+        assert row(plain_model).before == own.before
+        assert (row(plain_model).after, row(plain_model).change) == ("by the baseline, see the limits", "")
+    # One effect is passed over and others are undone: it is no baseline, and its error is that of the result.
+    assert row(with_zero.with_part(*LEAK)) == own
+
+
+@pytest.mark.parametrize(
+    ("explained", "explainable", "said"),
+    [
+        (0.2, 0.4, "Nearly all of the error's variance is noise, which no model explains."),
+        (0.4, 3.0, "97 % of the error's variance is noise; of the rest 13 % is explained."),
+        (0.0, 92.0, "8 % of the error's variance is noise; of the rest none is explained."),
+        (0.4, 92.0, "8 % of the error's variance is noise; of the rest none is explained."),
+        (0.5, 92.0, "8 % of the error's variance is noise; of the rest 1 % is explained."),
+        (99.0, 99.5, "Under 1 % of the error's variance is noise; of the rest over 99 % is explained."),
+        (92.0, 92.0, "8 % of the error's variance is noise; of the rest 100 % is explained."),
+    ],
+)
+def test_shares_are_said_of_what_is_no_noise(explained: float, explainable: float, said: str) -> None:
+    made = replace(case("refused"), explained_percent=explained, explainable_percent=explainable)
+    assert shares_text(made) == said
+
+
+@given(percent, percent)
+def test_shares_are_a_whole_whatever_was_estimated(explained: float, explainable: float) -> None:
+    part = shares(replace(case("refused"), explained_percent=explained, explainable_percent=explainable))
+    assert min(part.explained, part.left, part.noise) >= 0.0
+    assert part.explained + part.left + part.noise == pytest.approx(100.0)
+
+
+@given(st.floats(-1e4, 1e4), st.floats(1e-6, 1e4))
+def test_an_interval_keeps_value_and_bounds_to_a_tenth_of_its_half_width(value: float, half: float) -> None:
+    said = interval(value, value - half, value + half).replace("−", "-")
+    shown = [float(number) for number in re.findall(r"-?\d[\d.e+-]*", said)]
+    # Two digits of the half width: half a unit of the second one is a twentieth at most.
+    for number, true in zip(shown, (value, value - half, value + half), strict=True):
+        assert number == pytest.approx(true, abs=0.06 * half, rel=1e-3)
+
+
+def test_a_gain_that_is_none_is_not_called_one() -> None:
+    assert "it does not fall: −0.84 % [−2.2, 0.41]" in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
+    assert parameter_text(Parameter(0.0, 0.0, (0.0, 0.0), "1/K")) == "held at 0 1/K"
+
+
+def test_a_parameter_at_the_end_of_its_range_is_told_as_such() -> None:
+    assert parameter_text(Parameter(50.0, 20.0, (0.5, 50.0), "s")) == "50 [0.5, 50] s, at its limit"
+    assert parameter_text(Parameter(0.5, 20.0, (0.5, 50.0), "1")) == "0.5 [0.5, 50], at its limit"
+    assert parameter_text(Parameter(20.0, 8.0, (4.3, 35.7), "s")) == "20 [4, 36] s"
+
+
+@pytest.mark.parametrize(("value", "sd"), [(20.0, 20.0), (50.0, 40.0), (0.5, math.inf)])
+def test_a_parameter_that_may_be_anything_within_its_range_is_told_as_no_result(value: float, sd: float) -> None:
+    assert parameter_text(Parameter(value, sd, (0.5, 50.0), "s")) == "not determined"
+
+
+def test_structure_that_no_test_could_have_shown_is_not_called_none() -> None:
+    found = case("unexplained")
+    assert found.baseline is not None
+    assert found.extended is not None
+    untested = replace(
+        found,
+        baseline=replace(found.baseline, structure_rms=math.nan),
+        extended=replace(found.extended, structure_rms=math.nan),
+    )
+    row = comparison(untested)[-1]
+    assert (row.before, row.after, row.change) == ("cannot be told", "cannot be told", "–")
+
+
+def test_words_for_numbers() -> None:
+    assert interval(50.0, 0.5, 50.0) == "50 [0.5, 50]"
+    assert interval(2.0, math.nan, 3.0) == "2.000"
+    assert interval(-0.5, -0.6, -0.4) == "−0.50 [−0.60, −0.40]"
+    assert sure(0.9999) == "over 99 %"
+    assert sure(0.62) == "62 %"
+    assert two_numbers(0.17853, 0.17906) == ("0.1785", "0.1791")
+    assert listed(["a_b", "c", "d"]) == "a b, c or d"
+    part = shares(replace(case("refused"), explained_percent=120.0, explainable_percent=50.0))
+    assert (part.explained, part.left, part.noise) == (100.0, 0.0, 0.0)
