@@ -68,10 +68,10 @@ class Likelihood:
 
     def cost(self, model: ExtendedModel) -> float:
         """Sum of squares over what is fitted, in units of the noise's variance; infinite of a model that runs off."""
-        traces = [model.trace(session.conditions) for session in self.sessions]
-        self._last = model, traces  # the slopes of a step that is taken begin with them
         total = 0.0
         with np.errstate(over="ignore", invalid="ignore"):  # a leak beside an arm that pushes grows without bounds
+            traces = [model.trace(session.conditions) for session in self.sessions]
+            self._last = model, traces  # the slopes of a step that is taken begin with them
             left = [session.reading - reading for session, (reading, _) in zip(self.sessions, traces, strict=True)]
             self._about(model, left)
             for k, rest in enumerate(left):

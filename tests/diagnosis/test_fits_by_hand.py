@@ -141,11 +141,12 @@ def _weight(session: Any, sd: float, pole_per_s: float) -> tuple[Array, Array]:
     return np.eye(kept.sum()) / sd**2 - past @ found / sd**2, found
 
 
-def test_a_model_that_runs_off_costs_without_end_and_warns_of_nothing() -> None:
+@pytest.mark.parametrize("gain", [1.0, 1e250])
+def test_a_model_that_runs_off_costs_without_end_and_warns_of_nothing(gain: float) -> None:
     """A leak beside an arm that pushes: what goes out pushes more out."""
     size = 3000
     likelihood = Likelihood([session_of(np.ones(size), np.ones(size, dtype=bool))], 0.03, MODEL, STANDARD)
-    runs_off = ExtendedModel(1.0, -0.9, 0.01, 800.0, 140.0, "mbar").with_part("linear_leak", np.array([500.0]))
+    runs_off = ExtendedModel(gain, -0.9, 0.01, 800.0, 140.0, "mbar").with_part("linear_leak", np.array([500.0]))
     assert likelihood.cost(runs_off) == math.inf
     assert math.isfinite(likelihood.cost(MODEL.with_part("linear_leak", np.array([500.0]))))
 
