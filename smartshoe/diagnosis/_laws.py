@@ -55,7 +55,8 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
         if any(a.effect is None and a.margin < 0.0 for a in one.alternatives):
             tried.append(one.without)
         most = evidence.thresholds.law_departure**2 * max(one.fall, 0.0)
-        tried += [a.fit for a in one.laws if a.fit is not None and (one.effect.is_flexible or a.margin < most)]
+        if not one.effect.why_unnamed:  # what no law does has been weighed against those that come near
+            tried += [a.fit for a in one.laws if a.fit is not None and a.margin < most]
         other = _nearest_of_another_kind(one, found.model)
         if other is not None and (one.departed > 1.0 or one.is_ended) and one.size > evidence.thresholds.tolerable:
             # What departs by more than equations do, or lies where its kind ends, may be of another kind.

@@ -110,7 +110,7 @@ def relays_undone(signal, strength, half_widths, closed, open_, levelling, state
                 high, over = f, left
                 under *= 0.5 if stays == -1 else 1.0
                 stays = -1
-            f = low - under * (high - low) / (over - under) if over > under else y
+            f = low - under / (over - under) * (high - low) if over > under else y
         state[:] = moved
         out[k] = f
 
