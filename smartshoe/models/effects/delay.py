@@ -17,7 +17,7 @@ class Delay(Effect):
     """
 
     name, family, stage, place = "delay", "timing", "logger", "logger"
-    says = "the reading is late against the load by a constant time (early where it is negative), its corners as sharp as ever"
+    says = "the reading is late by a constant time (early where it is below zero), its corners as sharp as the load's"
     parameters = (EffectParameter("delay", "s", "time by which the reading is late", 0.0, -3.0, 3.0, 0.01),)
     exposed_by = by("rates", "steps")
     separated_by = {
