@@ -82,11 +82,22 @@ def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ig
 
 
 @njit(cache=True)
-def relays_undone(signal, strength, half_widths, closed, open_, levelling, state, out):  # type: ignore[no-untyped-def]
-    """out (n,) with out - strength relays(out) = ``signal`` (n,); ``state`` moves on.
+def closer(at, left, low, high, under, over, stays):  # type: ignore[no-untyped-def]
+    """A bracket of a rising ``left`` with ``at`` as an end, and first where its zero is sought next.
 
-    By the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counting half.
+    By the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counting half. ``under``
+    and ``over`` are what is left at ``low`` and ``high``; ``stays``: 1 if ``high`` stayed, -1 if ``low`` did.
     """
+    if left < 0.0:
+        low, under, over, stays = at, left, over * (0.5 if stays == 1 else 1.0), 1
+    else:
+        high, over, under, stays = at, left, under * (0.5 if stays == -1 else 1.0), -1
+    return low - (high - low) * (under / (over - under)), low, high, under, over, stays
+
+
+@njit(cache=True)
+def relays_undone(signal, strength, half_widths, closed, open_, levelling, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out - strength relays(out) = ``signal`` (n,); ``state`` moves on."""
     moved = np.empty(half_widths.size)
     for k in range(signal.size):
         y = signal[k]
@@ -100,17 +111,11 @@ def relays_undone(signal, strength, half_widths, closed, open_, levelling, state
                 continue
             if i == 1:
                 over = left
+                f = low - (high - low) * (under / (over - under)) if over > under else y
             elif abs(left) <= SOLVED:
                 break
-            elif left < 0.0:
-                low, under = f, left
-                over *= 0.5 if stays == 1 else 1.0
-                stays = 1
             else:
-                high, over = f, left
-                under *= 0.5 if stays == -1 else 1.0
-                stays = -1
-            f = low - under / (over - under) * (high - low) if over > under else y
+                f, low, high, under, over, stays = closer(f, left, low, high, under, over, stays)
         state[:] = moved
         out[k] = f
 
@@ -208,17 +213,19 @@ def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, sta
         if abs(f - last) > dead_zone:  # else the load has not moved, as far as friction knows
             sense = 1.0 if f > last else -1.0
             on = place if sense == direction else _place_of(sense * value, z, slope)
-            low, high = (last, y + strength) if sense > 0.0 else (y - strength, last)
-            for _ in range(_BISECTIONS):
-                f = 0.5 * (low + high)
-                move = max(sense * (f - last) - dead_zone, 0.0)
+            low, under, over, stays = 0.0, dead_zone - sense * (f - last), 0.0, 0
+            move = high = sense * (y - last) + strength - dead_zone  # friction is no more than that
+            for i in range(STEPS):
+                f = last + sense * (dead_zone + move)
                 height = strength * _left(fading, last + sense * move)
-                if f - height * sense * _along(on + move * per_load, z, slope) < y:
-                    low = f
+                left = sense * (f - y) - height * _along(on + move * per_load, z, slope)
+                if abs(left) <= SOLVED:
+                    break
+                if i == 0:
+                    over = left
+                    move = -high * (under / (over - under))
                 else:
-                    high = f
-            f = 0.5 * (low + high)
-            move = max(sense * (f - last) - dead_zone, 0.0)
+                    move, low, high, under, over, stays = closer(move, left, low, high, under, over, stays)
             if move > 0.0:
                 direction, place = sense, on + move * per_load
                 value = sense * _along(place, z, slope)
@@ -271,14 +278,22 @@ def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type:
             end = last + math.copysign(dead_zone, f - last)
             whole = y / (1.0 - strength)
             far = max(y, whole) if f > last else min(y, whole)
-            near, rises = end, f > last
-            for _ in range(_BISECTIONS):
-                f = 0.5 * (near + far)
-                now = _sense(sense, f - end, width, fade)
-                if (f * (1.0 - 0.5 * strength * (1.0 - now)) < y) == rises:
-                    near = f
+            way = 1.0 if f > last else -1.0  # a load that falls is sought upside down
+            f = low = way * end
+            high, under, over, stays = way * far, 0.0, 0.0, 0
+            for i in range(STEPS):  # first the ends
+                now = _sense(sense, way * f - end, width, fade)
+                left = f * (1.0 - 0.5 * strength * (1.0 - now)) - way * y
+                if abs(left) <= SOLVED or (i == 0 and left > 0.0) or (i == 1 and left < 0.0):
+                    break
+                if i == 0:
+                    under, f = left, high
+                elif i == 1:
+                    over = left
+                    f = low - (high - low) * (under / (over - under))
                 else:
-                    far = f
+                    f, low, high, under, over, stays = closer(f, left, low, high, under, over, stays)
+            f *= way
             last += f - end
         sense = now
         out[k] = f

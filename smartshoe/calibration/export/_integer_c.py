@@ -17,7 +17,7 @@ from smartshoe.models.effects.effect import CStep
 
 _ROOM = 2**62  # a sum below it stays in 64 bits with half a step of rounding
 _TOKEN = re.compile(
-    r"\s*(?:(?P<real>(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+)|(?P<whole>\d+)|(?P<name>[A-Za-z_]\w*)"
+    r"(?:\s|/\*.*?\*/)*(?:(?P<real>(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+)|(?P<whole>\d+)|(?P<name>[A-Za-z_]\w*)"
     r"|(?P<sign>->|\+\+|\+=|-=|\*=|/=|<=|>=|==|!=|&&|\|\||[-+*/<>=!?:;,(){}\[\]]))"
 )
 _LEVELS = (("||",), ("&&",), ("==", "!=", "<", ">", "<=", ">="), ("+", "-"), ("*", "/"))
@@ -132,7 +132,7 @@ class _Parser:
                 return [f"{loop} ({head}) {{", *self._block(), "}"]
         if self._sees("static", "const", "double", "int"):
             return self._declaration()
-        line = "break" if self._takes("break") else self._assignment()
+        line = self._next()[1] if self._sees("break", "continue") else self._assignment()
         self._needs(";")
         return [f"{line};"]
 

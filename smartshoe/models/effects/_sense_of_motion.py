@@ -30,8 +30,8 @@ def _sense(conditions: Conditions, turn: float, fade: float) -> Array:
 
 
 def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> Undone:
-    """The load whose own sense gives the output, by bisection; exact for a load without noise."""
-    from smartshoe.kernels.memory import sense_undone
+    """The load whose own sense gives the output, by false position; exact for a load without noise."""
+    from smartshoe.kernels.memory import SOLVED, STEPS, sense_undone
 
     def body(of: Mapping[str, str]) -> str:
         zone = c_number(dead_zone)
@@ -41,8 +41,8 @@ def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> 
             return f"""turned = ({by} < 0.0 ? -({by}) : {by}) / {c_number(turn)};
         total = turned + {c_number(fade)};
         if (total > 0.0) {{
-            const double at = ({by} < 0.0 ? -turned : turned) / total;
-            sense = at + ({of["sense"]} - at) * exp(-total);
+            const double to = ({by} < 0.0 ? -turned : turned) / total;
+            sense = to + ({of["sense"]} - to) * exp(-total);
         }}"""
 
         return f"""{{
@@ -54,20 +54,39 @@ def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> 
     if ({of["last"]} >= {NO_LOAD}) {{
         {of["last"]} = v;
     }} else if (fabs(v - {of["last"]}) > {zone}) {{
-        const int rises = v > {of["last"]};
-        const double end = rises ? {of["last"]} + {zone} : {of["last"]} - {zone};
-        const double whole = x / {c_number(1.0 - lost)};
-        double near = end, far = (x > whole) == rises ? x : whole;
-        int k;
-        for (k = 0; k < 50; k++) {{
-            v = 0.5 * (near + far);
+        const double way = v > {of["last"]} ? 1.0 : -1.0;
+        const double end = {of["last"]} + way * {zone}, whole = x / {c_number(1.0 - lost)};
+        double low = way * end, high = way * ((x > whole) == (way > 0.0) ? x : whole);
+        double at = low, under = 0.0, over = 0.0;
+        int k, stays = 0;
+        for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
+            double left;
+            v = way * at;
             sense = {of["sense"]};
             {turned("(v - end)")}
-            if ((v * (1.0 - {c_number(0.5 * lost)} * (1.0 - sense)) < x) == rises) {{
-                near = v;
-            }} else {{
-                far = v;
+            left = at * (1.0 - {c_number(0.5 * lost)} * (1.0 - sense)) - way * x;
+            if (fabs(left) <= {SOLVED} || (k == 0 && left > 0.0) || (k == 1 && left < 0.0)) {{
+                break;
             }}
+            if (k == 0) {{
+                under = left;
+                at = high;
+                continue;
+            }}
+            if (k == 1) {{
+                over = left;
+            }} else if (left < 0.0) {{
+                low = at;
+                under = left;
+                over *= stays == 1 ? 0.5 : 1.0;
+                stays = 1;
+            }} else {{
+                high = at;
+                over = left;
+                under *= stays == -1 ? 0.5 : 1.0;
+                stays = -1;
+            }}
+            at = low - (high - low) * (under / (over - under));
         }}
         {of["last"]} += v - end;
     }}

@@ -57,11 +57,11 @@ class BoucWenHysteresis(Remembering):
         return signal - float(values[0]) * np.clip(1.0 - float(values[4]) * load, 0.0, 1.0) * out
 
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
-        """The load whose friction gives the output, by bisection; exact for a load without noise.
+        """The load whose friction gives the output, by false position; exact for a load without noise.
 
         There is one such load where friction turns over less fast than load: half_height (1 + turn) < width.
         """
-        from smartshoe.kernels.memory import bouc_wen_undone
+        from smartshoe.kernels.memory import SOLVED, STEPS, bouc_wen_undone
 
         strength, fading = float(values[0]), float(values[4])
         per_load, z, slope = _branch(values)
@@ -70,7 +70,7 @@ class BoucWenHysteresis(Remembering):
             return _C_BODY.format(
                 **of, points=z.size, z=_row(z), slope=_row(slope), last_point=z.size - 1, no_load=NO_LOAD,
                 strength=c_number(strength), fading=c_number(fading), zone=c_number(dead_zone),
-                per_load=c_number(per_load),
+                per_load=c_number(per_load), steps=STEPS, solved=SOLVED,
             )  # fmt: skip
 
         constants = (strength, fading, per_load, z, slope, dead_zone)
@@ -127,8 +127,8 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
     x = y + {{strength}} * fmin(fmax(1.0 - {{fading}} * {{last}}, 0.0), 1.0) * {{value}};
     if (fabs(x - {{last}}) > {{zone}}) {{{{
         const double sense = x > {{last}} ? 1.0 : -1.0;
-        double on = {{place}}, low, high, height, move = 0.0, now;
-        int k;
+        double on = {{place}}, low, high, height, move, now, left, under, over = 0.0;
+        int k, stays = 0;
         if (sense * {{direction}} <= 0.0) {{{{
             low = 0.0;
             high = {{last_point}}.0;
@@ -143,28 +143,37 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
             }}}}
             on = 0.5 * (low + high);
         }}}}
-        low = sense > 0.0 ? {{last}} : y - {{strength}};
-        high = sense > 0.0 ? y + {{strength}} : {{last}};
-        for (k = 0; k <= 50; k++) {{{{
-            x = 0.5 * (low + high);
-            move = sense * (x - {{last}}) - {{zone}};
-            move = move > 0.0 ? move : 0.0;
+        low = 0.0;
+        under = {{zone}} - sense * (x - {{last}});
+        high = sense * (y - {{last}}) + {{strength}} - {{zone}};
+        move = high;
+        for (k = 0; k < {{steps}}; k++) {{{{  /* the Illinois method */
+            x = {{last}} + sense * ({{zone}} + move);
             {_at("on + move * {per_load}", "now")}
-            now *= sense;
-            if (k == 50) {{{{
+            height = {{strength}} * fmin(fmax(1.0 - {{fading}} * ({{last}} + sense * move), 0.0), 1.0);
+            left = sense * (x - y) - height * now;
+            if (fabs(left) <= {{solved}}) {{{{
                 break;
             }}}}
-            height = fmin(fmax(1.0 - {{fading}} * ({{last}} + sense * move), 0.0), 1.0);
-            if (x - {{strength}} * height * now < y) {{{{
-                low = x;
+            if (k == 0) {{{{
+                over = left;
+            }}}} else if (left < 0.0) {{{{
+                low = move;
+                under = left;
+                over *= stays == 1 ? 0.5 : 1.0;
+                stays = 1;
             }}}} else {{{{
-                high = x;
+                high = move;
+                over = left;
+                under *= stays == -1 ? 0.5 : 1.0;
+                stays = -1;
             }}}}
+            move = low - (high - low) * (under / (over - under));
         }}}}
         if (move > 0.0) {{{{
             {{direction}} = sense;
             {{place}} = on + move * {{per_load}};
-            {{value}} = now;
+            {{value}} = sense * now;
             {{last}} += sense * move;
         }}}}
     }}}}

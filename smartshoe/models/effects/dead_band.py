@@ -9,7 +9,6 @@ from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
-BISECTIONS = 50
 LEAST_ONSET = 1e-9  # stands for none
 MOST = 1.3  # times the lost load: a band that is sharp at its end loses a little more before it
 
@@ -51,38 +50,53 @@ class DeadBand(Effect):
         return _passed(signal, *(float(value) for value in values))
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Bisection between y and y + f0; loads within a sharp band cannot be told apart, nor noise about zero."""
+        """By false position from y to y + f0; loads within a sharp band cannot be told apart, nor noise about zero."""
+        from smartshoe.kernels.dead_band import dead_band_undone
+        from smartshoe.kernels.memory import SOLVED, STEPS
+
         lost, soft, onset = (float(value) for value in values)
+        if lost == 0.0:
+            return Memoryless(lambda signal, _: signal.copy(), "")
+        begins, whole, late = _constants(soft, onset)
 
         def undo(signal: Array, time_s: Array) -> Array:
-            if lost == 0.0:
-                return signal.copy()
-            low, high = signal.copy(), signal + MOST * lost
-            for _ in range(BISECTIONS):
-                middle = 0.5 * (low + high)
-                below = _passed(middle, lost, soft, onset) < signal
-                low, high = np.where(below, middle, low), np.where(below, high, middle)
-            return np.where(signal > 0.0, 0.5 * (low + high), signal)
+            out = np.empty(signal.size)
+            given = lost, soft, onset, max(onset, LEAST_ONSET), begins, whole, late, MOST * lost
+            dead_band_undone(np.ascontiguousarray(signal, dtype=float), *given, out)
+            return out
 
-        if lost == 0.0:
-            return Memoryless(undo, "")
-        begins, whole, late = _constants(soft, onset)
         body = f"""if (x > 0.0) {{
-    double low = x, high = x + {c_number(MOST * lost)};
-    int k;
-    for (k = 0; k < {BISECTIONS}; k++) {{
-        const double v = 0.5 * (low + high), z = v / {c_number(lost)};
-        const double y = ({c_number(1.0 + onset)} - z) / {c_number(soft)};
+    double low = x, high = x + {c_number(MOST * lost)}, under = 0.0, over = 0.0, v = low;
+    int k, stays = 0;
+    for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
+        const double z = v / {c_number(lost)}, y = ({c_number(1.0 + onset)} - z) / {c_number(soft)};
         const double s = (y > 0.0 ? y : 0.0) + log1p(exp(-fabs(y)));
         const double sets_in = {c_number(late)} * expm1(-z / {c_number(max(onset, LEAST_ONSET))});
-        const double m = {c_number(begins)} - {c_number(soft)} * s + sets_in;
-        if (v - {c_number(lost / whole)} * m < x) {{
+        const double left = v - x - {c_number(lost / whole)} * ({c_number(begins)} - {c_number(soft)} * s + sets_in);
+        if (fabs(left) <= {SOLVED}) {{
+            break;
+        }}
+        if (k == 0) {{
+            under = left;
+            v = high;
+            continue;
+        }}
+        if (k == 1) {{
+            over = left;
+        }} else if (left < 0.0) {{
             low = v;
+            under = left;
+            over *= stays == 1 ? 0.5 : 1.0;
+            stays = 1;
         }} else {{
             high = v;
+            over = left;
+            under *= stays == -1 ? 0.5 : 1.0;
+            stays = -1;
         }}
+        v = low - (high - low) * (under / (over - under));
     }}
-    x = 0.5 * (low + high);
+    x = v;
 }}"""
         return Memoryless(undo, body)
 

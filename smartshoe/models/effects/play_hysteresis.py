@@ -120,7 +120,7 @@ def _c_body(states: list[str], strength: float, levelling: float, closed: Array,
     double state[{count}], moved[{count}];
     double low = x - 2.0 * {whole}, high = x + 2.0 * {whole}, under = 0.0, over = 0.0, v = low;
     int i, k, stays = 0;
-{load}    for (k = 0; k < {STEPS}; k++) {{
+{load}    for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
         double left = v - x, g = v > 0.0 ? v : 0.0;
         const double above = g * g * (1.0 - {bent} * g);
         for (i = 0; i < {count}; i++) {{
@@ -138,24 +138,24 @@ def _c_body(states: list[str], strength: float, levelling: float, closed: Array,
         if (k == 0) {{
             under = left;
             v = high;
-        }} else {{
-            if (k == 1) {{
-                over = left;
-            }} else if (fabs(left) <= {SOLVED}) {{
-                break;
-            }} else if (left < 0.0) {{
-                low = v;
-                under = left;
-                over *= stays > 0 ? 0.5 : 1.0;
-                stays = 1;
-            }} else {{
-                high = v;
-                over = left;
-                under *= stays < 0 ? 0.5 : 1.0;
-                stays = -1;
-            }}
-            v = over > under ? low - under / (over - under) * (high - low) : x;
+            continue;
         }}
+        if (k == 1) {{
+            over = left;
+        }} else if (fabs(left) <= {SOLVED}) {{
+            break;
+        }} else if (left < 0.0) {{
+            low = v;
+            under = left;
+            over *= stays == 1 ? 0.5 : 1.0;
+            stays = 1;
+        }} else {{
+            high = v;
+            over = left;
+            under *= stays == -1 ? 0.5 : 1.0;
+            stays = -1;
+        }}
+        v = over > under ? low - (high - low) * (under / (over - under)) : x;
     }}
     x = v;
 {save}}}"""

@@ -1,0 +1,39 @@
+"""Gaps that a load closes first, undone; the plain twin is `smartshoe.models.effects.dead_band`."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from smartshoe.kernels.memory import SOLVED, STEPS, closer
+
+
+@njit(cache=True)
+def dead_band_undone(signal, lost, soft, onset, sets_in_over, begins, whole, late, most, out):  # type: ignore[no-untyped-def]
+    """out (n,) with out - lost m(out/lost) = ``signal`` (n,), m as in `DeadBand`; what is not above zero stays.
+
+    ``begins``, ``whole`` and ``late`` are m's constants, ``sets_in_over`` its onset or hardly any, ``most`` more than
+    is lost.
+    """
+    for k in range(signal.size):
+        y = signal[k]
+        if y <= 0.0:
+            out[k] = y
+            continue
+        f, low, high, under, over, stays = y, y, y + most, 0.0, 0.0, 0
+        for i in range(STEPS):  # first the ends
+            z = f / lost
+            x = (1.0 + onset - z) / soft
+            rounded = max(x, 0.0) + math.log1p(math.exp(-abs(x)))
+            left = f - y - lost / whole * (begins - soft * rounded + late * math.expm1(-z / sets_in_over))
+            if abs(left) <= SOLVED:
+                break
+            if i == 0:
+                under, f = left, high
+            elif i == 1:
+                over = left
+                f = low - (high - low) * (under / (over - under))
+            else:
+                f, low, high, under, over, stays = closer(f, left, low, high, under, over, stays)
+        out[k] = f
