@@ -31,6 +31,7 @@ from smartshoe.diagnosis._sensitivity import (
     marginal,
     nuisance_precision,
     nuisances,
+    where,
 )
 from smartshoe.diagnosis._session import Scale
 from smartshoe.models.core import USUAL_WALL_RATIO
@@ -573,3 +574,13 @@ def test_a_forces_error_is_that_of_the_compensated_reading() -> None:
     assert force_error(held, plain).fitted_n == pytest.approx(fitted_n, rel=1e-6)
     assert force_error([held[0], unjudged, held[1]], plain).held_out_n == pytest.approx(judged_n, rel=1e-6)
     assert math.isnan(force_error([unjudged], plain).held_out_n)
+
+
+def test_rows_of_cycles_of_scattered_samples_and_of_none_are_those_of_the_mask() -> None:
+    columns = np.asfortranarray(np.random.default_rng(3).standard_normal((600, 4)))
+    masks = [np.arange(600) // 200 != 1, np.arange(600) % 3 > 0, np.zeros(600, dtype=bool), np.arange(600) == 7]
+    for mask in masks:
+        found = where(mask, columns)
+        np.testing.assert_array_equal(found, columns[mask])
+        assert found.flags.f_contiguous
+    assert where(np.ones(600, dtype=bool), columns) is columns
