@@ -37,6 +37,7 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``low_rail``; masked: ties at the smallest reading under a rising load, where noise should untie them.
 
     Without noise beside the rail, one at zero and a dead band of the contact are the same: nothing is said then.
+    Masked also at rest: what is read there is no zero.
     """
     bottom = _rail(view, bad, 1.0)
     if bottom is None:
@@ -49,7 +50,7 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     on = tied & (view.load.values > view.curve[0][0] + view.thresholds.standing * view.load_span)
     yield Finding(
         "low_rail",
-        view.whole(on),
+        view.whole(tied),
         f"{int(on.sum())} readings are exactly {view.sign * bottom:.6g} {view.recording.sensor.unit.symbol} while the"
         " load is on: the sensor cannot go lower, and its zero is cut off",
         masks=True,

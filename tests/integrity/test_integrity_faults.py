@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from test_integrity_clean import simulated
 
+from smartshoe import diagnose
 from smartshoe.integrity import Integrity, examine
 from smartshoe.integrity._lines import aliases
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
@@ -209,6 +210,17 @@ def test_a_rail_below_which_the_sensor_does_not_go(protocol, seed, rail_mbar):
     assert kinds(found) == {"low_rail"}
     on = (reading < rail_mbar) & (recording.load.values > 20.0)
     assert recall_and_false(found, on, reading <= rail_mbar)[0] >= RECALL
+    assert not found.usable[0][reading <= rail_mbar].any()
+
+
+def test_of_a_unit_whose_sensor_ends_above_its_zero_no_zero_is_told() -> None:
+    """At rest it reads where the sensor ends: no offset is seen there, nor a curve that bends to it."""
+    recording = recorded(dynamic_protocol(), 3)
+    plain, cut = (
+        diagnose([with_reading(recording, np.maximum(recording.sensor.values, low))]) for low in (-10.0, 6.0)
+    )
+    assert [fault.kind for fault in cut.data_faults] == ["low_rail"]
+    assert (plain.verdict, plain.causes, cut.verdict, cut.causes) == ("adequate", (), "adequate", ())
 
 
 @settings(max_examples=12)
