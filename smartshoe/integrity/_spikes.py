@@ -119,7 +119,23 @@ def spikes(view: View, bad: Mask) -> Iterator[Finding]:
         # A peak between two samples looks like a spike of a part of the span; what is beyond all of it is none.
         beyond = on_load & (np.abs(view.load.outlying) > view.load_span)
         found_on_load = _finding(view, on_load, view.load, view.load_span, "reference load")
-        yield replace(found_on_load, no_load=view.whole(beyond))
+        yield replace(found_on_load, no_load=view.whole(beyond | _stands_alone(view.load, on_load)))
+
+
+def _stands_alone(signal: Signal, found: Mask) -> Mask:
+    """(m,) those ``found`` beside which the signal goes on as before, as it does not where it passes a peak.
+
+    Between two samples, of which either side would lead to it: they bend by a part (``same``) of it at least.
+    """
+    given, y = signal.thresholds, signal.values
+    out = np.zeros(found.size, dtype=bool)
+    for first, last in zip(*runs_of(found), strict=True):
+        before, after = y[max(first - given.few, 0) : first], y[last : last + given.few]
+        size = float(np.min(np.abs(signal.outlying[first:last])))
+        if min(before.size, after.size) == given.few:
+            bend = (after[-1] - after[0]) - (before[-1] - before[0])
+            out[first:last] = abs(float(bend)) < given.same * size
+    return out
 
 
 def _finding(view: View, at: Mask, signal: Signal, span: float, what: str) -> Finding:

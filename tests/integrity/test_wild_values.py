@@ -201,20 +201,40 @@ def test_recordings_come_back_in_their_order_and_sound_ones_as_they_were_given()
     assert [fault.recording for fault in found.faults if fault.kind == "spikes"] == [1]
 
 
-@pytest.mark.parametrize(("size_n", "is_none"), [(200.0, False), (3000.0, True)])
-def test_a_spike_beyond_its_span_is_missing_of_the_load_and_one_of_the_reading_is_left_out_of_fits(
-    size_n: float, is_none: bool
-) -> None:
-    """A peak between two samples is a spike of a part of the span, and was a load."""
+@pytest.mark.parametrize("size_n", [200.0, -150.0, 3000.0])
+def test_a_spike_is_missing_of_the_load_and_one_of_the_reading_is_left_out_of_fits(size_n: float) -> None:
     loaded = examine([_run(_with(LOAD_N, {1111: LOAD_N[1111] + size_n}))])
     assert [fault.kind for fault in loaded.faults] == ["spikes"]
     assert loaded.faults[0].says.startswith("the reference load has an isolated spike of ")
-    assert (_missing(loaded, "force"), _missing(loaded, "pressure")) == ([1111] if is_none else [], [])
+    assert (_missing(loaded, "force"), _missing(loaded, "pressure")) == ([1111], [])
     assert np.flatnonzero(~loaded.usable[0]).tolist() == [1111]
     read = examine([_run(mbar=_with(MBAR, {1111: MBAR[1111] + 0.1 * size_n}))])
     assert read.faults[0].says.startswith("the reading has an isolated spike of ")
     assert (_missing(read, "force"), _missing(read, "pressure")) == ([], [])
     assert np.flatnonzero(~read.usable[0]).tolist() == [1111]
+
+
+@pytest.mark.parametrize(("foot_n", "is_none"), [(10.0, True), (20.0, False), (100.0, False)])
+def test_a_spike_that_the_load_beside_it_bends_to_is_a_peak_between_two_samples(foot_n: float, is_none: bool) -> None:
+    """By a quarter of it on both sides together; what is left of it is missing in fits all the same."""
+    foot = foot_n * np.array([0.25, 0.5, 0.75, 1.0])
+    peak = LOAD_N[1106:1117] + np.concatenate([[0.0], foot, [100.0 + foot_n], foot[::-1], [0.0]])
+    found = examine([_run(_with(LOAD_N, dict(zip(range(1106, 1117), peak, strict=True))))])
+    assert _missing(found, "force") == ([1111] if is_none else [])
+    assert not found.usable[0][1111]
+
+
+def test_a_unit_whose_load_cell_has_spikes_is_as_good_as_it_was() -> None:
+    """Ten of a part of the span: simulated as loads they would make a lag, or a heat of the gas."""
+    run = simulated(dynamic_protocol((200.0, 800.0), repeats=3, rest_s=2.0), 3)
+    load_n, rng = run.load.values.copy(), np.random.default_rng(1)
+    at = rng.choice(load_n.size, 10, replace=False)
+    load_n[at] += rng.choice([-1.0, 1.0], at.size) * rng.uniform(100.0, 300.0, at.size)
+    plain, found = diagnose(run), diagnose(run.with_channel(replace(run.load, values=load_n)))
+    assert (plain.verdict, found.verdict, found.causes) == ("adequate", "adequate", ())
+    assert plain.baseline is not None
+    assert found.baseline is not None
+    assert found.baseline.rmse == pytest.approx(plain.baseline.rmse, rel=0.02)
 
 
 @pytest.mark.parametrize("value", [5000.0, 99999.0, -9999.0])
