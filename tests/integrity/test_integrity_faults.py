@@ -216,9 +216,7 @@ def test_a_rail_below_which_the_sensor_does_not_go(protocol, seed, rail_mbar):
 def test_of_a_unit_whose_sensor_ends_above_its_zero_no_zero_is_told() -> None:
     """At rest it reads where the sensor ends: no offset is seen there, nor a curve that bends to it."""
     recording = recorded(dynamic_protocol(), 3)
-    plain, cut = (
-        diagnose([with_reading(recording, np.maximum(recording.sensor.values, low))]) for low in (-10.0, 6.0)
-    )
+    plain, cut = (diagnose([with_reading(recording, np.maximum(recording.sensor.values, low))]) for low in (-10.0, 6.0))
     assert [fault.kind for fault in cut.data_faults] == ["low_rail"]
     assert (plain.verdict, plain.causes, cut.verdict, cut.causes) == ("adequate", (), "adequate", ())
 
