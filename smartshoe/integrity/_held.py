@@ -222,9 +222,10 @@ def _caught_up(view: View, starts: Index, stops: Index) -> Mask:
 def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
     """(runs,) runs beside noise over which the load goes through more than a share of its span: half of it, by `clear`.
 
-    They need not end: a channel that freezes stays so until the recording does, and catches up with nothing. A dead
-    band, a friction and a saturation stand still as well, but as a rail beyond which there is no reading, for less of
-    the load, or without noise.
+    Or through more than a quarter (`same`), where over no other run it goes through half as much. They need not end: a
+    channel that freezes stays so until the recording does, and catches up with nothing. A dead band, a friction and a
+    saturation stand still as well, but each time, for less of the load, or without noise; or at a rail, where the
+    curve stands still as well.
     """
     y, load, given = view.reading.values, view.load.values, view.thresholds
     out = np.zeros(starts.size, dtype=bool)
@@ -234,8 +235,16 @@ def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
     inside = (y[starts] > sound[given.few - 1]) & (y[starts] < sound[-given.few])
     span = float(np.ptp(load))
     beside = given.few * given.local
-    for i in np.flatnonzero(inside & (stops - starts > given.few)):
+    long = np.flatnonzero(stops - starts > given.few)
+    passed = np.array([float(np.ptp(load[a : b + 1])) for a, b in zip(starts[long], stops[long], strict=True)])
+    for at, i in enumerate(long):
         first, last = int(starts[i]), int(stops[i])
+        others = float(np.max(np.delete(passed, at), initial=0.0))
+        is_alone = passed[at] > max(given.same * span, given.clear * others)
+        if not (given.clear * passed[at] > span or is_alone):
+            continue
+        if not (inside[i] or given.clear * float(np.ptp(view.expected[first : last + 1])) > view.span):
+            continue
         near = max(y[max(first - beside, 0) : first + 1], y[last : last + beside + 1], key=len)
         if near.size <= given.local:
             continue
@@ -244,5 +253,5 @@ def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
         alternates = np.sum(product < 0.0) > np.sqrt(given.clear) * np.sum(product > 0.0)  # noise, not curvature
         least = toggling(given) * view.reading.local_step[first]
         if alternates and float(np.std(second)) / SECOND_DIFFERENCE > least:
-            out[i] = given.clear * float(np.ptp(load[first : last + 1])) > span
+            out[i] = True
     return out

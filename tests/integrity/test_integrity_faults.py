@@ -109,16 +109,20 @@ def test_held_samples(protocol, seed, noise_percent, length, share):
 @settings(max_examples=12)
 @given(SEEDS, NOISES_PERCENT, st.floats(0.55, 0.95), st.booleans())
 def test_a_channel_that_freezes_is_held_until_the_end_or_since_the_beginning(seed, noise_percent, share, is_end):
-    """It catches up with nothing, so that the load alone tells; at no rail, where a dead band stands still as well."""
+    """It catches up with nothing, so that the load alone tells, by more than a quarter of its span.
+
+    Near the top it may pass for saturation.
+    """
     recording = recorded(dynamic_protocol(), seed, noise_percent)
     reading = recording.sensor.values.copy()
     at = round((share if is_end else 1.0 - share) * reading.size)
     frozen = slice(at, None) if is_end else slice(None, at + 1)
-    assume(0.1 < (reading[at] - reading.min()) / np.ptp(reading) < 0.8)  # nearer the top it passes for saturation
-    assume(np.ptp(recording.load.values[frozen]) > 0.6 * np.ptp(recording.load.values))
+    assume((reading[at] - reading.min()) / np.ptp(reading) > 0.1)
+    assume(np.ptp(recording.load.values[frozen]) > 0.3 * np.ptp(recording.load.values))
+    is_near_top = (reading[at] - reading.min()) / np.ptp(reading) > 0.8
     reading[frozen] = reading[at]
     found = examine([with_reading(recording, reading)])
-    assert "held_samples" in kinds(found)
+    assert kinds(found) & {"held_samples", *(["saturation"] if is_near_top else [])}
     masked = np.zeros(reading.size, dtype=bool)
     masked[frozen] = True
     assert np.mean(found.usable[0][masked]) < FALSELY_MASKED
