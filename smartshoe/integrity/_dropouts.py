@@ -7,6 +7,7 @@ whatever load (a level that switches), or that falls and drifts back (a draught 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,31 +21,75 @@ from smartshoe.signals.masks import runs_of
 
 
 def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
-    """Kind ``dropouts``; masked.
+    """Kind ``dropouts``; masked. To nothing or to rest, and to the upper end, where a wire that breaks reads as well.
 
     A value that another recording of the unit dropped to (``view.dropped_to``) needs no fall from a large load here.
     """
     if view.span == 0.0:
         return
+    known = view.sign * view.dropped_to
+    is_upper = known > float(view.curve[1].max())
     at = dropped(view)
     if at.any() and not _one_level(view, at):
         at[:] = False
-    known = np.union1d(view.sign * view.dropped_to, common_values(view.reading.values[at], view.thresholds))
-    while (more := _also_gone(view, at, known) & ~at).any():  # with those known cut out the noise is known better
-        at |= more
-    if not at.any():
+    at, values = _with_others(view, at, known[~is_upper])
+    if at.any():
+        yield _finding(view, at, values)
+    over = view.upside_down()
+    up = dropped(over)
+    # A pressure may jump and come back; a rail is one value.
+    if up.any() and not (_one_value(over.reading.values[up], view.thresholds) and _one_level(over, up)):
+        up[:] = False
+    up, values = _with_others(over, up, -known[is_upper])
+    if (up & ~at).any():
+        yield _finding(over, up & ~at, values)
+
+
+def load_dropouts(view: View, bad: Mask) -> Iterator[Finding]:
+    """Kind ``dropouts``; masked: the load falls to nothing and comes back while the reading stands."""
+    if view.span == 0.0 or view.load_span == 0.0:
         return
+    swapped = view.swapped()
+    at, y = dropped(swapped), view.reading.values
+    still = 2.0 * view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
+    for first, stop in zip(*runs_of(at), strict=True):
+        comes_back = stop < y.size and bool(swapped.jump[stop - 1] > 0.0)
+        # A reading that lags is on its way down by then.
+        at[first:stop] = comes_back and float(y[first - 1] - np.min(y[first : stop + 1])) < still
+    if not at.any() or not _one_level(swapped, at):
+        return
+    yield replace(_finding(swapped, at, np.zeros(0)), no_load=view.whole(at))
+
+
+def _with_others(view: View, at: Mask, known: Array) -> tuple[Mask, Array]:
+    """Samples ``at`` which the reading is gone, with others at their values or at ``known`` ones, and these values."""
+    known = np.union1d(known, common_values(view.reading.values[at], view.thresholds))
+    while (more := _also_gone(view, at, known) & ~at).any():  # with those known cut out the noise is known better
+        at = at | more
+    return at, known
+
+
+def _finding(view: View, at: Mask, known: Array) -> Finding:
     starts, stops = runs_of(at)
-    yield Finding(
+    what, unit, others = "reading", view.recording.sensor.unit.symbol, "load stays"
+    if view.is_swapped:
+        what, unit, others = "reference load", "N", "reading stays"
+    return Finding(
         "dropouts",
         view.whole(at),
-        f"the reading drops out {'once, for' if starts.size == 1 else f'{starts.size} times, for up to'}"
+        f"the {what} drops out {'once, for' if starts.size == 1 else f'{starts.size} times, for up to'}"
         f" {float(np.max(view.time_s[stops - 1] - view.time_s[starts])) + view.step_s:.3g} s,"
         f" to about {float(np.median(view.sign * view.reading.values[at])):.4g}"
-        f" {view.recording.sensor.unit.symbol}, while the load stays: {int(at.sum())} samples are left out",
+        f" {unit}, while the {others}: {int(at.sum())} samples are left out",
         masks=True,
         values=view.sign * known,
     )
+
+
+def _one_value(values: Array, thresholds: Thresholds) -> bool:
+    """Whether nearly all of ``values`` are one."""
+    count = np.unique(values, return_counts=True)[1]
+    return bool(count.max() > (1.0 - thresholds.same) * values.size)
 
 
 def dropped(view: View) -> Mask:

@@ -11,7 +11,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.display import first_names
 from smartshoe.errors import InputError
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
-from smartshoe.integrity._dropouts import dropouts
+from smartshoe.integrity._dropouts import dropouts, load_dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
 from smartshoe.integrity._held import held_samples
@@ -40,6 +40,7 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     two_clocks,
     wrong_sign,
     dropouts,
+    load_dropouts,
     low_rail,
     held_samples,
     spikes,

@@ -17,7 +17,9 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
     top = _rail(view, bad, -1.0)
     if top is None:
         return
-    tied = (view.reading.values == top) & ~bad
+    tied = _without_leaps(view, (view.reading.values == top) & ~bad)
+    if not tied.any():
+        return
     least = _least_hidden(view, tied)
     hidden = _hidden(view, tied, top, -1.0)
     stands = _noise_stands_still(view, tied, top, -1.0)
@@ -55,6 +57,21 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
         " load is on: the sensor cannot go lower, and its zero is cut off",
         masks=True,
     )
+
+
+def _without_leaps(view: View, tied: Mask) -> Mask:
+    """(m,) those ``tied`` at the largest reading to which it did not leap, and back, from what the load makes it.
+
+    A reading that does drops out to its end.
+    """
+    out = tied.copy()
+    clear = view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
+    for first, stop in zip(*runs_of(tied), strict=True):
+        if first == 0 or stop == tied.size or not view.jump[first - 1] > 0.0 > view.jump[stop - 1]:
+            continue
+        beyond = view.reading.values[first] - float(np.median(view.expected[first:stop]))
+        out[first:stop] = beyond < clear
+    return out
 
 
 def _least_hidden(view: View, tied: Mask) -> float:

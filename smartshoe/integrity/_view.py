@@ -115,7 +115,8 @@ class View:
 
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
-    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out.
+    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out. ``is_swapped``: load and
+    reading have changed places.
     """
 
     recording: Recording
@@ -128,6 +129,7 @@ class View:
     offset_s: float = 0.0
     rate: float = 0.0
     dropped_to: Array = field(default_factory=lambda: np.zeros(0))
+    is_swapped: bool = False
 
     @cached_property
     def step_s(self) -> float:
@@ -300,6 +302,15 @@ class View:
     def turned(self) -> View:
         """The same with the reading turned over."""
         return replace(self, reading=Signal(-self.reading.values, self.thresholds), sign=-self.sign)
+
+    def upside_down(self) -> View:
+        """The same with load and reading turned over: the loaded end is the unloaded one."""
+        load, reading = (Signal(-one.values, self.thresholds) for one in (self.load, self.reading))
+        return replace(self, load=load, reading=reading, sign=-self.sign)
+
+    def swapped(self) -> View:
+        """The reading for the load and the load for the reading; no value that this dropped to is known."""
+        return replace(self, load=self.reading, reading=self.load, sign=1, dropped_to=np.zeros(0), is_swapped=True)
 
     def whole(self, at: Mask) -> Mask:
         """A mask (m,) over this view as one over all of the recording's samples."""

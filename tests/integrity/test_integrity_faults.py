@@ -16,6 +16,7 @@ from smartshoe.integrity import Integrity, examine
 from smartshoe.integrity._lines import aliases
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import Channel, Recording
+from smartshoe.signals.lags import lagged
 
 Array = NDArray[np.float64]
 
@@ -160,6 +161,73 @@ def test_dropouts(protocol, seed, noise_percent, length, share, level):
     # Falls from low loads alone may be a logger that held its rest, or a rail: masked all the same.
     falls_from_high = float((clean[starts] - rest).max()) > 0.4 * float(np.ptp(clean))
     assert kinds(found) & ({"dropouts"} if falls_from_high else {"dropouts", "held_samples", "low_rail"})
+
+
+@settings(max_examples=12)
+@given(PROTOCOLS, SEEDS, NOISES_PERCENT, st.sampled_from([1.05, 1.3, 3.0]), st.integers(3, 40))
+def test_a_reading_that_drops_out_to_its_upper_end(protocol, seed, noise_percent, times, length):
+    """As that of a wire that breaks, which an input pulls up."""
+    rng = np.random.default_rng(seed)
+    recording = recorded(protocol, seed, noise_percent)
+    clean = recording.sensor.values
+    reading, bad = clean.copy(), np.zeros(clean.size, dtype=bool)
+    for start in rng.integers(1, reading.size - length - 1, 6):
+        bad[start : start + length] = True
+    reading[bad] = times * float(np.ptp(clean)) + float(clean.min())
+    found = examine([with_reading(recording, reading)])
+    assert kinds(found) == {"dropouts"}
+    assert recall_and_false(found, bad & (clean < 0.7 * clean.max()), bad) == (1.0, 0.0)
+    assert recall_and_false(found, bad, bad)[0] >= RECALL
+
+
+def test_pulses_of_pressure_are_no_dropouts_to_an_end() -> None:
+    recording = recorded(dynamic_protocol(), 5)
+    reading, rng = recording.sensor.values.copy(), np.random.default_rng(5)
+    for start in rng.integers(1, reading.size - 21, 6):
+        reading[start : start + 20] = 120.0 + 0.5 * rng.standard_normal(20)
+    assert "dropouts" not in kinds(examine([with_reading(recording, reading)]))
+
+
+def test_of_several_recordings_each_dropout_to_an_end_is_said_once() -> None:
+    recording, rng = recorded(dynamic_protocol(), 6), np.random.default_rng(6)
+    both = []
+    for _ in range(2):
+        reading = recording.sensor.values.copy()
+        for start in rng.integers(1, reading.size - 21, 6):
+            reading[start : start + 20] = 110.0
+        both.append(with_reading(recording, reading))
+    found = examine(both)
+    assert [(fault.kind, fault.recording) for fault in found.faults] == [("dropouts", 0), ("dropouts", 1)]
+    assert all("to about 110 mbar" in fault.says for fault in found.faults)
+
+
+@settings(max_examples=12)
+@given(PROTOCOLS, SEEDS, NOISES_PERCENT, st.integers(3, 40))
+def test_a_load_that_drops_out_is_missing(protocol, seed, noise_percent, length):
+    rng = np.random.default_rng(seed)
+    recording = recorded(protocol, seed, noise_percent)
+    load_n, bad = recording.load.values.copy(), np.zeros(len(recording), dtype=bool)
+    loaded = np.flatnonzero(np.convolve(load_n < 60.0, np.ones(100), "same") == 0.0)
+    for start in rng.choice(loaded, 6):
+        bad[start : start + length] |= load_n[start : start + length] > 60.0
+    load_n[bad] = 0.0
+    found = examine([recording.with_channel(replace(recording.load, values=load_n))])
+    assert kinds(found) == {"dropouts"}
+    assert found.faults[0].says.startswith("the reference load drops out")
+    gone = ~found.recordings[0].load.present
+    assert np.array_equal(gone, ~found.usable[0])
+    # Where the reading falls meanwhile the unit may have been unloaded.
+    assert (gone[bad].mean() > 0.6, gone[~bad].any()) == (True, False)
+
+
+@pytest.mark.parametrize("lag_s", [0.5, 1.5, 3.0])
+def test_a_load_that_leaves_a_slow_unit_for_a_while_has_not_dropped_out(lag_s: float) -> None:
+    """Its reading is on its way down until the load is back."""
+    time_s = np.arange(0.0, 60.0, 0.01)
+    load_n = np.where(time_s % 3.0 < 2.5, 500.0, 0.0) * (time_s > 2.0)
+    reading = 0.1 * lagged(load_n, 0.01, lag_s) + 0.1 * np.random.default_rng(1).standard_normal(time_s.size)
+    found = examine([Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading)])
+    assert "dropouts" not in kinds(found)
 
 
 @settings(max_examples=8)
