@@ -79,19 +79,22 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
     examined = [_examined(one, decided) for one in tamed]
-    dropped_to = np.unique(np.concatenate([one.values for findings, _, _ in examined for one in findings] or [NONE]))
-    if dropped_to.size and len(recordings) > 1:
+    told = [finding for findings, _, _ in examined for finding in findings]
+    dropped_to = np.unique(np.concatenate([one.values for one in told] or [NONE]))
+    rails = np.unique([one.rail for one in told if one.rail is not None])
+    if dropped_to.size + rails.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
-        examined = [_examined(one, decided, dropped_to) for one in tamed]
+        examined = [_examined(one, decided, dropped_to, rails) for one in tamed]
     kept: list[Recording] = []
     for number, (tame, (findings, mask, clock)) in enumerate(zip(tamed, examined, strict=True)):
         recording = tame.recording
         kept.append(_with_known_load(recording, findings))
         faults += [_fault(number, recording, finding) for finding in findings]
         refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
-        if not refused and decided.clear * mask.mean() < 1.0:
+        faulty = _at_fault(findings, mask.size)
+        if not refused and (decided.clear * (1.0 - faulty.mean()) < 1.0 or not mask.any()):
             refused = [
-                f"{recording.label}: {100 * (1 - float(mask.mean())):.0f} % of the samples are faulty"
+                f"{recording.label}: {100 * float(faulty.mean()):.0f} % of the samples are faulty"
                 f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
             ]
         usable.append(np.zeros_like(mask) if refused else mask)
@@ -100,6 +103,12 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     offset_s, rate, lags = zip(*clocks, strict=True)
     shared = one_clock([one for one, mask in zip(lags, usable, strict=True) if mask.any()], decided)
     return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
+
+
+def _at_fault(findings: Sequence[Finding], size: int) -> Mask:
+    """(n,) samples of a recording of ``size`` that a fault masks."""
+    masks = [finding.at for finding in findings if finding.masks]
+    return np.any(masks, axis=0) if masks else np.zeros(size, dtype=bool)
 
 
 def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
@@ -117,8 +126,10 @@ def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recor
     return with_missing(recording, recording.load, np.any(none, axis=0)) if none else recording
 
 
-def _examined(tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE) -> tuple[list[Finding], Mask, Clock]:
-    """The findings of one recording, its usable samples, its clock; ``dropped_to`` as in `View`."""
+def _examined(
+    tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE, rails: Array = NONE
+) -> tuple[list[Finding], Mask, Clock]:
+    """The findings of one recording, its usable samples, its clock; ``dropped_to`` and ``rails`` as in `View`."""
     recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
@@ -133,7 +144,7 @@ def _examined(tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE) ->
     if lacking is not None:
         findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
     else:
-        view = _view(tame.recording, thresholds, dropped_to)
+        view = _view(tame.recording, thresholds, dropped_to, rails)
         if view is None:
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
@@ -146,6 +157,8 @@ def _examined(tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE) ->
             findings.append(finding)
             if finding.masks:
                 usable &= ~finding.at
+            if finding.cut_off is not None:
+                usable &= ~finding.cut_off
         if any(finding.severity == "fatal" for finding in findings):
             break
     return findings, usable, (view.offset_s, view.rate, seen)
@@ -168,7 +181,7 @@ def _lacking(recording: Recording) -> str | None:
     return None if readings else f"there is no reading: name its column with --sensor{among}"
 
 
-def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> View | None:
+def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array, rails: Array = NONE) -> View | None:
     """The recording where load and reading are both present, the reading rising with load; None where hardly ever."""
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
@@ -176,7 +189,8 @@ def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array) -> Vi
         return None
     time_s, load_n, reading = recording.time_s[index], load.si[index], sensor.values[index]
     force = Signal(load_n, thresholds)
-    view = View(recording, index, time_s, force, Signal(reading, thresholds), 1, thresholds, dropped_to=dropped_to)
+    read = Signal(reading, thresholds)
+    view = View(recording, index, time_s, force, read, 1, thresholds, dropped_to=dropped_to, rails=rails)
     at, middle = view.curve
     falls = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
     return view.turned() if falls else view

@@ -48,7 +48,9 @@ class Finding:
 
     Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
     ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded; ``error`` that of
-    `DataFault`. ``no_load`` (n,) marks samples of the load that are none.
+    `DataFault`. ``no_load`` (n,) marks samples of the load that are none. ``cut_off`` (n,) marks others than ``at``
+    that no fit may use either, and that are as they must be: at rest beyond the end of the sensor. ``rail`` is the
+    value, as recorded, at which the sensor ends.
     """
 
     kind: str
@@ -60,6 +62,8 @@ class Finding:
     values: Array = field(default_factory=lambda: np.zeros(0))
     error: float = 0.0
     no_load: Mask | None = None
+    cut_off: Mask | None = None
+    rail: float | None = None
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
     least = _least_hidden(view, tied)
     hidden = _hidden(view, tied, top, -1.0)
     stands = _noise_stands_still(view, tied, top, -1.0)
-    if hidden <= least and not stands:
+    if hidden <= least and not stands and not _is_known(view, top):
         return
     cut = f", and about {100 * hidden / view.span:.2g} % of the span is cut off" if hidden > least else ""
     yield Finding(
@@ -32,6 +32,7 @@ def saturation(view: View, bad: Mask) -> Iterator[Finding]:
         f"{int(tied.sum())} readings ({100 * float(tied.mean()):.2g} %) are exactly {view.sign * top:.6g}"
         f" {view.recording.sensor.unit.symbol} at the loaded end: the sensor or its converter saturates there{cut}",
         masks=True,
+        rail=view.sign * top,
     )
 
 
@@ -39,24 +40,30 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``low_rail``; masked: ties at the smallest reading under a rising load, where noise should untie them.
 
     Without noise beside the rail, one at zero and a dead band of the contact are the same: nothing is said then.
-    Masked also at rest: what is read there is no zero.
+    Left out at rest as well, where it is no fault: what is read there is no zero.
     """
     bottom = _rail(view, bad, 1.0)
     if bottom is None:
         return
     tied = (view.reading.values == bottom) & ~bad
-    if not _noise_stands_still(view, tied, bottom, 1.0) or _hidden(view, tied, bottom, 1.0) <= _least_hidden(
-        view, tied
-    ):
+    hidden, least = _hidden(view, tied, bottom, 1.0), _least_hidden(view, tied)
+    if not _is_known(view, bottom) and (hidden <= least or not _noise_stands_still(view, tied, bottom, 1.0)):
         return
     on = tied & (view.load.values > view.curve[0][0] + view.thresholds.standing * view.load_span)
     yield Finding(
         "low_rail",
-        view.whole(tied),
+        view.whole(on),
         f"{int(on.sum())} readings are exactly {view.sign * bottom:.6g} {view.recording.sensor.unit.symbol} while the"
         " load is on: the sensor cannot go lower, and its zero is cut off",
         masks=True,
+        cut_off=view.whole(tied & ~on),
+        rail=view.sign * bottom,
     )
+
+
+def _is_known(view: View, rail: float) -> bool:
+    """Whether another recording of the unit shows that its sensor ends there."""
+    return bool(np.isin(view.sign * rail, view.rails))
 
 
 def _without_leaps(view: View, tied: Mask) -> Mask:

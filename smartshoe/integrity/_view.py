@@ -115,7 +115,8 @@ class View:
 
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
-    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out. ``is_swapped``: load and
+    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out, ``rails`` (r,) those at
+    which its sensor is known to end. ``is_swapped``: load and
     reading have changed places.
     """
 
@@ -129,6 +130,7 @@ class View:
     offset_s: float = 0.0
     rate: float = 0.0
     dropped_to: Array = field(default_factory=lambda: np.zeros(0))
+    rails: Array = field(default_factory=lambda: np.zeros(0))
     is_swapped: bool = False
 
     @cached_property

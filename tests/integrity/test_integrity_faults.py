@@ -163,6 +163,30 @@ def test_dropouts(protocol, seed, noise_percent, length, share, level):
     assert kinds(found) & ({"dropouts"} if falls_from_high else {"dropouts", "held_samples", "low_rail"})
 
 
+def test_where_a_sensor_ends_in_one_recording_it_ends_in_the_others() -> None:
+    """Also in one that rests there for most of its time, which is of use all the same."""
+    one = recorded(dynamic_protocol(), 3)
+    longer = np.full(2 * len(one), 6.0)
+    rested = Recording.from_arrays(
+        time_s=one.sample_time_s * np.arange(len(one) + longer.size),
+        force_n=np.concatenate([one.load.values, 0.0 * longer]),
+        pressure_mbar=np.concatenate([np.maximum(one.sensor.values, 6.0), longer]),
+    )
+    assert "low_rail" not in kinds(examine([rested]))
+    found = examine([with_reading(one, np.maximum(one.sensor.values, 6.0)), rested])
+    assert [(fault.kind, fault.recording) for fault in found.faults] == [("low_rail", 0), ("low_rail", 1)]
+    assert found.refusals == ()
+    assert np.array_equal(found.usable[1], rested.sensor.values > 6.0)
+    assert 3 * found.usable[1].sum() < len(rested)
+    high, cut = recorded(dynamic_protocol(), 4), recorded(dynamic_protocol((200.0, 760.0)), 5)
+    top = 0.94 * float(high.sensor.values.max())
+    both = [with_reading(run, np.minimum(run.sensor.values, top)) for run in (high, cut)]
+    found = examine(both)
+    assert {(fault.kind, fault.recording) for fault in found.faults} >= {("saturation", 0)}
+    for mask, run in zip(found.usable, both, strict=True):
+        assert not mask[run.sensor.values == top].any()
+
+
 @settings(max_examples=12)
 @given(PROTOCOLS, SEEDS, NOISES_PERCENT, st.sampled_from([1.05, 1.3, 3.0]), st.integers(3, 40))
 def test_a_reading_that_drops_out_to_its_upper_end(protocol, seed, noise_percent, times, length):
