@@ -21,20 +21,20 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
     reading, load = view.reading, view.load
     if float(np.ptp(reading.values)) == 0.0:
         says = "the reading is constant: is the unit connected, and is this its column?"
-    elif view.load_span <= 2.0 * load.largest * load.quiet_noise:
-        says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
     else:
-        share, moves_with = _followed_share(view)
+        share, moves_with = _followed_share(view) if view.load_span > 0.0 else (0.0, 0.0)
         # A walk at random may explain half of the variance, but does not move along.
         follows = view.thresholds.follows
         if view.thresholds.clear * (1.0 - share) <= view.thresholds.same or (share >= follows and moves_with > 0.0):
-            return
+            return  # of a few samples a ramp, a load looks like noise: what is followed is none
         memory_s = view.thresholds.memory_s
         says = (
             f"the reading does not follow the load: load explains {100 * max(share, 0.0):.0f} % of its variance, a"
             f" curve and relaxations of {min(memory_s):g} to {max(memory_s):g} s allowed; is this the unit that was"
             " pressed?"
         )
+        if view.load_span <= 2.0 * load.largest * load.quiet_noise:
+            says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
     yield Finding("does_not_follow_load", whole, says, "fatal", True, says)
 
 

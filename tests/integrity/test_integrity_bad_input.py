@@ -52,6 +52,21 @@ def test_a_pressure_that_falls_under_a_positive_load_is_no_negative_load() -> No
     assert "the pressure falls as the load rises" in found.faults[0].says
 
 
+@pytest.mark.parametrize("period_s", [0.55, 0.7, 0.9])
+def test_a_load_of_a_few_samples_a_ramp_that_is_followed_is_no_noise(period_s: float) -> None:
+    """As one that was logged at 10 Hz: from each sample to the next it goes anywhere."""
+    time_s = np.arange(0.0, 90.0, 0.1)
+    load_n = 300.0 + 400.0 * (1.0 - np.abs(2.0 * (time_s / period_s % 1.0) - 1.0))
+    noise, other = np.random.default_rng(1).standard_normal((2, time_s.size))
+    followed, not_followed = (
+        examine([Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=mbar)])
+        for mbar in (0.1 * load_n + 0.05 * noise, 60.0 + 10.0 * other)
+    )
+    assert followed.faults == ()
+    assert [fault.kind for fault in not_followed.faults] == ["does_not_follow_load"]
+    assert "no more than its noise" in not_followed.refusals[0]
+
+
 @pytest.mark.parametrize(("load", "reading"), [(1.0, 0.0), (0.0, 1.0)], ids=["reading", "load"])
 def test_a_channel_that_is_constant_is_refused(load: float, reading: float) -> None:
     found = examine([_recording(force_n=40.0 + load * LOAD_N, pressure_mbar=3.0 + reading * READING)])
