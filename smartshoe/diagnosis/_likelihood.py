@@ -14,7 +14,7 @@ from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged, where
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.extended import ExtendedModel, Passage
+from smartshoe.models.extended import ExtendedModel, Trace
 
 # Resolutions of a fit: half and twice of each changed no name in two cases.
 MOST_STEPS = 25
@@ -24,7 +24,7 @@ KNOWN_TO = 0.01  # of what a fit costs more than one that it is compared with: l
 LOG_RANGE = 30.0  # ratio of bounds from which a parameter of shape is stepped in its logarithm
 
 
-def rows_of(model: ExtendedModel, session: Session, trace: Passage | None = None) -> Array:
+def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) -> Array:
     """(n, 1 + p): what a model leaves of a session, and the slopes of its reading over `theta`."""
     reading, slopes = model.sensitivities(session.conditions, trace)
     rows = np.empty((reading.size, 1 + slopes.shape[1]), order="F")
@@ -41,7 +41,7 @@ class Likelihood:
     ) -> None:
         self.sessions = tuple(session for session in sessions if session.fitted.any())
         self.noise_sd = noise_sd
-        self._last: tuple[ExtendedModel, list[Passage]] | None = None
+        self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._rows: list[Array] = []  # `rows_of` where they were last asked for, with room for one column more
         self._scales = np.zeros(0)
         self._precision = [nuisance_precision(session, like, thresholds) for session in self.sessions]
@@ -72,7 +72,7 @@ class Likelihood:
         with np.errstate(over="ignore", invalid="ignore"):  # a leak beside an arm that pushes grows without bounds
             traces = [model.trace(session.conditions) for session in self.sessions]
             self._last = model, traces  # the slopes of a step that is taken begin with them
-            left = [session.reading - one.reading for session, one in zip(self.sessions, traces, strict=True)]
+            left = [session.reading - reading for session, (reading, _) in zip(self.sessions, traces, strict=True)]
             self._about(model, left)
             for k, rest in enumerate(left):
                 total += float(self._gram(k, rest[:, None])[0, 0])
@@ -81,7 +81,7 @@ class Likelihood:
     def normal(self, model: ExtendedModel, rows: Sequence[Array] | None = None) -> tuple[float, Array, Array]:
         """Cost, its half gradient's negative J'r (p,) and normal matrix J'J (p, p); ``rows`` where they are known."""
         if rows is None:
-            known: Sequence[Passage | None] = self._known(model) or [None] * len(self.sessions)
+            known: Sequence[Trace | None] = self._known(model) or [None] * len(self.sessions)
             rows = [rows_of(model, *one) for one in zip(self.sessions, known, strict=True)]
         self._rows = [np.empty((one.shape[0], one.shape[1] + 1), order="F") for one in rows]
         for own, one in zip(self._rows, rows, strict=True):
@@ -96,15 +96,15 @@ class Likelihood:
         known = self._known(model)
         assert known is not None
         weighed = self._scales * step  # each parameter in units of what it does
-        for rows, session, trace in zip(self._rows, self.sessions, known, strict=True):
-            left = session.reading - trace.reading
+        for rows, session, (reading, _) in zip(self._rows, self.sessions, known, strict=True):
+            left = session.reading - reading
             missed = rows[:, 0] - left - rows[:, 1:-1] @ step
             for k, share in enumerate(weighed / max(float(weighed @ step), 1e-300), start=1):
                 rows[:, k] += share * missed
             rows[:, 0] = left
         return self._products(model)
 
-    def _known(self, model: ExtendedModel) -> list[Passage] | None:
+    def _known(self, model: ExtendedModel) -> list[Trace] | None:
         return self._last[1] if self._last is not None and self._last[0] is model else None
 
     def _products(self, model: ExtendedModel) -> tuple[float, Array, Array]:

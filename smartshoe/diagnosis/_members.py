@@ -208,4 +208,4 @@ def _with_own(model: ExtendedModel, name: str, session: Session, slopes: Array) 
     """`rows_of` a model whose last effect is ``name``: the ``slopes`` of all else are as they are without it."""
     trace = model.trace(session.conditions)
     own = model.own_sensitivities(name, session.conditions, trace)
-    return np.column_stack([session.reading - trace.reading, slopes, own])
+    return np.column_stack([session.reading - trace[0], slopes, own])

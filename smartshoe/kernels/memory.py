@@ -441,26 +441,6 @@ def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def orifice_along(moved, pressure, step_rate, laminar, d_rate, d_laminar, out):  # type: ignore[no-untyped-def]
-    """out (n,): by how much what is left, ``pressure`` (n,), of `orifice` moves with what comes in, by ``moved`` (n,).
-
-    And with ``step_rate`` and ``laminar``, by the d_.
-    """
-    half, d_half = 0.5 * step_rate, 0.5 * d_rate
-    d_lost = d_flow = 0.0
-    for k in range(pressure.size):
-        p = pressure[k]
-        square = 1.0 / math.sqrt(p * p + laminar * laminar)
-        flow = p * math.sqrt(square)
-        slope = half * math.sqrt(square) * (1.0 - 0.5 * p * p * square * square)
-        own = d_half * flow - d_laminar * half * 0.5 * flow * laminar * square * square
-        d_p = (moved[k] - d_lost - d_flow - own) / (1.0 + slope)
-        d_flow = slope * d_p + own
-        d_lost = moved[k] - d_p
-        out[k] = d_p
-
-
-@njit(cache=True)
 def rise(largest, raised, width):  # type: ignore[no-untyped-def]
     """u/phi of a first loading, 1 + raised tanh(M^2/width), M the ``largest`` load so far."""
     return 1.0 + raised * tanh(largest * largest / width) if raised > 0.0 else 1.0

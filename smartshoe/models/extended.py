@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from smartshoe.arrays import Array
 from smartshoe.models.core import USUAL_WALL_RATIO, Core, network
 from smartshoe.models.effects.catalogue import effect
-from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter, Nearby
+from smartshoe.models.effects.effect import PLACES, Conditions, CoreEffect, Effect, EffectParameter
 from smartshoe.models.elements import Arm, Element
 
 BASELINE = (
@@ -22,9 +22,6 @@ BASELINE = (
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
-RUNS_OFF = (
-    1e3  # full scales: beside an arm that pushes derivatives may grow without end, where what they are of does not
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,28 +133,33 @@ class ExtendedModel:
 
         return (*sorted(before, key=order), None, *sorted(after, key=order))
 
-    def _run(self, conditions: Conditions, inputs: list[Array] | None = None) -> Array:
-        """The reading's share (n,); ``inputs`` gathers what goes into each block."""
-        signal = conditions.load
-        for part in self.chain:
+    def _run(
+        self,
+        signal: Array,
+        conditions: Conditions,
+        first: int = 0,
+        inputs: list[Array] | None = None,
+        core: Core | None = None,
+    ) -> Array:
+        """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
+        for part in self.chain[first:]:
             if inputs is not None:
                 inputs.append(signal)
             if part is None:
-                signal = self.core.simulate(signal, conditions.step_s)
+                signal = (core or self.core).simulate(signal, conditions.step_s)
             else:
-                signal = part.effect.apply(signal, self._around(part, conditions), part.values)
+                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
+                signal = part.effect.apply(signal, given, part.values)
         return self.gain * signal
 
-    def _around(self, part: Part, conditions: Conditions) -> Conditions:
-        """``conditions``, with the relaxing arm for a block that bends a spring beside it: it solves both's balance."""
-        if not part.effect.bends_beside_arm:
-            return conditions
+    def _around(self, conditions: Conditions) -> Conditions:
+        """``conditions`` with the relaxing arm: blocks that bend a spring beside it solve the balance of both."""
         relaxing = self.relaxing_share, self.relaxation_rate_per_s
         return conditions if conditions.relaxing == relaxing else conditions.within(*relaxing)
 
     def simulate(self, conditions: Conditions) -> Array:
         """The reading (n,) as a share of ``full_scale_reading`` under ``conditions``."""
-        return self._run(conditions)
+        return self._run(conditions.load, conditions)
 
     def reading(self, conditions: Conditions) -> Array:
         """The reading (n,) in ``reading_unit``."""
@@ -183,28 +185,28 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, self.core if alike else None))
         return tuple(made)
 
-    def sensitivities(self, conditions: Conditions, trace: Passage | None = None) -> tuple[Array, Array]:
+    def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
         The chain is run anew only from the first block that a parameter moves.
         ``trace``: this model's own under the same conditions, where it is known.
         """
         trace = trace or self.trace(conditions)
-        out = np.empty((trace.reading.size, 1 + len(self._varied)), order="F")
-        out[:, 0] = trace.reading / self.gain
+        out = np.empty((trace[0].size, 1 + len(self._varied)), order="F")
+        out[:, 0] = trace[0] / self.gain
         out[:, 1:] = self.column_of(self._varied, conditions, trace)
-        return trace.reading, out
+        return trace[0], out
 
-    def own_sensitivities(self, name: str, conditions: Conditions, trace: Passage) -> Array:
+    def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
         """Of these derivatives those (n, k) with respect to the parameters of the effect ``name``."""
         own = [by for by, (owner, _) in zip(self._varied, self.parameters[1:], strict=True) if owner == name]
         return self.column_of(own, conditions, trace)
 
-    def trace(self, conditions: Conditions) -> Passage:
+    def trace(self, conditions: Conditions) -> Trace:
         """The reading (n,), and what goes into each block of the chain, the chain's end last."""
         inputs: list[Array] = []
-        reading = self._run(conditions, inputs)
-        return Passage(reading, (*inputs, reading / self.gain))
+        reading = self._run(conditions.load, conditions, 0, inputs)
+        return reading, [*inputs, reading / self.gain]
 
     def extended_by(self, added: Effect, start: Array) -> Extensions:
         """A small step of each strength of an effect that is not in it yet; ``start``: null strengths and a shape."""
@@ -221,37 +223,13 @@ class ExtendedModel:
             made.append(Extension(step, trial, first, None if in_core else self.core))
         return tuple(made)
 
-    def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Passage) -> Array:
+    def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
         """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
-        out = np.empty((trace.reading.size, len(by)), order="F")
+        reading, inputs = trace
+        out = np.empty((reading.size, len(by)), order="F")
         for column, one in enumerate(by):
-            out[:, column] = self._slope(one, conditions, trace)
+            out[:, column] = one.slope(reading, inputs, conditions)
         return out
-
-    def _slope(self, by: Extension, conditions: Conditions, trace: Passage) -> Array:
-        """The reading's derivative (n,) with respect to what ``by`` moves; blocks that can answer by their own."""
-        moved, signal = by.model, trace.inputs[by.first]
-        added = len(moved.chain) - len(self.chain)  # the first block, or none
-        for place, part in enumerate(moved.chain[by.first :], by.first):
-            if part is None:
-                signal = (by.core or moved.core).simulate(signal, conditions.step_s)
-                continue
-            given = moved._around(part, conditions)
-            known = None if added and place == by.first else self._nearby(place - added, conditions, trace)
-            out = None if known is None else known(signal, given, part.values)
-            if out is None or not out @ out <= RUNS_OFF**2 * out.size:
-                out = part.effect.apply(signal, given, part.values)
-            signal = out
-        return np.asarray((moved.gain * signal - trace.reading) / by.step)
-
-    def _nearby(self, place: int, conditions: Conditions, trace: Passage) -> Nearby | None:
-        """How the block at a place of the chain answers close to its ``trace``."""
-        if place not in trace.nearby:
-            part = self.chain[place]
-            assert part is not None
-            signal, out = trace.inputs[place : place + 2]
-            trace.nearby[place] = part.effect.nearby(signal, out, self._around(part, conditions), part.values)
-        return trace.nearby[place]
 
     # -- to and from a file ---------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
@@ -305,17 +283,11 @@ class Extension:
     first: int
     core: Core | None
 
-
-@dataclass(frozen=True, eq=False)
-class Passage:
-    """A model's ``reading`` (n,) and its ``inputs``, what goes into each block of its chain, the chain's end last.
-
-    ``nearby``: how blocks answer close to that, by their places, as far as it was asked for.
-    """
-
-    reading: Array
-    inputs: tuple[Array, ...]
-    nearby: dict[int, Nearby | None] = field(default_factory=dict, repr=False)
+    def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions) -> Array:
+        """The reading's derivative (n,), ``inputs`` being what goes into each block of the model that did not move."""
+        moved = self.model._run(inputs[self.first], conditions, self.first, core=self.core)
+        return (moved - reading) / self.step
 
 
 Extensions = tuple[Extension, ...]
+Trace = tuple[Array, list[Array]]

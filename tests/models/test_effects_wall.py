@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -347,39 +346,6 @@ def test_springs_beside_the_arm_are_those_of_a_plain_search_for_the_root(
         bent = found / (1.0 + values[0] * (1.0 - found)) if name == "gas_compression" else found + beside * (found - q)
         wanted[k] = bent
     assert np.max(np.abs(made.apply(given_.load, given_, values) - wanted)) < 1e-9
-
-
-@pytest.mark.parametrize("name", ["mullins_softening", "wall_hardening", "orifice_leak"])
-@given(seed=seeds, share=st.floats(0.01, 0.5), rate_per_s=st.floats(0.05, 5.0), before=st.sampled_from([0.0, 0.5]))
-@settings(max_examples=12)
-def test_close_to_what_is_known_a_block_answers_by_its_derivatives(
-    name: str, seed: int, share: float, rate_per_s: float, before: float
-) -> None:
-    """What it then lacks of running it again is of the second order, whatever moves: load, arm, and each parameter."""
-    made, alone = effect(name), conditions(corners(seed), noise=0.002, seed=seed)
-    alone = replace(alone, before={"largest_load": before})
-    given_, generator = alone.within(share, rate_per_s), np.random.default_rng(seed)
-    values = drawn(made, seed)
-    out = made.apply(given_.load, given_, values)
-    nearby = made.nearby(given_.load, out, given_, values)
-    assert nearby is not None
-    np.testing.assert_array_equal(nearby(given_.load, given_, values), out)
-    span_s = float(given_.time_s[-1])
-    moves = [(np.sin(3.0 * np.pi * given_.time_s / span_s) * given_.load, 0.0, 0.0, np.zeros(values.size))]
-    moves += [(0.0, share, 0.0, np.zeros(values.size)), (0.0, 0.0, rate_per_s, np.zeros(values.size))]
-    for k, parameter in enumerate(made.parameters):
-        way = parameter.size if values[k] + 0.01 * parameter.size < parameter.upper else -parameter.size
-        moves.append((0.0, 0.0, 0.0, way * np.eye(values.size)[k]))
-    moves.append((0.2 * generator.random() * given_.load, 0.1 * share, 0.1 * rate_per_s, moves[-1][3]))
-    for load, more, faster, by in moves:
-        for step, most in ((1e-3, 0.03), (1e-4, 0.003)):
-            near = (
-                given_.load + step * load,
-                alone.within(share + step * more, rate_per_s + step * faster),
-                values + step * by,
-            )
-            change, to_first = made.apply(*near) - out, nearby(*near) - out
-            assert np.linalg.norm(to_first - change) <= most * np.linalg.norm(change) + 1e-8
 
 
 @given(

@@ -131,10 +131,6 @@ class Conditions:
         return begins if abs(begins) >= LEAST_CHANGE_K else 0.0
 
 
-Nearby = Callable[[Array, Conditions, Array], Array]
-"""A block's output (n,) for a signal (n,), conditions and values close to those that it is known at, to first order."""
-
-
 class Inverse(ABC):
     """A block's inverse, run on a stream: the same numbers for any chunking."""
 
@@ -233,10 +229,6 @@ class Effect(ABC):
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The block's output (n,) for its input (n,); ``values`` in the order of ``parameters``. Never in place."""
-
-    def nearby(self, signal: Array, out: Array, conditions: Conditions, values: Array) -> Nearby | None:
-        """What `apply` gives close to where it gave ``out`` (n,), None where running it again takes no longer."""
-        return None
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""

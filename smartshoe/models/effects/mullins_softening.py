@@ -11,9 +11,9 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import c_number
-from smartshoe.models.effects._wall_loop import ArmGiven, SpringNearby, arm_beside, most_beside
+from smartshoe.models.effects._wall_loop import arm_beside, most_beside
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, Undone, beyond_noise, dead_zone
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse, Nearby
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -66,22 +66,12 @@ class MullinsSoftening(Effect):
 
         if values[0] == 0.0:
             return signal.copy()
-        amounts, arm = _given(conditions, values)
-        out = np.empty(signal.size)
-        softened(np.ascontiguousarray(signal), *amounts, *_past(conditions), *arm, out)
+        before, out = float(conditions.before.get("largest_load", 0.0)), np.empty(signal.size)
+        share, decay, now, earlier = arm_beside(conditions)
+        share *= 1.0 - float(values[5])
+        given = *_amounts(values, share), before, dead_zone(conditions), share, decay, now, earlier
+        softened(np.ascontiguousarray(signal), *given, out)
         return out
-
-    def nearby(self, signal: Array, out: Array, conditions: Conditions, values: Array) -> Nearby | None:
-        """By its derivatives: of the largest load, and of the moment at which it is exceeded, to first order too."""
-        from smartshoe.kernels.wall_loop import softened_about
-
-        if values[0] == 0.0:
-            return None
-        found = SpringNearby.of_record(signal, out, conditions, values, _given)
-        amounts, arm = _given(conditions, values)
-        slopes = found.by_load, found.by_most, found.grows, found.by_amounts
-        softened_about(found.signal, found.u, found.q, *amounts, *_past(conditions), *arm, *slopes)
-        return found
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
@@ -91,18 +81,6 @@ class MullinsSoftening(Effect):
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u: in closed form below the largest, by Newton above; exact for a load without noise."""
         return _undone(*_amounts(values))
-
-
-def _given(conditions: Conditions, values: Array) -> tuple[tuple[float, float, float, float, float], ArmGiven]:
-    """`_amounts`, and the part of the arm that does not soften."""
-    share, decay, now, before = arm_beside(conditions)
-    share *= 1.0 - float(values[5])
-    return _amounts(values, share), (share, decay, now, before)
-
-
-def _past(conditions: Conditions) -> tuple[float, float]:
-    """The largest load before, and by how much the largest counts less."""
-    return float(conditions.before.get("largest_load", 0.0)), dead_zone(conditions)
 
 
 def _undone(

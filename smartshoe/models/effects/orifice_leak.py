@@ -9,7 +9,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone
-from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse, Nearby
+from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -45,22 +45,6 @@ class OrificeLeak(Effect):
         rate = float(values[0]) * conditions.step_s
         orifice(np.ascontiguousarray(signal), rate, float(values[1]), np.zeros(2), out)
         return out
-
-    def nearby(self, signal: Array, out: Array, conditions: Conditions, values: Array) -> Nearby | None:
-        """By its derivatives."""
-        from smartshoe.kernels.memory import orifice_along
-
-        if values[0] == 0.0:
-            return None
-        rate, laminar = float(values[0]) * conditions.step_s, float(values[1])
-
-        def moved(near: Array, given: Conditions, beside: Array) -> Array:
-            change = np.empty(near.size)
-            steps = float(beside[0]) * given.step_s - rate, float(beside[1]) - laminar
-            orifice_along(near - signal, out, rate, laminar, *steps, change)
-            return out + change
-
-        return moved
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Add what left, integrated from the pressure that is left: exact."""

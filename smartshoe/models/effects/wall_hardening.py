@@ -7,8 +7,8 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.models.effects._beside_arm import BesideArm
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
-from smartshoe.models.effects._wall_loop import ArmGiven, SpringNearby, arm_beside
-from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse, Nearby
+from smartshoe.models.effects._wall_loop import arm_beside
+from smartshoe.models.effects.effect import ChainContext, Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
 
 
@@ -47,17 +47,6 @@ class WallHardening(Effect):
         hardened(np.ascontiguousarray(signal), *_coefficients(values), *arm_beside(conditions), out)
         return out
 
-    def nearby(self, signal: Array, out: Array, conditions: Conditions, values: Array) -> Nearby | None:
-        """By its derivatives."""
-        from smartshoe.kernels.wall_loop import hardened_about
-
-        if values[0] == 0.0:
-            return None
-        found = SpringNearby.of_record(signal, out, conditions, values, _given)
-        arm = found.arm[0] * (1.0 - found.arm[2])
-        hardened_about(found.u, *_coefficients(values), arm, found.by_load, found.by_amounts)
-        return found
-
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
         return BesideArm(self.inverse(values, step_s), chain.arm, step_s)
@@ -74,10 +63,6 @@ class WallHardening(Effect):
 
         body = f"x *= (1.0 + x * x * ({c_number(cubic)} + {c_number(fifth)} * x * x)) / {c_number(whole)};"
         return Memoryless(undo, body)
-
-
-def _given(conditions: Conditions, values: Array) -> tuple[tuple[float, float], ArmGiven]:
-    return _coefficients(values), arm_beside(conditions)
 
 
 def _coefficients(values: Array) -> tuple[float, float]:
