@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -50,10 +49,9 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
     # Rice's rule, of each direction's half.
     bins = 2 * round((0.5 * x.size) ** (1.0 / 3.0))
     edges = np.linspace(low, high, bins + 1)
+    rises, falls = (_by_bin(x[moves], y[moves], edges) for moves in (rate > still, rate < -still))
     at, ups, downs = [], [], []
-    for left, right in pairwise(edges):
-        inside = (x >= left) & (x < right)
-        up, down = y[inside & (rate > still)], y[inside & (rate < -still)]
+    for left, right, up, down in zip(edges[:-1], edges[1:], rises, falls, strict=True):
         if min(up.size, down.size) > 2:
             at.append(0.5 * (left + right))
             ups.append(float(np.median(up)))
@@ -65,6 +63,13 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
     either = np.where(rate > 0, np.interp(x, place, rising), np.interp(x, place, falling))
     by_curve = _explained(y, np.interp(x, place, 0.5 * (rising + falling)))
     return Branches(recording, place, rising, falling, by_curve, _explained(y[moving], either[moving]))
+
+
+def _by_bin(x: Array, y: Array, edges: Array) -> list[Array]:
+    """The ``y`` (n,) of the ``x`` (n,) from each of the ``edges`` (m + 1,) up to the next, in order."""
+    number = np.digitize(x, edges)
+    order = np.argsort(number, kind="stable")
+    return np.split(y[order], np.searchsorted(number[order], np.arange(1, edges.size + 1)))[1:-1]
 
 
 def friction_of(recording: Recording, thresholds: Thresholds) -> str | None:

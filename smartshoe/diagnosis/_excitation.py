@@ -143,7 +143,7 @@ class _Rise(NamedTuple):
 
 def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
     load, step_s = session.conditions.load, session.conditions.step_s
-    span = min(1.0, max(float(np.ptp(load)), 1e-9))
+    lowest, span = float(load.min()), min(1.0, max(float(np.ptp(load)), 1e-9))
     for first, last in rises_of(load, thresholds.cycle * span):
         rise = float(load[last] - load[first])
         if rise < thresholds.cycle * span or load[last] <= 0.0:
@@ -152,7 +152,7 @@ def _rises(session: Session, thresholds: Thresholds) -> Iterator[_Rise]:
         samples = int(np.argmax(part >= 0.75)) - int(np.argmax(part >= 0.25))
         is_rated = samples * thresholds.same >= 1.0 or session.thinned > 1  # else one sample makes another rate of it
         rate = 0.5 * rise / max(samples * step_s, 0.5 * step_s)
-        above = float(load[first]) - float(load.min()) > thresholds.clear * thresholds.cycle * span
+        above = float(load[first]) - lowest > thresholds.clear * thresholds.cycle * span
         yield _Rise(rate, samples * _windows(session), float(load[last]), above, is_rated)
 
 

@@ -169,7 +169,7 @@ def worst_cycle(traces: Sequence[Trace]) -> TraceSegment | None:
             usable = trace.usable[start:stop] & np.isfinite(trace.baseline[start:stop])
             if usable.sum() < 8:
                 continue
-            error = (trace.reading - trace.baseline)[start:stop][usable]
+            error = (trace.reading[start:stop] - trace.baseline[start:stop])[usable]
             found.append(
                 (
                     bool(trace.held_out[start:stop].mean() > 0.5),
