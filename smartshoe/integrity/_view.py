@@ -116,8 +116,7 @@ class View:
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
     ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out, ``rails`` (r,) those at
-    which its sensor is known to end. ``is_swapped``: load and
-    reading have changed places.
+    which its sensor is known to end. ``is_swapped``: load and reading have changed places.
     """
 
     recording: Recording
