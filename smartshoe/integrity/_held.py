@@ -237,21 +237,18 @@ def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
     beside = given.few * given.local
     long = np.flatnonzero(stops - starts > given.few)
     passed = np.array([float(np.ptp(load[a : b + 1])) for a, b in zip(starts[long], stops[long], strict=True)])
-    for at, i in enumerate(long):
+    next_most = float(np.sort(passed)[-2]) if passed.size > 1 else 0.0  # of others than that which passes most
+    is_far = (given.clear * passed > span) | (passed > max(given.same * span, given.clear * next_most))
+    for i in long[is_far]:
         first, last = int(starts[i]), int(stops[i])
-        others = float(np.max(np.delete(passed, at), initial=0.0))
-        is_alone = passed[at] > max(given.same * span, given.clear * others)
-        if not (given.clear * passed[at] > span or is_alone):
-            continue
         if not (inside[i] or given.clear * float(np.ptp(view.expected[first : last + 1])) > view.span):
             continue
         near = max(y[max(first - beside, 0) : first + 1], y[last : last + beside + 1], key=len)
         if near.size <= given.local:
             continue
-        second = np.diff(near, 2)
-        product = second[1:] * second[:-1]
+        bends = np.diff(near, 2)
+        product = bends[1:] * bends[:-1]
         alternates = np.sum(product < 0.0) > np.sqrt(given.clear) * np.sum(product > 0.0)  # noise, not curvature
         least = toggling(given) * view.reading.local_step[first]
-        if alternates and float(np.std(second)) / SECOND_DIFFERENCE > least:
-            out[i] = True
+        out[i] = alternates and float(np.std(bends)) / SECOND_DIFFERENCE > least
     return out
