@@ -22,18 +22,12 @@ def dead_band_undone(signal, lost, soft, onset, sets_in_over, begins, whole, lat
             out[k] = y
             continue
         f, low, high, under, over, stays = y, y, y + most, 0.0, 0.0, 0
-        for i in range(STEPS):  # first the ends
+        for i in range(STEPS):
             z = f / lost
             x = (1.0 + onset - z) / soft
             rounded = max(x, 0.0) + math.log1p(math.exp(-abs(x)))
             left = f - y - lost / whole * (begins - soft * rounded + late * math.expm1(-z / sets_in_over))
             if abs(left) <= SOLVED:
                 break
-            if i == 0:
-                under, f = left, high
-            elif i == 1:
-                over = left
-                f = low - (high - low) * (under / (over - under))
-            else:
-                f, low, high, under, over, stays = closer(f, left, low, high, under, over, stays)
+            f, low, high, under, over, stays = closer(i, f, left, low, high, under, over, stays)
         out[k] = f

@@ -82,17 +82,23 @@ def relays(load, half_widths, closed, open_, levelling, state, out):  # type: ig
 
 
 @njit(cache=True)
-def closer(at, left, low, high, under, over, stays):  # type: ignore[no-untyped-def]
-    """A bracket of a rising ``left`` with ``at`` as an end, and first where its zero is sought next.
+def closer(step, at, left, low, high, under, over, stays):  # type: ignore[no-untyped-def]
+    """Where the zero of a rising ``left`` is sought after ``at``, and its bracket. First the ends, ``low``, ``high``.
 
-    By the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counting half. ``under``
-    and ``over`` are what is left at ``low`` and ``high``; ``stays``: 1 if ``high`` stayed, -1 if ``low`` did.
+    From ``step`` 2 on by the Illinois method (Dowell and Jarratt 1971): false position, an end that stays twice counts
+    half. ``under`` and ``over`` are what is left at the ends; ``stays``: 1 if ``high`` stayed, -1 if ``low`` did. In C
+    `smartshoe.models.effects._false_position`.
     """
-    if left < 0.0:
+    if step == 0:
+        return high, low, high, left, over, stays
+    if step == 1:
+        over = left
+    elif left < 0.0:
         low, under, over, stays = at, left, over * (0.5 if stays == 1 else 1.0), 1
     else:
         high, over, under, stays = at, left, under * (0.5 if stays == -1 else 1.0), -1
-    return low - (high - low) * (under / (over - under)), low, high, under, over, stays
+    trial = low - (high - low) * (under / (over - under)) if over > under else low
+    return trial, low, high, under, over, stays
 
 
 @njit(cache=True)
@@ -103,19 +109,12 @@ def relays_undone(signal, strength, half_widths, closed, open_, levelling, state
         y = signal[k]
         low, high = y - 2.0 * strength, y + 2.0 * strength
         f, under, over, stays = low, 0.0, 0.0, 0
-        for i in range(STEPS):  # first the ends
+        for i in range(STEPS):
             moved[:] = state
             left = f - y - strength * _loop_at(max(f, 0.0), half_widths, closed, open_, levelling, moved)
-            if i == 0:
-                under, f = left, high
-                continue
-            if i == 1:
-                over = left
-                f = low - (high - low) * (under / (over - under)) if over > under else y
-            elif abs(left) <= SOLVED:
+            if abs(left) <= SOLVED:
                 break
-            else:
-                f, low, high, under, over, stays = closer(f, left, low, high, under, over, stays)
+            f, low, high, under, over, stays = closer(i, f, left, low, high, under, over, stays)
         state[:] = moved
         out[k] = f
 
@@ -215,17 +214,13 @@ def bouc_wen_undone(signal, strength, fading, per_load, z, slope, dead_zone, sta
             on = place if sense == direction else _place_of(sense * value, z, slope)
             low, under, over, stays = 0.0, dead_zone - sense * (f - last), 0.0, 0
             move = high = sense * (y - last) + strength - dead_zone  # friction is no more than that
-            for i in range(STEPS):
+            for i in range(1, STEPS + 1):  # what is left at the lower end is known
                 f = last + sense * (dead_zone + move)
                 height = strength * _left(fading, last + sense * move)
                 left = sense * (f - y) - height * _along(on + move * per_load, z, slope)
                 if abs(left) <= SOLVED:
                     break
-                if i == 0:
-                    over = left
-                    move = -high * (under / (over - under))
-                else:
-                    move, low, high, under, over, stays = closer(move, left, low, high, under, over, stays)
+                move, low, high, under, over, stays = closer(i, move, left, low, high, under, over, stays)
             if move > 0.0:
                 direction, place = sense, on + move * per_load
                 value = sense * _along(place, z, slope)
@@ -281,18 +276,12 @@ def sense_undone(signal, strength, width, fade, dead_zone, state, out):  # type:
             way = 1.0 if f > last else -1.0  # a load that falls is sought upside down
             f = low = way * end
             high, under, over, stays = way * far, 0.0, 0.0, 0
-            for i in range(STEPS):  # first the ends
+            for i in range(STEPS):
                 now = _sense(sense, way * f - end, width, fade)
                 left = f * (1.0 - 0.5 * strength * (1.0 - now)) - way * y
                 if abs(left) <= SOLVED or (i == 0 and left > 0.0) or (i == 1 and left < 0.0):
                     break
-                if i == 0:
-                    under, f = left, high
-                elif i == 1:
-                    over = left
-                    f = low - (high - low) * (under / (over - under))
-                else:
-                    f, low, high, under, over, stays = closer(f, left, low, high, under, over, stays)
+                f, low, high, under, over, stays = closer(i, f, left, low, high, under, over, stays)
             f *= way
             last += f - end
         sense = now

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._false_position import closer_in_c
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import NO_LOAD, Undone, cleaned_load
 from smartshoe.models.effects.effect import Conditions
@@ -59,7 +60,7 @@ def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> 
         double low = way * end, high = way * ((x > whole) == (way > 0.0) ? x : whole);
         double at = low, under = 0.0, over = 0.0;
         int k, stays = 0;
-        for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
+        for (k = 0; k < {STEPS}; k++) {{
             double left;
             v = way * at;
             sense = {of["sense"]};
@@ -68,25 +69,7 @@ def undone_by_sense(lost: float, turn: float, fade: float, dead_zone: float) -> 
             if (fabs(left) <= {SOLVED} || (k == 0 && left > 0.0) || (k == 1 && left < 0.0)) {{
                 break;
             }}
-            if (k == 0) {{
-                under = left;
-                at = high;
-                continue;
-            }}
-            if (k == 1) {{
-                over = left;
-            }} else if (left < 0.0) {{
-                low = at;
-                under = left;
-                over *= stays == 1 ? 0.5 : 1.0;
-                stays = 1;
-            }} else {{
-                high = at;
-                over = left;
-                under *= stays == -1 ? 0.5 : 1.0;
-                stays = -1;
-            }}
-            at = low - (high - low) * (under / (over - under));
+            {closer_in_c("at")}
         }}
         {of["last"]} += v - end;
     }}

@@ -83,7 +83,7 @@ class Undone(Inverse):
         return out
 
     def c_step(self, name: str) -> CStep:
-        """The kernel's step, its bisection included."""
+        """The kernel's step, its search for a root included."""
         names = {member: f"f->{name}_{member}" for member in self.members}
         states = {f"{name}_{member}": float(value) for member, value in zip(self.members, self.start, strict=True)}
         return CStep(states, self.body(names))

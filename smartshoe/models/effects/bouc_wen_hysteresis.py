@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._false_position import closer_in_c
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import LEAST_DEAD_ZONE, NO_LOAD, Remembering, Undone, cleaned, dead_zone
 from smartshoe.models.effects.effect import Conditions, EffectParameter, Inverse
@@ -70,7 +71,7 @@ class BoucWenHysteresis(Remembering):
             return _C_BODY.format(
                 **of, points=z.size, z=_row(z), slope=_row(slope), last_point=z.size - 1, no_load=NO_LOAD,
                 strength=c_number(strength), fading=c_number(fading), zone=c_number(dead_zone),
-                per_load=c_number(per_load), steps=STEPS, solved=SOLVED,
+                per_load=c_number(per_load), steps=STEPS, solved=SOLVED, closer=closer_in_c("move"),
             )  # fmt: skip
 
         constants = (strength, fading, per_load, z, slope, dead_zone)
@@ -147,7 +148,7 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
         under = {{zone}} - sense * (x - {{last}});
         high = sense * (y - {{last}}) + {{strength}} - {{zone}};
         move = high;
-        for (k = 0; k < {{steps}}; k++) {{{{  /* the Illinois method */
+        for (k = 1; k <= {{steps}}; k++) {{{{
             x = {{last}} + sense * ({{zone}} + move);
             {_at("on + move * {per_load}", "now")}
             height = {{strength}} * fmin(fmax(1.0 - {{fading}} * ({{last}} + sense * move), 0.0), 1.0);
@@ -155,20 +156,7 @@ _C_BODY = f"""if ({{last}} >= {{no_load}}) {{{{
             if (fabs(left) <= {{solved}}) {{{{
                 break;
             }}}}
-            if (k == 0) {{{{
-                over = left;
-            }}}} else if (left < 0.0) {{{{
-                low = move;
-                under = left;
-                over *= stays == 1 ? 0.5 : 1.0;
-                stays = 1;
-            }}}} else {{{{
-                high = move;
-                over = left;
-                under *= stays == -1 ? 0.5 : 1.0;
-                stays = -1;
-            }}}}
-            move = low - (high - low) * (under / (over - under));
+            {{closer}}
         }}}}
         if (move > 0.0) {{{{
             {{direction}} = sense;

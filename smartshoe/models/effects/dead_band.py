@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._false_position import closer_in_c
 from smartshoe.models.effects._sensor_inverse import Memoryless, c_number
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
 from smartshoe.models.effects.exposure import by
@@ -68,7 +69,7 @@ class DeadBand(Effect):
         body = f"""if (x > 0.0) {{
     double low = x, high = x + {c_number(MOST * lost)}, under = 0.0, over = 0.0, v = low;
     int k, stays = 0;
-    for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
+    for (k = 0; k < {STEPS}; k++) {{
         const double z = v / {c_number(lost)}, y = ({c_number(1.0 + onset)} - z) / {c_number(soft)};
         const double s = (y > 0.0 ? y : 0.0) + log1p(exp(-fabs(y)));
         const double sets_in = {c_number(late)} * expm1(-z / {c_number(max(onset, LEAST_ONSET))});
@@ -76,25 +77,7 @@ class DeadBand(Effect):
         if (fabs(left) <= {SOLVED}) {{
             break;
         }}
-        if (k == 0) {{
-            under = left;
-            v = high;
-            continue;
-        }}
-        if (k == 1) {{
-            over = left;
-        }} else if (left < 0.0) {{
-            low = v;
-            under = left;
-            over *= stays == 1 ? 0.5 : 1.0;
-            stays = 1;
-        }} else {{
-            high = v;
-            over = left;
-            under *= stays == -1 ? 0.5 : 1.0;
-            stays = -1;
-        }}
-        v = low - (high - low) * (under / (over - under));
+        {closer_in_c("v")}
     }}
     x = v;
 }}"""

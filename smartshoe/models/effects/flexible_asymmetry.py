@@ -33,7 +33,7 @@ class FlexibleAsymmetry(Remembering):
         return by_sense(signal, conditions, *_constants(values, conditions.step_s))
 
     def inverse(self, values: Array, step_s: float, dead_zone: float = LEAST_DEAD_ZONE) -> Inverse:
-        """The load whose own sense gives the output, by bisection; exact for a load without noise."""
+        """The load whose own sense gives the output, by false position; exact for a load without noise."""
         return undone_by_sense(*_constants(values, step_s), dead_zone)
 
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from smartshoe.arrays import Array
+from smartshoe.models.effects._false_position import closer_in_c
 from smartshoe.models.effects._sensor_inverse import c_number
 from smartshoe.models.effects._wall_memory import Undone, dead_zone
 from smartshoe.models.effects.effect import Conditions, Effect, EffectParameter, Inverse
@@ -120,7 +121,7 @@ def _c_body(states: list[str], strength: float, levelling: float, closed: Array,
     double state[{count}], moved[{count}];
     double low = x - 2.0 * {whole}, high = x + 2.0 * {whole}, under = 0.0, over = 0.0, v = low;
     int i, k, stays = 0;
-{load}    for (k = 0; k < {STEPS}; k++) {{  /* first the ends, then the Illinois method */
+{load}    for (k = 0; k < {STEPS}; k++) {{
         double left = v - x, g = v > 0.0 ? v : 0.0;
         const double above = g * g * (1.0 - {bent} * g);
         for (i = 0; i < {count}; i++) {{
@@ -135,27 +136,10 @@ def _c_body(states: list[str], strength: float, levelling: float, closed: Array,
                 * (0.5 * (above + down * down * (1.0 - {bent} * down)) - up * up * (1.0 - {bent} * up));
             left -= {whole} * open[i] * (g - half[i] - place);
         }}
-        if (k == 0) {{
-            under = left;
-            v = high;
-            continue;
-        }}
-        if (k == 1) {{
-            over = left;
-        }} else if (fabs(left) <= {SOLVED}) {{
+        if (fabs(left) <= {SOLVED}) {{
             break;
-        }} else if (left < 0.0) {{
-            low = v;
-            under = left;
-            over *= stays == 1 ? 0.5 : 1.0;
-            stays = 1;
-        }} else {{
-            high = v;
-            over = left;
-            under *= stays == -1 ? 0.5 : 1.0;
-            stays = -1;
         }}
-        v = over > under ? low - (high - low) * (under / (over - under)) : x;
+        {closer_in_c("v")}
     }}
     x = v;
 {save}}}"""
