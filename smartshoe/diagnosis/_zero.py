@@ -125,8 +125,9 @@ def zeros_of(
     sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
     slow = noise.of_a_mean(thresholds.hold_s) / np.sqrt(len(rests)) if noise is not None and noise.is_noise else 0.0
-    reading_sd = float(np.linalg.norm([reading_sd, thresholds.departure * np.mean(np.abs(drifted)), slow]))
-    load, reading = float(np.mean(loads)), float(np.mean(readings))
+    as_read_sd = float(np.hypot(reading_sd, slow))
+    reading_sd = float(np.hypot(as_read_sd, thresholds.departure * np.mean(np.abs(drifted))))
+    load, reading, drift = (float(np.mean(one)) for one in (loads, readings, drifted))
     many = largest_of_noise(1, thresholds)
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
     if abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
@@ -135,6 +136,7 @@ def zeros_of(
     if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
     is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
+    is_clear[1] &= abs(reading + drift) >= many * as_read_sd  # one that only undoes a drift is that drift's error
     borne = (reading - load) * model.gain
     if load > 0.0 and not commanded and is_clear.all() and _is_past(borne, sessions, model, thresholds):
         return (Zero(sensor, borne, reading_sd, abs(borne), (machine.name,), True),)  # no cause more is needed

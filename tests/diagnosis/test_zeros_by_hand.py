@@ -70,6 +70,14 @@ def test_a_reading_that_agrees_with_the_load_or_is_far_off_is_no_zero(monkeypatc
         assert bool(_seen(monkeypatch, [(0.0, reading, 0.0)])) is is_named
 
 
+def test_an_offset_that_only_undoes_a_drift_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The unloaded unit reads nothing: that an offset cancels what the model drifts by would be a coincidence."""
+    bound = MANY * STANDARD.zero_sd
+    for read, is_named in ((0.0, False), (0.999 * bound, False), (1.001 * bound, True)):
+        assert bool(_seen(monkeypatch, [(0.0, -0.02 - read, 0.02)])) is is_named
+        assert bool(_seen(monkeypatch, [(0.0, 0.02 + read, -0.02)])) is is_named
+
+
 def test_a_zeros_deviation_is_of_its_scatter_its_rest_and_what_drifted(monkeypatch: pytest.MonkeyPatch) -> None:
     rests = [(0.10, -0.05, 0.01), (0.11, -0.06, -0.03), (0.12, -0.09, 0.02)]
     found = _seen(monkeypatch, rests)
