@@ -111,6 +111,16 @@ def is_clear(row: Row) -> bool:
     return all(e["strength_percent"] >= CLEAR_PERCENT or e["family"] == "data" for e in effects)
 
 
+def is_zero_alone(row: Row) -> bool:
+    """Whether nothing but a tare or an offset is hidden: the baseline's own offset has it, imperfections are left."""
+    return {e["id"] for e in row["truth"]["effects"]} <= {"zero_offset", "load_cell_tare"}
+
+
+def mean_share(shares: Sequence[float]) -> float:
+    """Mean of shares explained in percent, each between -1 and 1."""
+    return 100.0 * float(np.mean(np.clip(shares, -1, 1))) if shares else float("nan")
+
+
 def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
     """The issue's table for one world."""
     asked = ASKED.get(world, {})
@@ -131,8 +141,10 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
         return Figure(name, value, "%", len(of), wilson(hits, len(of)), *asked.get(key, (None, None)), not down, key)
 
     names = [pair for _, j in cases for pair in j.names]
+    said = [pair for _, j in cases for pair in j.said_names]
     laws = [pair for _, j in cases for pair in j.laws]
     explained = [j.explained for _, j in hidden if j.explained is not None]
+    beside_zeros = [j.explained for r, j in hidden if j.explained is not None and not is_zero_alone(r)]
     held = [j for r, j in cases if "verdict" in r["found"]]
     cpu = sorted(r["cpu_s"] for r, _ in cases)
 
@@ -157,11 +169,14 @@ def figures(world: str, cases: Sequence[Judged]) -> list[Figure]:
         share("cases with a false name", "", [*one, *two, *three], lambda j: bool(j.false), down=True),
         plain("calibration error of the confidence", "calibration", calibration_error(names), "", len(names), True),
         plain("area under its curve", "area", area_under_curve(names), "", len(names), False),
+        plain("the same, of the name or its equivalents: error", "", calibration_error(said), "", len(said), True),
+        plain("the same, of the name or its equivalents: area", "", area_under_curve(said), "", len(said), False),
         plain("the same of the law's: error", "", calibration_error(laws), "", len(laws), True),
         plain("the same of the law's: area", "", area_under_curve(laws), "", len(laws), False),
-        plain("held-out variance explained, of what could be (mean)", "explained",
-              100.0 * float(np.mean(np.clip(explained, -1, 1))) if explained else float("nan"), "%",
+        plain("held-out variance explained, of what could be (mean)", "explained", mean_share(explained), "%",
               len(explained), False),
+        plain("the same, without cases of a tare or an offset alone", "", mean_share(beside_zeros), "%",
+              len(beside_zeros), False),
         share("an extension that makes held-out data worse", "worse", [(r, j) for r, j in cases if j in held],
               lambda j: j.worse, down=True),
         plain("processor time, median", "median", float(np.median(cpu)) if cpu else float("nan"), "s", len(cpu), True),

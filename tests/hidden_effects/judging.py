@@ -11,8 +11,9 @@
   what is there, and it must be that where a tare or an offset of 0.15 % and more is there.
 - *false names*: causes that are neither hidden nor a nuisance or condition, by effect or family. A second name in the
   hidden family is a *companion*, counted apart.
-- *confidence*: right is a cause that is neither false nor a companion. That of the *law*, of the causes that are right:
-  it is the very effect that is there, hidden or not.
+- *confidence*: right is a cause that is neither false nor a companion. By its own words it is right as well where what
+  is there is among its `equivalents`, whatever else could be told (`said_names`). That of the *law*, of the causes that
+  are right: it is the very effect that is there, hidden or not.
 - *explained*: of the held-out variance that could be explained, 1 - (extended^2 - noise^2)/(baseline^2 - noise^2). A
   fault of the data or noise that is hidden alone is nothing that a model could explain.
 """
@@ -40,7 +41,10 @@ Found = Mapping[str, Any]
 
 @dataclass
 class Judgement:
-    """One answer judged; ``names`` are (confidence, right) of each cause, ``laws`` those of its law."""
+    """One answer judged; ``names`` are (confidence, right) of each cause, ``laws`` those of its law.
+
+    ``said_names``: right as well where an equivalent is there, which is what the confidence is said to be of.
+    """
 
     exact: bool = False
     all_named: bool = False
@@ -52,6 +56,7 @@ class Judgement:
     false_faults: list[str] = field(default_factory=list)
     hedges: int = 0
     names: list[tuple[float, bool]] = field(default_factory=list)
+    said_names: list[tuple[float, bool]] = field(default_factory=list)
     laws: list[tuple[float, bool]] = field(default_factory=list)
     explained: float | None = None
     worse: bool = False
@@ -133,7 +138,9 @@ def _sort_in(out: Judgement, cause: Found, real: list[Found], names: set[str], f
         out.false.append(cause["effect"])
         if cause["confidence"] > SURE:
             out.sure_false.append(cause["effect"])
-    out.names.append((float(cause["confidence"]), right))
+    confidence = float(cause["confidence"])
+    out.names.append((confidence, right))
+    out.said_names.append((confidence, right or not there.isdisjoint(cause.get("equivalents") or ())))
     if right and "law_confidence" in cause:
         out.laws.append((float(cause["law_confidence"]), cause["effect"] in there))
     for effect in real:

@@ -50,7 +50,11 @@ def test_an_equivalent_counts_only_where_the_truth_cannot_be_told_from_it():
     said = [cause("orifice_leak", "leak", equivalents=("linear_leak",))]
     assert not judge(row("single", [LEAK], said, "explained")).exact
     assert judge(row("single", [effect("linear_leak", "leak", like=("orifice_leak",))], said, "explained")).exact
-    assert judge(row("single", [LEAK], said, "explained")).companions == ["orifice_leak"]
+    companion = judge(row("single", [LEAK], said, "explained"))
+    assert companion.companions == ["orifice_leak"]
+    assert not companion.names[0][1]
+    assert companion.said_names[0][1]  # the confidence is said to be of the name or its equivalents
+    assert not judge(row("single", [LOOP], said, "explained")).said_names[0][1]
 
 
 def test_two_effects_are_exact_with_both_names_and_no_false_one():
@@ -88,6 +92,15 @@ def test_the_held_out_share_is_of_what_noise_leaves_to_explain():
     assert not one.worse
     assert judge(row("single", [LEAK], [], "unexplained", after=1.2)).worse
     assert judge(row("single", [effect("spikes", "noise")], [], "adequate")).explained is None
+
+
+def test_a_zero_alone_leaves_a_model_nothing_to_explain():
+    rows = [row("single", [LEAK], [], "explained"), row("single", [effect("zero_offset", "zero")], [], "explained")]
+    rows[1]["found"]["extended"] = rows[1]["found"]["baseline"]
+    by_name = {figure.name: figure for figure in figures("own", judged(rows))}
+    mean, aside = (by_name[n] for n in by_name if "explained" in n or "alone" in n)
+    assert (mean.count, aside.count) == (2, 1)
+    assert mean.value == pytest.approx(aside.value / 2)
 
 
 def test_a_diagnosis_that_raised_is_a_wrong_answer():
