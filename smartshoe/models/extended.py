@@ -21,6 +21,8 @@ BASELINE = (
     EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, -0.9, 5.0, 0.1),
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
+MOST_SENSITIVITIES = 12  # models under the same conditions of which they are kept
+MOST_AT_ONCE = 8  # signals that pass a block side by side: their steps fill the time that each waits, and the cache
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 
@@ -44,6 +46,32 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
+class _Makeup:
+    """What a chain's effects alone decide, whatever their values: a fit makes thousands of models that share it.
+
+    ``order``: numbers of the parts as the signal passes them, None the core; ``in_core``: the effects that stand there.
+    """
+
+    names: tuple[str, ...]
+    parameters: tuple[tuple[str, EffectParameter], ...]
+    order: tuple[int | None, ...]
+    in_core: tuple[CoreEffect | None, ...]
+
+    @classmethod
+    def of(cls, effects: Sequence[Effect]) -> _Makeup:
+        """That of a chain of these."""
+        in_core = tuple(one if isinstance(one, CoreEffect) else None for one in effects)
+        own, core = [("baseline", parameter) for parameter in BASELINE], PLACES.index("core")
+        at = sorted((PLACES.index(one.place), one.name, k) for k, one in enumerate(effects) if in_core[k] is None)
+        return cls(
+            tuple(one.name for one in effects),
+            (*own, *((one.name, parameter) for one in effects for parameter in one.parameters)),
+            (*(k for place, _, k in at if place < core), None, *(k for place, _, k in at if place > core)),
+            in_core,
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class ExtendedModel:
     """The standard linear solid (Chinimilli 2016, equation 2) with effects, ``parts``, at their places of the chain.
 
@@ -64,11 +92,14 @@ class ExtendedModel:
     noise: float = 0.0
 
     # -- parameters as one vector ------------------------------------------------------------------------------
-    @cached_property
+    @property
     def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
         """(effect's name or "baseline", parameter) in the order of `theta`."""
-        own = [("baseline", parameter) for parameter in BASELINE]
-        return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
+        return self._makeup.parameters
+
+    @cached_property
+    def _makeup(self) -> _Makeup:
+        return _Makeup.of([part.effect for part in self.parts])
 
     @property
     def pole_per_s(self) -> float:
@@ -81,6 +112,11 @@ class ExtendedModel:
         baseline = [self.gain, self.relaxing_share, self.relaxation_rate_per_s]
         return np.concatenate([baseline, *(part.values for part in self.parts)])
 
+    @property
+    def content(self) -> tuple[object, ...]:
+        """What two models have in common that read alike, whatever the conditions: effects and all numbers."""
+        return self.wall_ratio, self.names, *self.theta.tolist()
+
     def at(self, theta: Array) -> ExtendedModel:
         """The same chain with the parameters ``theta`` (p,)."""
         parts, k = [], len(BASELINE)
@@ -89,7 +125,9 @@ class ExtendedModel:
             parts.append(Part(part.effect, np.array(theta[k : k + count], dtype=float)))
             k += count
         gain, share, rate = (float(value) for value in theta[: len(BASELINE)])
-        return replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
+        made = replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
+        vars(made)["_makeup"] = self._makeup  # the effects are the same
+        return made
 
     def with_part(self, added: Effect | str, values: ArrayLike | None = None) -> ExtendedModel:
         """This model with one more effect, itself or its name, at null where ``values`` are not given."""
@@ -108,30 +146,22 @@ class ExtendedModel:
     @property
     def names(self) -> tuple[str, ...]:
         """The effects in it."""
-        return tuple(part.name for part in self.parts)
+        return self._makeup.names
 
     # -- the chain -----------------------------------------------------------------------------------------------
     @cached_property
     def core(self) -> Core:
         """The linear network of wall and gas."""
         elements: list[Element] = [Arm(self.relaxing_share, self.relaxation_rate_per_s)]
-        for part in self.parts:
-            if isinstance(part.effect, CoreEffect):
-                elements += part.effect.elements(part.values)
+        for part, inside in zip(self.parts, self._makeup.in_core, strict=True):
+            if inside is not None:
+                elements += inside.elements(part.values)
         return network(tuple(elements), self.wall_ratio)
 
     @cached_property
     def chain(self) -> tuple[Part | None, ...]:
         """The blocks in the order in which the signal passes them; None stands for the core."""
-        outside = [part for part in self.parts if not isinstance(part.effect, CoreEffect)]
-        core = PLACES.index("core")
-        before = [part for part in outside if PLACES.index(part.effect.place) < core]
-        after = [part for part in outside if PLACES.index(part.effect.place) > core]
-
-        def order(part: Part) -> tuple[int, str]:
-            return PLACES.index(part.effect.place), part.name
-
-        return (*sorted(before, key=order), None, *sorted(after, key=order))
+        return tuple(None if k is None else self.parts[k] for k in self._makeup.order)
 
     def _run(
         self,
@@ -142,7 +172,18 @@ class ExtendedModel:
         core: Core | None = None,
     ) -> Array:
         """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
-        for part in self.chain[first:]:
+        return self.gain * self._passed(signal, conditions, slice(first, None), inputs, core)
+
+    def _passed(
+        self,
+        signal: Array,
+        conditions: Conditions,
+        blocks: slice,
+        inputs: list[Array] | None = None,
+        core: Core | None = None,
+    ) -> Array:
+        """The ``signal`` (n,) behind these ``blocks`` of the chain."""
+        for part in self.chain[blocks]:
             if inputs is not None:
                 inputs.append(signal)
             if part is None:
@@ -150,12 +191,26 @@ class ExtendedModel:
             else:
                 given = self._around(conditions) if part.effect.bends_beside_arm else conditions
                 signal = part.effect.apply(signal, given, part.values)
-        return self.gain * signal
+        return signal
+
+    def _passed_each(self, signals: Sequence[Array], conditions: Conditions, first: int) -> Sequence[Array]:
+        """Several ``signals`` (n,) behind the chain's end, from the block ``first`` on."""
+        if len(signals) == 1:
+            return [self._passed(signals[0], conditions, slice(first, None))]
+        for part in self.chain[first:]:
+            if part is None:
+                signals = [self.core.simulate(one, conditions.step_s) for one in signals]
+            else:
+                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
+                signals = part.effect.apply_each(signals, given, part.values)
+        return signals
 
     def _around(self, conditions: Conditions) -> Conditions:
         """``conditions`` with the relaxing arm: blocks that bend a spring beside it solve the balance of both."""
         relaxing = self.relaxing_share, self.relaxation_rate_per_s
-        return conditions if conditions.relaxing == relaxing else conditions.within(*relaxing)
+        if conditions.relaxing == relaxing:
+            return conditions
+        return conditions.kept("within", relaxing, lambda: conditions.within(*relaxing))
 
     def simulate(self, conditions: Conditions) -> Array:
         """The reading (n,) as a share of ``full_scale_reading`` under ``conditions``."""
@@ -170,32 +225,38 @@ class ExtendedModel:
         """For each parameter but the gain."""
         theta, made = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
-        core = self.chain.index(None)
-        # What the arm is felt by first: a block that bends beside it, or the core.
-        arm = next(k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm)
+        core = self._makeup.order.index(None)
+        # What the arm is felt by: blocks that bend beside it, and the core.
+        beside = [k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm]
         for j, (owner, parameter) in enumerate(self.parameters):
             if j == 0:
                 continue
             step = derivative_step(parameter, theta[j])
             moved = theta.copy()
             moved[j] += step
-            first = arm if owner == "baseline" else place_of.get(owner, core)
-            trial = self.at(moved)
+            place = place_of.get(owner, core)
+            first, last = (beside[0], beside[-1]) if owner == "baseline" else (place, place)
             alike = first != core and owner != "baseline"  # this parameter does not touch the core
-            made.append(Extension(step, trial, first, self.core if alike else None))
+            own = slice(first, last + 1)
+            made.append(Extension(step, self.at(moved), own, last + 1, self.core if alike else None))
         return tuple(made)
 
     def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
-        The chain is run anew only from the first block that a parameter moves.
+        The chain is run anew only from the first block that a parameter moves; nobody may write to what it gives.
         ``trace``: this model's own under the same conditions, where it is known.
         """
-        trace = trace or self.trace(conditions)
-        out = np.empty((trace[0].size, 1 + len(self._varied)), order="F")
-        out[:, 0] = trace[0] / self.gain
-        out[:, 1:] = self.column_of(self._varied, conditions, trace)
-        return trace[0], out
+
+        def made() -> tuple[Array, Array]:
+            known = trace or self.trace(conditions)
+            out = np.empty((known[0].size, 1 + len(self._varied)), order="F")
+            out[:, 0] = known[0] / self.gain
+            out[:, 1:] = self.column_of(self._varied, conditions, known)
+            return known[0], out
+
+        # Fits begin where others ended, and what they end at is weighed: the same model is asked for again and again.
+        return conditions.kept("sensitivities", self.content, made, MOST_SENSITIVITIES)
 
     def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
         """Of these derivatives those (n, k) with respect to the parameters of the effect ``name``."""
@@ -220,15 +281,23 @@ class ExtendedModel:
             trial, in_core = self.with_part(added, moved), isinstance(added, CoreEffect)
             names = [None if part is None else part.name for part in trial.chain]
             first = names.index(None if in_core else added.name)
-            made.append(Extension(step, trial, first, None if in_core else self.core))
+            own, after = slice(first, first + 1), first + in_core  # a block of its own stands before the model's next
+            made.append(Extension(step, trial, own, after, None if in_core else self.core))
         return tuple(made)
 
     def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
         """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
         reading, inputs = trace
         out = np.empty((reading.size, len(by)), order="F")
+        alike: dict[int, list[int]] = {}
         for column, one in enumerate(by):
-            out[:, column] = one.slope(reading, inputs, conditions)
+            alike.setdefault(one.after, []).append(column)
+        for after, columns in alike.items():
+            for k in range(0, len(columns), MOST_AT_ONCE):
+                few = columns[k : k + MOST_AT_ONCE]
+                moved = [by[column].moved(inputs, conditions) for column in few]
+                for column, end in zip(few, self._passed_each(moved, conditions, after), strict=True):
+                    out[:, column] = (self.gain * end - reading) / by[column].step
         return out
 
     # -- to and from a file ---------------------------------------------------------------------------------------
@@ -276,17 +345,20 @@ def derivative_step(parameter: EffectParameter, value: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """A model with one parameter moved by ``step``: the ``first`` block that it moves, the ``core`` where it stays."""
+    """A model with one parameter moved by ``step``: its ``own`` blocks, that move by it, the ``core`` where it stays.
+
+    ``after``: the block of the model that did not move that comes then; from it on the chains are the same.
+    """
 
     step: float
     model: ExtendedModel
-    first: int
+    own: slice
+    after: int
     core: Core | None
 
-    def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions) -> Array:
-        """The reading's derivative (n,), ``inputs`` being what goes into each block of the model that did not move."""
-        moved = self.model._run(inputs[self.first], conditions, self.first, core=self.core)
-        return (moved - reading) / self.step
+    def moved(self, inputs: Sequence[Array], conditions: Conditions) -> Array:
+        """What comes out of its own blocks (n,); ``inputs``: what goes into each of the model that did not move."""
+        return self.model._passed(inputs[self.own.start], conditions, self.own, core=self.core)
 
 
 Extensions = tuple[Extension, ...]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -37,14 +37,19 @@ class OrificeLeak(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """What is left of the pressure."""
+        return self.apply_each([signal], conditions, values)[0]
+
+    def apply_each(self, signals: Sequence[Array], conditions: Conditions, values: Array) -> Sequence[Array]:
+        """The same of several, side by side."""
         if values[0] == 0.0:
-            return signal.copy()
+            return [one.copy() for one in signals]
         from smartshoe.kernels.memory import orifice
 
-        out = np.empty(signal.size)
+        pressures = np.array(signals)
+        out = np.empty(pressures.shape)
         rate = float(values[0]) * conditions.step_s
-        orifice(np.ascontiguousarray(signal), rate, float(values[1]), np.zeros(2), out)
-        return out
+        orifice(pressures, rate, float(values[1]), np.zeros((len(signals), 2)), out)
+        return list(out)
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Add what left, integrated from the pressure that is left: exact."""
