@@ -69,7 +69,7 @@ def command(
     from smartshoe.cli._output import emit_json, note, progress, require_writable
     from smartshoe.runs.session import analyse, conduct, publish
 
-    require_writable(json_path, folder=out_folder)
+    require_writable(json_path=json_path, folder=out_folder)
     if replay is not None:
         folder = _replayed(replay, resume, options)
         target = Path(out_folder) if out_folder is not None else None
