@@ -40,9 +40,9 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
     load, sensor = recording.load, recording.sensor
     present = load.present & sensor.present
     x, y = load.values[present], sensor.values[present]
-    if x.size < thresholds.least_samples or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return None
     width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
+    if x.size < max(thresholds.least_samples, width) or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return None
     rate = np.gradient(np.convolve(x, np.ones(width), "same"))  # to one scale: it is held against its own largest
     low, high = (float(value) for value in np.percentile(x, [1, 99]))
     still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
