@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
     from smartshoe.recording import Recording
 
+MOST_NOTES = 10
 NOT_FITTED = "every third load cycle, or part of the time where there are few cycles, not fitted"
 # Steps that usually follow one, without the report. The fits between the first two go on until one adds nothing.
 _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing alternatives": 1}
@@ -121,8 +122,10 @@ def command(
         _save_calibration(calibration_path, found, fitted, unit)
     taken = emit_json(found.to_dict(), json_path)
     if refused:
-        for said in found.limits[1:]:
+        for said in found.limits[1 : 1 + MOST_NOTES]:
             note(said)
+        if (more := len(found.limits) - 1 - MOST_NOTES) > 0:
+            note(f"and {more} more, which --json has under limits")
         raise NotIdentifiableError(found.limits[0] if found.limits else found.says)
     if taken:
         return
