@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smartshoe.arrays import Array, Index, Mask
+from smartshoe.arrays import Array, Index, Mask, numbers_of
 from smartshoe.display import Summarised, SummaryTable, first_names, panels, significant
 from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.units import SECOND, Unit, declared, unit_of_suffix
@@ -50,7 +50,7 @@ class Channel:
     @classmethod
     def from_values(cls, name: str, values: ArrayLike, unit: Unit, role: Role = "auxiliary") -> Self:
         """A channel from numbers as they come: non-finite ones become missing samples."""
-        array = np.array(values, dtype=float, copy=True)
+        array = np.array(numbers_of(values, f"channel {name}"), copy=True)
         if array.ndim != 1:
             raise InputError(f"channel {name} has shape {array.shape}: give one number per sample")
         finite = np.isfinite(array)

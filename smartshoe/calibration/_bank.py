@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, numbers_of
 from smartshoe.calibration._compensator import Compensator
 from smartshoe.calibration._filter import ForceFilter
 from smartshoe.errors import InputError, UsageError
@@ -73,7 +73,7 @@ class CompensatorBank:
         return self._push_any(readings, out)
 
     def _push_any(self, readings: ArrayLike, out: Array | None) -> Array:
-        block = np.require(readings, dtype=np.float64, requirements=["C", "A", "W"])
+        block = np.require(numbers_of(readings, "readings"), requirements=["C", "A", "W"])
         units = len(self.filters)
         if np.ndim(readings) not in (1, 2) or block.shape[-1] != units:
             raise InputError(f"readings have shape {np.shape(readings)}: give ({units},) or (ticks, {units})")
@@ -118,7 +118,7 @@ class MixedBank(CompensatorBank):
     def push(self, readings: ArrayLike, out: Array | None = None) -> Array:
         """As `CompensatorBank.push`."""
         # A copy, since ``out`` may be the readings themselves.
-        block = np.array(readings, dtype=float)
+        block = np.array(numbers_of(readings, "readings"))
         forces_n = super().push(readings, out)
         for column, item in self._others:
             forces_n[..., column] = item.push(block[..., column])
@@ -153,5 +153,10 @@ def stack(filters: Sequence[ForceFilter]) -> CompensatorBank:
     >>> bank.push(np.full((3, 2), 10.0)).shape  # a block of three
     (3, 2)
     """
+    if isinstance(filters, ForceFilter) or not isinstance(filters, Iterable):
+        raise UsageError(f"filters is of type {type(filters).__name__}: give stack() a list of compensators")
+    filters = tuple(filters)
+    if strange := [type(item).__name__ for item in filters if not isinstance(item, ForceFilter)]:
+        raise UsageError(f"filters hold one of type {strange[0]}: give stack() a list of compensators")
     plain = all(isinstance(item, Compensator) for item in filters)
     return CompensatorBank(filters) if plain else MixedBank(filters)

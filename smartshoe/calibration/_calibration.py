@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -65,8 +66,11 @@ class Calibration:
 
     def __post_init__(self) -> None:
         for key in ("a1", "b0", "b1", "offset", "scale", "delay_s", "sample_rate_hz"):
-            if not math.isfinite(getattr(self, key)):
-                raise InputError(f"calibration of {self.unit or 'a unit'}: {key} is not finite: identify the unit anew")
+            number = getattr(self, key)
+            if not (isinstance(number, numbers.Real) and math.isfinite(number)):
+                raise InputError(
+                    f"calibration of {self.unit or 'a unit'}: {key} is no finite number: identify the unit anew"
+                )
         if self.a1 <= 0 or self.sample_rate_hz <= 0:
             key = "a1" if self.a1 <= 0 else "sample_rate_hz"
             raise InputError(

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, require_positive
 from smartshoe.calibration._core_inverse import CoreInverse
 from smartshoe.calibration._filter import ForceFilter
 from smartshoe.calibration._noise_limit import MOST, NoiseLimit, noise_gain
@@ -40,13 +40,12 @@ class ExtendedCompensator(ForceFilter):
         started_s: float = 0.0,
         reading_unit: Unit | None = None,
     ) -> None:
-        if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0):
-            raise UsageError(f"sample_rate_hz is {sample_rate_hz:g}: give a positive number")
+        sample_rate_hz = require_positive(sample_rate_hz, "sample_rate_hz")
         if not (np.isfinite(started_s) and started_s >= 0):
             raise UsageError(f"started_s is {started_s:g}: give the seconds since the unit was switched on, from 0")
         self.model = model
-        self.sample_rate_hz = float(sample_rate_hz)
-        self.step_s = 1.0 / self.sample_rate_hz
+        self.sample_rate_hz = sample_rate_hz
+        self.step_s = 1.0 / sample_rate_hz
         self.started_s = float(started_s)
         self.reading_unit = reading_unit or find_unit(model.reading_unit) or declared(model.reading_unit)
         self.reading_per_share = model.full_scale_reading * model.gain

@@ -8,7 +8,7 @@ from typing import Any, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, numbers_of
 from smartshoe.errors import InputError
 from smartshoe.recording import Channel, Recording
 from smartshoe.units import Unit
@@ -58,7 +58,7 @@ class ForceFilter(ABC):
         if isinstance(readings, Channel):
             values = readings.values if self.reading_unit is None else readings.in_unit(self.reading_unit)
         else:
-            values = np.asarray(readings, dtype=float)
+            values = numbers_of(readings, "readings")
         if values.ndim != 1:
             raise InputError(f"readings have shape {values.shape}: give one number per sample")
         return self._copy()._push_block(values)
@@ -69,7 +69,7 @@ class ForceFilter(ABC):
     def push(self, readings: Array) -> Array: ...
     def push(self, readings: Any) -> Any:
         """Force in N of the next reading (float in, float out) or block (n,): the same numbers as `apply`."""
-        block = np.asarray(readings, dtype=float)
+        block = numbers_of(readings, "readings")
         if block.ndim == 0:
             return float(self._push_block(block.reshape(1))[0])
         if block.ndim != 1:

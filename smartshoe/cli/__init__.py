@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from smartshoe.cli._output import Talk, talk
+from smartshoe.cli._output import Talk, printable, talk
 from smartshoe.errors import SmartShoeError
 from smartshoe.files.gate.limits import raise_limits
 
@@ -100,9 +100,8 @@ _LONGEST_END = 110  # where a message says how to mend it
 
 
 def _one_line(text: str) -> str:
-    """``text`` as one printable line of bounded length: names and cells of files stand in messages."""
-    line = " ".join(text.split())
-    line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
+    """``text`` as one printable line of bounded length."""
+    line = printable(text)
     if len(line) > _LONGEST_LINE:
         line = f"{line[: _LONGEST_LINE - _LONGEST_END]} ... {line[-_LONGEST_END:]}"
     return line

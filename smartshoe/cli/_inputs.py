@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from smartshoe.cli._output import warn
 from smartshoe.recording import UNITS_OF_A_SHOE, Channel, Recording
 
 if TYPE_CHECKING:
@@ -67,10 +69,21 @@ def read_all(
                 raise
             return half
 
-    recordings = join_pairs([one(file) for file in files])
+    recordings = join_pairs([one(file) for file in _each_once(files)])
     show_notes(recordings)
     say_what_strikes(recordings)
     return recordings
+
+
+def _each_once(files: Sequence[str]) -> list[str]:
+    """``files`` without those named twice: the same samples again would be evidence that is not there."""
+    found: dict[Path, str] = {}
+    for file in files:
+        place = Path(file).resolve()
+        if place in found:
+            warn(f"{file} is named twice and counts once")
+        found.setdefault(place, file)
+    return list(found.values())
 
 
 def say_what_strikes(recordings: Sequence[Recording]) -> None:
@@ -81,17 +94,12 @@ def say_what_strikes(recordings: Sequence[Recording]) -> None:
         for channel in (*recording.of_role("load"), *recording.sensors):
             share = 0.0 if channel.missing is None else float(channel.missing.mean())
             if share > MISSING_SHARE:
-                click.echo(
-                    f"warning: {recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}: they are"
-                    " left out",
-                    err=True,
-                )
+                warn(f"{recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}: they are left out")
             if channel.role == "load" and is_negative(channel):
                 low, high = channel.values.min(), channel.values.max()
-                click.echo(
-                    f"warning: the load of {recording.label} goes from {low:.4g} to {high:.4g} {channel.unit.symbol}:"
-                    " compression is positive here; if it is compression, turn it with --force '-COLUMN'",
-                    err=True,
+                warn(
+                    f"the load of {recording.label} goes from {low:.4g} to {high:.4g} {channel.unit.symbol}:"
+                    " compression is positive here; if it is compression, turn it with --force '-COLUMN'"
                 )
 
 
@@ -148,10 +156,9 @@ def warn_of_a_past(recordings: Sequence[Recording], calibration: Calibration) ->
     for recording in recordings:
         earlier = recording.metadata.get("continues")
         if earlier is not None and calibration.extended is not None:
-            click.echo(
-                f"warning: {recording.label} continues {earlier}: the filter begins as after a rest, without what"
-                " drift, set, softening and leak had done by then (join the two files to carry it over)",
-                err=True,
+            warn(
+                f"{recording.label} continues {earlier}: the filter begins as after a rest, without what"
+                " drift, set, softening and leak had done by then (join the two files to carry it over)"
             )
 
 
@@ -159,10 +166,9 @@ def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibrati
     """A warning on stderr for each recording that says it is of another unit, or whose load passes what was seen."""
     for recording in recordings:
         if recording.unit and calibration.unit and recording.unit != calibration.unit:
-            click.echo(
-                f"warning: {recording.label} is of unit {recording.unit}, the calibration of {calibration.unit}: its"
-                " forces mean nothing; give that unit's own calibration",
-                err=True,
+            warn(
+                f"{recording.label} is of unit {recording.unit}, the calibration of {calibration.unit}: its"
+                " forces mean nothing; give that unit's own calibration"
             )
     seen = calibration.load_range_n
     for recording in recordings:
@@ -171,10 +177,9 @@ def warn_of_another_unit(recordings: Sequence[Recording], calibration: Calibrati
             continue
         top_n = float(loads[0].si.max())
         if top_n > BEYOND * seen[1]:
-            click.echo(
-                f"warning: {recording.label} is loaded to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N:"
-                " the rest is extrapolated",
-                err=True,
+            warn(
+                f"{recording.label} is loaded to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N:"
+                " the rest is extrapolated"
             )
 
 
@@ -182,8 +187,7 @@ def warn_of_forces_beyond(label: str, force_n: Array, calibration: Calibration) 
     """A warning on stderr where the forces (n,) that a calibration gave pass the largest load that it has seen."""
     seen, top_n = calibration.load_range_n, float(force_n.max(initial=0.0))
     if seen is not None and top_n > BEYOND * seen[1]:
-        click.echo(
-            f"warning: {label} comes to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N: the rest is"
-            " extrapolated, or the calibration is another unit's",
-            err=True,
+        warn(
+            f"{label} comes to {top_n:.0f} N, the calibration has seen {seen[1]:.0f} N: the rest is"
+            " extrapolated, or the calibration is another unit's"
         )

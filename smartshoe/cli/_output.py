@@ -22,22 +22,27 @@ figures_option = click.option(
 )
 
 
-def require_writable(*files: str | None, folder: str | None = None, read: Iterable[str] = ()) -> None:
+def require_writable(
+    *files: str | None, json_path: str | None = None, folder: str | None = None, read: Iterable[str] = ()
+) -> None:
     """Refuse with `UsageError`, before anything is computed, what could not be written at the end, or should not be.
 
-    ``files`` are to be written (None: not asked for, ``-``: stdout), some of them perhaps in ``folder``, which is made
-    where it is missing. None of them may be one of those that are ``read``, which a result would replace, or another
-    result.
+    ``files`` and ``json_path`` are to be written (None: not asked for; of ``json_path`` alone ``-`` is stdout), some
+    of them perhaps in ``folder``, which is made where it is missing. None of them may be one of those that are
+    ``read``, which a result would replace, or another result.
     """
     from smartshoe.errors import UsageError
 
+    _refuse_no_name(*files, None if json_path == "-" else json_path)
+    if folder in ("", "-"):
+        raise UsageError(f"--out is {folder!r}, which names no folder: give the name of one (. for this one)")
     made = None if folder is None else Path(folder).absolute()
     if made is not None:
         there = next(place for place in (made, *made.parents) if place.exists())
         if not there.is_dir():
             raise UsageError(f"{folder} cannot be made a folder, {there} is a file: choose another --out")
     taken = {Path(path).resolve(): "is read, and the result would replace it" for path in read}
-    for path in files:
+    for path in (*files, json_path):
         if path is None or path == "-":
             continue
         parent = Path(path).absolute().parent
@@ -49,6 +54,18 @@ def require_writable(*files: str | None, folder: str | None = None, read: Iterab
         if place in taken and (place.is_file() or not place.exists()):  # a device keeps nothing
             raise UsageError(f"{path} {taken[place]}: give another name to write to")
         taken[place] = "is to hold two results"
+
+
+def _refuse_no_name(*files: str | None) -> None:
+    """Raise `UsageError` for an empty name, as of a script's variable that was never set, and for ``-``."""
+    from smartshoe.errors import UsageError
+
+    if "" in files:
+        raise UsageError("the name of a file to write is empty: give one")
+    if "-" in files:
+        raise UsageError(
+            "- is standard output, which only --json writes to: give the name of a file (./- for one of that name)"
+        )
 
 
 def emit_json(result: dict[str, Any], path: str | None) -> bool:
@@ -75,10 +92,21 @@ Talk = Literal["quiet", "usual", "verbose"]
 talk: ContextVar[Talk] = ContextVar("talk", default="usual")
 
 
+def printable(text: str) -> str:
+    """``text`` as one line without what a terminal would obey: names and cells of files stand in messages."""
+    line = " ".join(text.split())
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
+
+
 def note(text: str) -> None:
     """What a person may want to know, on stderr; nothing with ``--quiet``."""
     if talk.get() != "quiet":
-        click.echo(f"note: {text}", err=True)
+        click.echo(f"note: {printable(text)}", err=True)
+
+
+def warn(text: str) -> None:
+    """What a person should know before using the result, on stderr."""
+    click.echo(f"warning: {printable(text)}", err=True)
 
 
 def _nothing(_: object) -> None:

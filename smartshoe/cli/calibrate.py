@@ -69,7 +69,7 @@ def command(
     from smartshoe.cli._output import emit_json, note, progress, require_writable
     from smartshoe.runs.session import analyse, conduct, publish
 
-    require_writable(json_path, folder=out_folder)
+    require_writable(json_path=json_path, folder=out_folder)
     if replay is not None:
         folder = _replayed(replay, resume, options)
         target = Path(out_folder) if out_folder is not None else None
@@ -98,6 +98,7 @@ def command(
             written = publish(result, target) if target is not None else {}
     if emit_json(whole, json_path):
         return
+    from smartshoe.devices.joining import clock_text
     from smartshoe.report.tables import print_identification, print_validation
 
     print_identification(whole["identification"])
@@ -105,8 +106,8 @@ def command(
     for experiment in whole["experiments"]:
         join = experiment["join"]
         click.echo(
-            f"{experiment['name']}: machine's clock ahead of the shoe's by {join['delay_s']['value']:.4f} ±"
-            f" {join['delay_s']['sd']:.4f} s, {join['rate_ppm']['value']:.1f} ± {join['rate_ppm']['sd']:.1f} ppm fast"
+            f"{experiment['name']}: beside the shoe's the machine's clock is "
+            + clock_text(*(join[key][of] for key in ("delay_s", "rate_ppm") for of in ("value", "sd")))
         )
     if result.diagnosis is not None:
         click.echo(f"diagnosis: {result.diagnosis.says}")

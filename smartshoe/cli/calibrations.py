@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from smartshoe.cli._output import figures_option
+from smartshoe.cli._output import figures_option, warn
 
 if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
@@ -40,7 +40,7 @@ def _opened(folder: str | None) -> CalibrationStore:
 
 def _show_faults(store: CalibrationStore) -> None:
     for fault in store.faults:
-        click.echo(f"warning: {fault}", err=True)
+        warn(fault)
 
 
 def _today() -> str:
@@ -70,9 +70,10 @@ def command() -> None:
 def list_command(unit: str | None, date: str | None, store_folder: str | None, json_path: str | None) -> None:
     """Units, their calibrations, where they sit, what has expired."""
     from smartshoe.calibration.store.dates import days_between, iso, moment
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.report.tables import new_console, table_of
 
+    require_writable(json_path=json_path)
     store, at = _opened(store_folder), moment(date or _today(), "--date")
     result = store.to_dict(at, unit)
     _show_faults(store)
@@ -122,7 +123,7 @@ def show_command(
     from smartshoe.report.numbers import with_sd
     from smartshoe.report.tables import new_console, table_of
 
-    require_writable(out_path, json_path)
+    require_writable(out_path, json_path=json_path, read=[calibration] if Path(calibration).is_file() else [])
     store = _opened(store_folder)
     name, says, found = _one(store, calibration, date, refuse_expired)
     _show_faults(store)
@@ -159,8 +160,9 @@ def compare_command(
 ) -> None:
     """Two calibrations: what differs, by how many sd, and how many newtons it means."""
     from smartshoe.calibration.store.compare import RATES_N_PER_S, compare
-    from smartshoe.cli._output import emit_json
+    from smartshoe.cli._output import emit_json, require_writable
 
+    require_writable(json_path=json_path)
     store = _opened(store_folder)
     (one, _, ours), (other, _, theirs) = (_one(store, name, None, False) for name in (first, second))
     result = compare(ours, theirs, rates or RATES_N_PER_S).to_dict()
@@ -184,7 +186,7 @@ def drift_command(
     from smartshoe.calibration.store.drift import drift
     from smartshoe.cli._output import emit_json, require_writable
 
-    require_writable(json_path, folder=out_folder)
+    require_writable(json_path=json_path, folder=out_folder)
     store = _opened(store_folder)
     found = drift(store, _serial(store, unit, _today()))
     _show_faults(store)
@@ -224,7 +226,7 @@ def add_command(
     from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.errors import UsageError
 
-    require_writable(json_path)
+    require_writable(json_path=json_path, read=files)
     if len(files) > 1 and (serial_number or position):
         raise UsageError(
             f"--serial-number and --position name one unit, {len(files)} files are given: add them one by one"
@@ -259,7 +261,7 @@ def swap_command(position: str, serial_number: str, date: str | None, note: str,
     event = store.place(serial_number, position, date or _today(), note)
     click.echo(f"unit {serial_number}: {event.says}")
     if not store.history(serial_number):
-        click.echo(f"warning: unit {serial_number} has no calibration in {store} yet", err=True)
+        warn(f"unit {serial_number} has no calibration in {store} yet")
 
 
 @command.command("repair", epilog="Example: smartshoe calibrations repair S0123 --date 2026-03-31 --note 'new tube'")

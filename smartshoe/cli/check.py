@@ -49,7 +49,7 @@ def command(
     from smartshoe.cli._output import emit_json, progress, require_writable
     from smartshoe.errors import RefusedError
 
-    require_writable(json_path, read=(*files, *calibration_paths))
+    require_writable(json_path=json_path, read=(*files, *calibration_paths))
     with progress(2) as step:
         step("reading")
         from smartshoe.calibration.folder import load_calibrations

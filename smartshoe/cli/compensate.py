@@ -27,7 +27,7 @@ def command(
     """Force from the pressure in FILE, by a calibration."""
     from smartshoe.cli._output import note, progress, require_writable
 
-    require_writable(out_path)
+    require_writable(out_path, read=[file, calibration_path])
     with progress(2 + (out_path is not None)) as step:
         step("reading")
         from smartshoe.calibration import Calibration, compensated

@@ -30,7 +30,7 @@ def command(
     from smartshoe.display import first_names
     from smartshoe.files.logs import write
 
-    require_writable(target)
+    require_writable(target, read=[source])
     with progress(2) as step:
         step("reading")
         (recording,) = read_all([source], time=time, force=force, sensors=sensors, unit=unit)

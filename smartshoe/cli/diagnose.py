@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from smartshoe.diagnosis import Diagnosis
     from smartshoe.recording import Recording
 
+MOST_NOTES = 10
 NOT_FITTED = "every third load cycle, or part of the time where there are few cycles, not fitted"
 # Steps that usually follow one, without the report. The fits between the first two go on until one adds nothing.
 _USUALLY_LEFT = {"examining the data": 6, "fitting the baseline": 5, "weighing alternatives": 1}
@@ -75,11 +77,11 @@ def command(
 ) -> None:
     """What the simulation of a unit gets wrong, why, and what mending it gains (one FILE an experiment)."""
     from smartshoe.cli._output import emit_json, note, progress, require_writable
-    from smartshoe.errors import NotIdentifiableError, SmartShoeError, UsageError
-    from smartshoe.files.atomic import make_folder
+    from smartshoe.errors import NotIdentifiableError, UsageError
+    from smartshoe.files.atomic import results_folder
 
     read = (*files, *held_out, *([] if design_path is None else [design_path]))
-    require_writable(json_path, calibration_path, folder=out_folder, read=read)
+    require_writable(calibration_path, json_path=json_path, folder=out_folder, read=read)
     if design_path is not None:
         if files or held_out:
             raise UsageError("--design asks about protocols, before anything is measured: name no FILE beside it")
@@ -91,28 +93,20 @@ def command(
     if figures is not None and out_folder is None:
         raise UsageError("--figures writes into --out DIR: give --out as well")
     _check(files, held_out)
-    with progress() as step:
+    with progress() as step, ExitStack() as stack:
         step("reading")
         from smartshoe.diagnosis import diagnose
 
         recordings = read_all(files, unit=unit, **columns)
         others = read_all(held_out, unit=unit, **columns) if held_out else []
-        folder = None if out_folder is None else Path(out_folder)
-        is_new = folder is not None and not folder.exists()
-        if folder is not None:
-            make_folder(folder)
+        folder = None if out_folder is None else stack.enter_context(results_folder(out_folder))
         step("examining the data")
-        try:
-            found = diagnose(
-                recordings,
-                hold_out=others,
-                material=material / 100.0,
-                progress=with_what_is_left(step, folder is not None),
-            )
-        except SmartShoeError:
-            if folder is not None and is_new:
-                folder.rmdir()  # nothing is left behind of what was not done
-            raise
+        found = diagnose(
+            recordings,
+            hold_out=others,
+            material=material / 100.0,
+            progress=with_what_is_left(step, folder is not None),
+        )
         fitted, judges = _used(found, recordings, others)
         title = _title(fitted, unit)
         written: dict[str, Path] = {}
@@ -128,8 +122,10 @@ def command(
         _save_calibration(calibration_path, found, fitted, unit)
     taken = emit_json(found.to_dict(), json_path)
     if refused:
-        for said in found.limits[1:]:
+        for said in found.limits[1 : 1 + MOST_NOTES]:
             note(said)
+        if (more := len(found.limits) - 1 - MOST_NOTES) > 0:
+            note(f"and {more} more, which --json has under limits")
         raise NotIdentifiableError(found.limits[0] if found.limits else found.says)
     if taken:
         return

@@ -34,7 +34,9 @@ def command(
     """Write the compensators of calibrations (files, or folders of them) for firmware or other tools."""
     from smartshoe.calibration.export import export_shoe, export_twins, write_files
     from smartshoe.calibration.folder import load_calibrations
+    from smartshoe.cli._output import require_writable
 
+    require_writable(folder=folder)
     calibrations = load_calibrations(calibration_paths)
     if twin and target != "fmu":
         raise click.UsageError(f"--twin is for --to fmu, not for {target}: leave it away")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -88,24 +89,23 @@ def command(
     sensors: tuple[str, ...],
 ) -> None:
     """Events, phases, strides and forces of a trial (FILE: both shoes; or one FILE for each shoe)."""
-    from smartshoe.cli._output import emit_json, note, progress, require_writable, show_notes
+    from smartshoe.cli._output import emit_json, note, progress, require_writable, show_notes, warn
 
     with progress() as step:
         step("starting")
         from smartshoe.cli._gait_stream import gait_of_stream, is_streamed, refuse_with
         from smartshoe.cli._inputs import say_what_strikes, units_of, with_units
-        from smartshoe.files.atomic import make_folder
+        from smartshoe.files.atomic import results_folder
         from smartshoe.files.logs import read
         from smartshoe.gait import Coverage, analyse
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
-    require_writable(json_path, c3d_path, folder=out_folder, read=(*files, *calibration_paths))
+    require_writable(c3d_path, json_path=json_path, folder=out_folder, read=(*files, *calibration_paths))
     if body_weight_n is not None and 0.0 < body_weight_n < LEAST_WEIGHT_N:
-        click.echo(
-            f"warning: a body weight of {body_weight_n:g} N is {body_weight_n / 9.80665:.1f} kg: if it is in kg, give"
-            f" --body-weight {9.80665 * body_weight_n:.0f}",
-            err=True,
+        warn(
+            f"a body weight of {body_weight_n:g} N is {body_weight_n / 9.80665:.1f} kg: if it is in kg, give"
+            f" --body-weight {9.80665 * body_weight_n:.0f}"
         )
     streamed = is_streamed(files, stream)
     if streamed:
@@ -136,12 +136,13 @@ def command(
         covered = Coverage.midfoot(coverage)
     else:
         covered = Coverage(coverage) if course_path is None else Coverage.load(course_path)
-    folder = make_folder(out_folder) if out_folder is not None else None
-    if streamed:
-        gait_of_stream(files, calibrations, body_weight_n, covered, time, json_path, folder, estimator)
-        return
     written: dict[str, Path] = {}
-    with progress(1 + (folder is not None)) as step:
+    with ExitStack() as stack:
+        folder = stack.enter_context(results_folder(out_folder)) if out_folder is not None else None
+        if streamed:
+            gait_of_stream(files, calibrations, body_weight_n, covered, time, json_path, folder, estimator)
+            return
+        step = stack.enter_context(progress(1 + (folder is not None)))
         step("events, strides, forces")
         wanted = None
         if reference is not None:

@@ -89,7 +89,7 @@ def command(
     from smartshoe.cli._output import emit_json, progress, require_writable
     from smartshoe.report.tables import print_identification
 
-    require_writable(json_path, calibration_path, read=files)
+    require_writable(calibration_path, json_path=json_path, read=files)
     options: dict[str, Any] = {
         "offset": "estimate" if offset is None else _number("--offset", offset),
         "delay": "estimate" if delay is None else _number("--delay", delay),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from smartshoe.cli._output import require_writable
 from smartshoe.cli._ranges import FiniteRange
 from smartshoe.errors import UsageError
 
@@ -41,6 +42,7 @@ def command(
         raise UsageError(f"{missing} is missing: give --host and --token both, or neither for this computer only")
     if token == "" or host == "":
         raise UsageError("--host or --token is empty: give both a word")
+    require_writable(record)
     try:
         from smartshoe.live.server import LiveServer
     except ImportError as error:

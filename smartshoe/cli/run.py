@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import click
 
 from smartshoe.cli._output import figures_option
@@ -33,13 +35,13 @@ def command(
 
     if figures is not None and out_folder is None:
         raise click.UsageError("--figures writes into --out DIR: give --out as well")
-    require_writable(json_path, folder=out_folder, read=[scenario])
-    with progress() as step:
+    require_writable(json_path=json_path, folder=out_folder, read=[scenario])
+    with progress() as step, ExitStack() as stack:
         step("reading the scenario")
         from smartshoe.kernels import warm_up
 
         warm_up.begin()
-        from smartshoe.files.atomic import json_text, make_folder
+        from smartshoe.files.atomic import json_text, results_folder
         from smartshoe.report.tables import print_summary
         from smartshoe.runs.scenario import load, parse_assignments, run, steps_of
         from smartshoe.runs.scenario.publish import judged, publish
@@ -47,7 +49,7 @@ def command(
         loaded, source = load(scenario, parse_assignments(assignments))
         if seed is not None:
             loaded = loaded.model_copy(update={"seed": seed})
-        folder = make_folder(out_folder) if out_folder is not None else None
+        folder = stack.enter_context(results_folder(out_folder)) if out_folder is not None else None
         step.of(steps_of(loaded) + (folder is not None))
         result = run(loaded, source, step)
         whole = result.to_dict()

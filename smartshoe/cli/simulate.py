@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import click
 
 
@@ -14,18 +16,19 @@ def command(scenario: str, out_folder: str, seed: int | None) -> None:
 
     Of a simulated trial the true loads are written too, as NAME_truth.csv.
     """
-    from smartshoe.cli._output import progress
+    from smartshoe.cli._output import progress, require_writable
 
-    with progress() as step:
+    require_writable(folder=out_folder, read=[scenario])
+    with progress() as step, ExitStack() as stack:
         step("reading the scenario")
-        from smartshoe.files.atomic import make_folder
+        from smartshoe.files.atomic import results_folder
         from smartshoe.files.logs import write
         from smartshoe.runs.scenario import load, simulate, simulate_trial
 
         loaded, source = load(scenario)
         if seed is not None:
             loaded = loaded.model_copy(update={"seed": seed})
-        folder = make_folder(out_folder)
+        folder = stack.enter_context(results_folder(out_folder))
         pressed = sum(len(unit.recordings) or len(loaded.protocol) for unit in loaded.unit)
         step.of(2 * pressed + 2 * (loaded.trial is not None))  # made and written
         made = simulate(loaded, source, step)

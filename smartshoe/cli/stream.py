@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from smartshoe.cli._output import note
+from smartshoe.cli._output import note, require_writable
 from smartshoe.cli._ranges import FiniteRange
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def command(url: str, calibrations: tuple[str, ...], duration_s: float | None, o
     from smartshoe.errors import UsageError
     from smartshoe.runs.session.streaming import StreamedForces
 
+    require_writable(out)
     loaded = load_calibrations(calibrations)
     if out is not None and Path(out).exists():
         raise UsageError(f"{out} is there already and is not overwritten: choose another name for --out")

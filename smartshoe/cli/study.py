@@ -17,7 +17,7 @@ def command(study_file: str, out_folder: str, jobs: int | None, c3d: bool, json_
     from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.runs.studies import study
 
-    require_writable(json_path, folder=out_folder, read=[study_file])
+    require_writable(json_path=json_path, folder=out_folder, read=[study_file])
     with counting("trials") as progress:
         result = study(study_file, out_folder, jobs=jobs, c3d=c3d, progress=progress)
     if emit_json(result.to_dict(), json_path):

@@ -34,7 +34,7 @@ def command(
     from smartshoe.cli._output import emit_json, require_writable
     from smartshoe.runs.sweeps import sweep
 
-    require_writable(json_path, folder=out_folder, read=[scenario])
+    require_writable(json_path=json_path, folder=out_folder, read=[scenario])
     with counting("cases") as progress:
         result = sweep(scenario, out_folder, jobs=jobs, scheduler=scheduler, shard=shard, progress=progress)
     if emit_json(result.to_dict(), json_path):

@@ -27,7 +27,7 @@ def command(
     """Judge a calibration on recordings: errors raw, after the best static gain, and compensated, per rate."""
     from smartshoe.cli._output import emit_json, progress, require_writable
 
-    require_writable(json_path, read=(*files, calibration_path))
+    require_writable(json_path=json_path, read=(*files, calibration_path))
     with progress(2) as step:
         step("reading")
         from smartshoe.calibration import Calibration

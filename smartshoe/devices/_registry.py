@@ -20,6 +20,8 @@ GROUP = "smartshoe.devices"
 
 def split_url(url: str) -> tuple[str, str, dict[str, str]]:
     """``sim:instron?unit=left_toe`` as scheme, target and options; raises `UsageError` where there is no scheme."""
+    if not isinstance(url, str):
+        raise UsageError(f"a device's address is of type {type(url).__name__}: give text like 'sim:instron'")
     scheme, colon, rest = url.partition(":")
     if not colon or not scheme:
         raise UsageError(f"device {url!r} has no scheme: write it like sim:instron or log:Specimen_RawData_1.csv")

@@ -28,6 +28,14 @@ LONGEST_BRIDGED_STEPS = 3.5
 Ticks = Literal["logger", "machine"]
 
 
+def clock_text(delay_s: float, delay_sd_s: float, rate_ppm: float, rate_sd_ppm: float) -> str:
+    """An offset and a rate of one clock beside another, in words."""
+    return (
+        f"{abs(delay_s):.4f} ± {delay_sd_s:.4f} s {'behind' if delay_s < 0 else 'ahead'},"
+        f" {abs(rate_ppm):.1f} ± {rate_sd_ppm:.1f} ppm {'slow' if rate_ppm < 0 else 'fast'}"
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Alignment:
     """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle); sd of both; correlation.
@@ -43,6 +51,11 @@ class Alignment:
     correlation: float
     residual: Array = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
     by_corners: bool = False
+
+    @property
+    def says(self) -> str:
+        """How the machine's clock stands beside the logger's, in words: numbers below 0 are behind and slow."""
+        return clock_text(self.delay_s, self.delay_sd_s, 1e6 * self.rate, 1e6 * self.rate_sd)
 
     def machine_time(self, logger_time_s: Array) -> Array:
         """Logger time (n,) on the machine's clock."""
@@ -187,10 +200,7 @@ def join_with_clocks(
         name = channel.name if channel.name not in channels else f"logger_{channel.name}"
         role: Role = "auxiliary" if channel.role == "load" else channel.role
         channels[name] = replace(channel, name=name, role=role)
-    note = (
-        f"joined with {machine_log.label} by {copy.name}: machine clock ahead by {found.delay_s:.4f} ±"
-        f" {found.delay_sd_s:.4f} s, rate {1e6 * found.rate:.1f} ± {1e6 * found.rate_sd:.1f} ppm{caveat}"
-    )
+    note = f"joined with {machine_log.label} by {copy.name}: its machine's clock is {found.says}{caveat}"
     joined = Recording(
         time_s,
         channels,

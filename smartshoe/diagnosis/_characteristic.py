@@ -40,9 +40,9 @@ def branches_of(recording: Recording, thresholds: Thresholds) -> Branches | None
     load, sensor = recording.load, recording.sensor
     present = load.present & sensor.present
     x, y = load.values[present], sensor.values[present]
-    if x.size < thresholds.least_samples or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return None
     width = max(1, round(0.5 * thresholds.echo_s / recording.sample_time_s))
+    if x.size < max(thresholds.least_samples, width) or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return None
     rate = np.gradient(np.convolve(x, np.ones(width), "same"))  # to one scale: it is held against its own largest
     low, high = (float(value) for value in np.percentile(x, [1, 99]))
     still = thresholds.standing * float(np.quantile(np.abs(rate), 1.0 - thresholds.faulty_share))
@@ -102,16 +102,22 @@ def characteristic_of(recording: Recording, thresholds: Thresholds) -> str | Non
     half_span = 0.5 * float(place[-1] - place[0])
     u = (place - 0.5 * (place[0] + place[-1])) / half_span
     unit, of_load = sensor.unit.symbol, recording.load.unit.symbol
-    rises = f"over this load the {sensor.name} rises by"
+    course = f"over this load the {sensor.name}"
     inner, lower, upper = np.abs(u) < 0.25, u < -0.5, u > 0.5
     if min(inner.sum(), lower.sum(), upper.sum()) < 3:  # of two medians it is a difference, and no line
         whole = _slope(place, found.mean, np.full(place.size, True))
-        shape = f"{rises} {whole:.3g} {unit}/{of_load} on the whole: too little was recorded to tell its shape"
+        way = "falls" if whole < 0.0 else "rises"
+        shape = (
+            f"{course} {way} by {abs(whole):.3g} {unit}/{of_load} on the whole: too little was recorded to tell its"
+            " shape"
+        )
     else:
         middle = _slope(place, found.mean, inner)
         ends = 0.5 * (_slope(place, found.mean, upper) + _slope(place, found.mean, lower))
+        sign = -1.0 if middle < 0.0 and ends < 0.0 else 1.0
         shape = (
-            f"{rises} {middle:.3g} {unit}/{of_load} about the middle and by {ends:.3g} {unit}/{of_load} at the ends:"
+            f"{course} {'falls' if sign < 0 else 'rises'} by {sign * middle:.3g} {unit}/{of_load} about the middle and"
+            f" by {sign * ends:.3g} {unit}/{of_load} at the ends:"
             f" {_shape(middle, ends, thresholds)}"
         )
     apart = 0.5 * float(np.median(np.abs(found.ups - found.downs)[np.abs(u) < 0.5]))

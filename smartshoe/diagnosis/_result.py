@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from smartshoe.arrays import Array, Index, Mask
+from smartshoe.arrays import Array, Index, Mask, require_positive
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import NotIdentifiableError
@@ -221,10 +221,11 @@ class Diagnosis(Summarised):
         """The extended model as a calibration, for `compensate`, `export` and a twin.
 
         With a ``force_model`` that one compensates, and the extended model is the twin.
-        Raises `NotIdentifiableError` where the diagnosis was refused.
+        Raises `NotIdentifiableError` where the diagnosis was refused, `UsageError` for a rate that is not positive.
         """
         from smartshoe.calibration import extended_calibration
 
+        sample_rate_hz = require_positive(sample_rate_hz, "sample_rate_hz")
         if self.model is None:
             raise NotIdentifiableError(f"there is no model to calibrate by: {self.says}")
         made = extended_calibration(

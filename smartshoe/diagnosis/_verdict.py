@@ -152,6 +152,8 @@ def sentence_of(
         return f"{good}{left}, and {NO_CAUSE if withheld else 'no effect of the catalogue accounts for it'}"
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
+    elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong
+        said = f"{good}, each recording's own zero and gain allowed for; {named} is found in these"
     elif worse:
         said = f"{good}; with {named} it is worse there, good to {by_all}"
     else:

@@ -170,6 +170,19 @@ def json_text(result: Mapping[str, Any]) -> str:
     return json.dumps(result, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
+@contextmanager
+def results_folder(path: Path | str) -> Iterator[Path]:
+    """Yield `make_folder` of ``path``; where the block ends with an error, folders it made and left empty are gone."""
+    made = [place for place in (Path(path), *Path(path).parents) if not place.exists()]
+    try:
+        yield make_folder(path)
+    except BaseException:
+        for place in made:
+            with suppress(OSError):  # what holds something stays
+                place.rmdir()
+        raise
+
+
 def make_folder(path: Path | str) -> Path:
     """Create the folder ``path`` (and parents) where it is missing, checking that it can be written to.
 

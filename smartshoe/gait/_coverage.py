@@ -20,6 +20,7 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.errors import InputError, UsageError
 from smartshoe.files.atomic import write_text
+from smartshoe.files.gate import read_text
 from smartshoe.gait._contact import Contacts
 from smartshoe.gait._edges import WALKING_STANCE_S  # a runner loads the midfoot otherwise
 
@@ -105,10 +106,7 @@ class Coverage:
     @classmethod
     def load(cls, path: Path | str) -> Coverage:
         """Read a course that `save` wrote; raises `InputError` naming the file and the line."""
-        try:
-            lines = Path(path).read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path} cannot be read ({error}): give a course of coverage") from error
+        lines = read_text(Path(path), "a course of coverage").splitlines()
         said = dict(line[1:].split(":", 1) for line in lines if line.startswith("#") and ":" in line)
         said = {name.strip(): value for name, value in said.items()}
         rows = list(csv.reader(line for line in lines if not line.startswith("#")))

@@ -46,8 +46,8 @@ def rise_places(loads: Array, levels: Array, top: Array) -> Array:
     above a level from its first sample on.
     """
     rows, width = loads.shape
-    if rows == 0:
-        return np.full((0, levels.shape[1]), np.nan)
+    if loads.size == 0:  # no row, or a rate so low that no sample lies by a contact
+        return np.full(levels.shape, np.nan)
     above = loads >= top[:, None]
     reached = above.any(axis=1)
     at_top = np.where(reached, above.argmax(axis=1), width - 1)

@@ -231,7 +231,9 @@ class Identification(Summarised):
 
     def discrete(self, sample_rate_hz: float | None = None) -> tuple[Array, Array]:
         """Numerator and denominator of the bilinear filter, by default at the data's rate."""
-        return discretise(*self.coefficients, sample_rate_hz or self.sample_rate_hz, "bilinear")
+        return discretise(
+            *self.coefficients, self.sample_rate_hz if sample_rate_hz is None else sample_rate_hz, "bilinear"
+        )
 
     def compensator(self, sample_rate_hz: float = 100.0) -> Compensator:
         """The filter that turns readings (in ``reading_unit``) into force in N."""

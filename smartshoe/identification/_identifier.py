@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Literal, get_args
 
 import numpy as np
@@ -176,7 +177,7 @@ def _fixed(name: str, value: float | str) -> float | None:
     """None where ``value`` is "estimate", else the number."""
     if value == "estimate":
         return None
-    if isinstance(value, str) or not np.isfinite(value):
+    if not isinstance(value, Real) or not np.isfinite(value):
         raise UsageError(f"{name} is {value!r}: give a finite number or 'estimate'")
     return float(value)
 

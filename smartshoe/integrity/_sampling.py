@@ -14,11 +14,18 @@ from smartshoe.signals.noise import robust_sd
 
 
 def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
-    """Kind ``short_recording``: fatal, since so little shows nothing."""
-    if len(recording) >= thresholds.least_samples:
-        return
+    """Kind ``short_recording``: fatal, since so little shows nothing, nor what is over before a reading answers."""
     held = f"{len(recording)} samples in {recording.duration_s:.3g} s" if len(recording) > 1 else "one sample"
-    says = f"the recording holds {held}: give at least {thresholds.least_samples} samples"
+    if len(recording) < thresholds.least_samples:
+        mend = f"give at least {thresholds.least_samples} samples"
+    elif recording.duration_s < thresholds.echo_s:
+        mend = (
+            f"a reading may take {thresholds.echo_s:g} s to answer its load, so give a longer one, or check the unit of"
+            " its time"
+        )
+    else:
+        return
+    says = f"the recording holds {held}: {mend}"
     yield Finding("short_recording", np.ones(len(recording), dtype=bool), says, "fatal", True, says)
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, require_positive
 from smartshoe.errors import UsageError
 from smartshoe.models.first_order import hold_coefficients
 
@@ -21,8 +21,7 @@ def discretise(
     ``bilinear`` is what the paper runs at 100 Hz (Chinimilli 2016, Section V); ``zoh`` and ``foh`` are exact for
     stairs and for straight lines between samples. ``a1`` in 1/s, above 0.
     """
-    if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0):
-        raise UsageError(f"sample_rate_hz is {sample_rate_hz:g}: give a positive number")
+    sample_rate_hz = require_positive(sample_rate_hz, "sample_rate_hz")
     if not (a1 > 0 and np.isfinite([a1, b0, b1]).all()):
         raise UsageError(f"a1 = {a1:g}, b0 = {b0:g}, b1 = {b1:g} is no stable filter: a1 must be above 0, all finite")
     if method == "bilinear":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, require_positive
 from smartshoe.devices import Bladder
 from smartshoe.errors import UsageError
 from smartshoe.models.effects.effect import Conditions
@@ -61,8 +61,7 @@ class TwinBladder(Bladder):
         if not np.isfinite(load).all():
             at = int(np.argmin(np.isfinite(load)))
             raise UsageError(f"load sample {at + 1} of {load.size} is not finite: fill gaps before pressing")
-        if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0):
-            raise UsageError(f"sample_rate_hz is {sample_rate_hz:g}: give a positive number")
+        sample_rate_hz = require_positive(sample_rate_hz, "sample_rate_hz")
         if self._rate_hz is not None and sample_rate_hz != self._rate_hz:
             raise UsageError(
                 f"the twin was pressed at {self._rate_hz:g} Hz since its reset, now at {sample_rate_hz:g} Hz: keep to"

@@ -185,6 +185,11 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_read(
         "run t.csv --json t.csv",
         "sweep t.csv --out new --json t.csv",
         "study t.csv --out new --json t.csv",
+        "compensate t.csv --calibration c.json --out t.csv",
+        "compensate other.csv --calibration t.csv --out ./t.csv",
+        "convert t.csv t.csv",
+        "convert t.csv link.csv",
+        "calibrations add t.csv --json t.csv",
     ],
 )
 def test_a_result_replaces_neither_what_is_read_nor_another_result(
@@ -205,9 +210,133 @@ def test_a_result_replaces_neither_what_is_read_nor_another_result(
 def test_a_result_may_lie_in_the_folder_that_is_made(table: Path, tmp_path: Path) -> None:
     from smartshoe.cli._output import require_writable
 
-    require_writable(str(tmp_path / "new" / "x.json"), "-", None, folder=str(tmp_path / "new"))
+    require_writable(str(tmp_path / "new" / "x.json"), None, json_path="-", folder=str(tmp_path / "new"))
     require_writable("x.json", "/dev/null", folder=str(table.parent / "a" / "b"))
-    require_writable("/dev/null", "/dev/null", "-", "-", read=["/dev/null", "-"])
+    require_writable("/dev/null", "/dev/null", json_path="-", read=["/dev/null", "-"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        *(
+            (words, "- is standard output, which only --json writes to: give the name of a file")
+            for words in (
+                "identify t.csv --calibration -",
+                "diagnose t.csv --json - --calibration -",
+                "compensate t.csv --calibration c.json --out -",
+                "convert t.csv -",
+                "gait t.csv --c3d -",
+                "stream --shoe sim:stand --out -",
+                "live --shoe sim:stand --record -",
+                "calibrations show c.json --out -",
+            )
+        ),
+        *(
+            (words, "--out is '-', which names no folder: give the name of one")
+            for words in (
+                "run s.toml --out -",
+                "simulate s.toml --out -",
+                "sweep s.toml --out -",
+                "study s.toml --out -",
+                "gait t.csv --out -",
+                "diagnose t.csv --out -",
+                "export c.json --to c --out -",
+                "calibrate --out -",
+            )
+        ),
+        ("identify t.csv --json=", "the name of a file to write is empty: give one"),
+        ("compensate t.csv --calibration c.json --out=", "the name of a file to write is empty: give one"),
+        ("run s.toml --out=", "--out is '', which names no folder"),
+    ],
+)
+def test_a_dash_or_nothing_names_no_file_and_no_folder(
+    words: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As of a script whose variable was never set, or that takes - for standard output everywhere."""
+    monkeypatch.chdir(tmp_path)
+    assert run_command(words.split()) == 2
+    assert said in capsys.readouterr().err.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ("gait none.csv --out a/new", 3),
+        ("gait table.csv --out a/new", 3),
+        ("gait empty.csv --stream --out a/new", 3),
+        ("diagnose none.csv --out a/new", 3),
+        ("diagnose left.csv right.csv --out a/new", 2),
+        ("run faulty.toml --out a/new", 3),
+        ("simulate faulty.toml --out a/new", 3),
+        ("study study.toml --out a/new --c3d", 5),
+    ],
+)
+def test_a_failed_command_leaves_no_folder(
+    words: str, status: int, table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """Each of them has read a part of its input before it fails."""
+    monkeypatch.chdir(tmp_path)
+    table.rename("table.csv")
+    (tmp_path / "empty.csv").touch()
+    for unit in ("left", "right"):
+        (tmp_path / f"{unit}.csv").write_text(f"# unit: {unit}_toe\n{(tmp_path / 'table.csv').read_text()}")
+    (tmp_path / "faulty.toml").write_text(
+        '[[unit]]\nname = "left_toe"\nrecordings = ["table.csv", "none.csv"]\n[identify]\nuse = ["table"]\n'
+    )
+    (tmp_path / "study.toml").write_text('[[trial]]\nfile = "none.csv"\nsubject = "Anna"\ncondition = "shod"\n')
+    before = sorted(tmp_path.iterdir())
+    assert run_command(words.split()) == status
+    assert capsys.readouterr().err.splitlines()[-1].startswith("error: ")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_recording_that_is_named_twice_counts_once(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(["identify", str(table), "--json", "-"]) == 0
+    once = capsys.readouterr().out
+    again = str(table.parent / "." / ".." / table.parent.name / table.name)
+    assert run_command(["identify", str(table), again, "--json", "-"]) == 0
+    told = capsys.readouterr()
+    assert told.out == once
+    assert told.err == f"warning: {again} is named twice and counts once\n"
+
+
+def test_a_warning_is_one_line_whatever_a_file_is_called(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    negated = tmp_path / "line one\nline two\x1b[31m.csv"
+    negated.write_text(HEADER + "".join(f"{k / 10},{-abs(k % 40 - 20)},{k % 40}\n" for k in range(400)))
+    assert run_command(["convert", str(negated), str(tmp_path / "out.csv")]) == 0
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert r"line one line two\x1b[31m.csv goes from" in said
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["0,1,2", "1,1,3", "2,1,4", "3,1,5"], "t.csv: the load never moves, so that nothing can be judged by it"),
+        (["0,1,2", "1,2,2", "2,3,2"], "t.csv: the reading never moves, so that nothing can be judged by it"),
+        (["0,1,2", "1,2,3"], "t.csv holds 2 samples with both load and reading"),
+    ],
+)
+def test_what_judges_nothing_is_refused(
+    rows: list[str], said: str, table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    calibration = str(tmp_path / "c.json")
+    assert run_command(["identify", str(table), "--calibration", calibration]) == 0
+    (tmp_path / "t.csv").write_text(HEADER + "\n".join(rows))
+    assert run_command(["validate", str(tmp_path / "t.csv"), "--calibration", calibration]) == 3
+    assert said in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_an_editors_mark_before_a_file_is_no_part_of_it(table: Path, tmp_path: Path) -> None:
+    """Windows' Notepad writes it before UTF-8."""
+    calibration, scenario = tmp_path / "c.json", tmp_path / "s.toml"
+    assert run_command(["identify", str(table), "--calibration", str(calibration)]) == 0
+    calibration.write_bytes(b"\xef\xbb\xbf" + calibration.read_bytes())
+    assert run_command(["validate", str(table), "--calibration", str(calibration)]) == 0
+    scenario.write_text('\ufeff[machine]\nbackend = "sim:instron"\n[protocol.dynamic]\n[[unit]]\nname = "toe"\n')
+    assert run_command(["diagnose", "--design", str(scenario), "--json", str(tmp_path / "d.json")]) == 0
 
 
 def test_places_that_cannot_be_written_end_in_status_2(

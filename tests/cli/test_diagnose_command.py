@@ -252,3 +252,18 @@ def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert "Example: smartshoe diagnose" in said
     assert "--hold-out" in said
+
+
+def test_of_many_refused_recordings_a_few_are_told_and_how_many_more(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [str(tmp_path / f"{k}.csv") for k in range(30)]
+    for name in names:
+        Path(name).write_text("time_s,force_n,pressure_mbar\n0,0,0\n1,1,1\n")
+    out = tmp_path / "d.json"
+    assert run_command(["diagnose", *names, "--json", str(out)]) == 5
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 12
+    assert told[-2] == "note: and 19 more, which --json has under limits"
+    assert told[-1].startswith("error: ")
+    assert len(json.loads(out.read_text())["limits"]) == 30

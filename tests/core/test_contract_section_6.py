@@ -200,3 +200,53 @@ def test_dir_shows_verbs_and_classes_only() -> None:
     assert dir(smartshoe) == sorted(smartshoe.__all__)
     assert all(callable(getattr(smartshoe, name)) for name in dir(smartshoe))
     assert {"compensate", "identify", "Validation", "GaitResult"} <= set(dir(smartshoe))
+
+
+@pytest.mark.parametrize("rate_hz", [0, -1.0, float("nan"), float("inf"), "100 Hz", None])
+def test_a_rate_that_is_none_is_a_wrong_argument(recording: Recording, found: Identification, rate_hz: Any) -> None:
+    """Of whichever call, as the command line's exit status 2 has it, and not a fault of any file."""
+    diagnosis = smartshoe.diagnose(recording)
+    calls: list[Callable[[], object]] = [
+        lambda: found.compensator(sample_rate_hz=rate_hz),
+        lambda: diagnosis.calibration(sample_rate_hz=rate_hz),
+    ]
+    if rate_hz is not None:  # where it is left away, the data's own
+        calls += [lambda: found.discrete(rate_hz), lambda: diagnosis.calibration().compensator(rate_hz)]
+    for call in calls:
+        with pytest.raises(UsageError, match=r"^sample_rate_hz is .*: give a positive number$"):
+            call()
+
+
+def test_what_is_of_no_use_is_refused_by_its_name(recording: Recording, found: Identification) -> None:
+    """Each in one sentence, and none of them by an error of numpy's."""
+    filter_ = found.compensator()
+    wrong: list[tuple[Callable[[], object], str]] = [
+        (lambda: smartshoe.read(recording), "path is of type Recording: give the name of a file"),  # type: ignore[arg-type]
+        (lambda: smartshoe.identify(recording, offset=None), "offset is None: give a finite number or 'estimate'"),  # type: ignore[arg-type]
+        (lambda: filter_.push("full"), "readings: not all are real numbers"),  # type: ignore[call-overload]
+        (lambda: filter_.apply(["1", "x"]), "readings: not all are real numbers"),
+        (lambda: filter_.apply([1j]), "readings: not all are real numbers"),
+        (lambda: smartshoe.stack([filter_]).push(["x"]), "readings: not all are real numbers"),
+        (lambda: smartshoe.stack(filter_), "filters is of type Compensator: give stack"),  # type: ignore[arg-type]
+        (lambda: smartshoe.stack([found]), "filters hold one of type Identification"),  # type: ignore[list-item]
+        (lambda: smartshoe.open_shoe(None), "a device's address is of type NoneType"),  # type: ignore[arg-type]
+        (
+            lambda: Recording.from_arrays(time_s=[0.0, 1.0], force_n=["a", "b"]),
+            "channel force: not all are real numbers",
+        ),
+        (
+            lambda: Recording.from_arrays(time_s=[0.0, 1.0], force_n=np.array([1j, 0])),
+            "channel force: not all are real",
+        ),
+    ]
+    for call, said in wrong:
+        with pytest.raises(SmartShoeError, match=said):
+            call()
+    u, y = np.sin(np.arange(0.0, 50.0, 0.1)), np.cos(np.arange(0.0, 50.0, 0.1))
+    for options, said in (
+        ({"poles": 1.5}, "poles=1.5 and zeros=0: give whole numbers"),
+        ({"poles": "2"}, "poles='2' and zeros=0: give whole numbers"),
+        ({"delay_s": 1e9}, r"delay_s is 1e\+09 s and the shortest experiment lasts 49.9 s: give less"),
+    ):
+        with pytest.raises(UsageError, match=said):
+            smartshoe.identify_transfer_function(u, y, sample_time_s=0.1, **{"poles": 1, "zeros": 0, **options})

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smartshoe.devices.joining import align, join, join_pairs
+from smartshoe.devices.joining import Alignment, align, join, join_pairs
 from smartshoe.errors import InputError
 from smartshoe.protocol import dynamic_protocol
 from smartshoe.recording import Recording
@@ -118,3 +118,14 @@ def test_a_smooth_load_without_corners_is_joined_all_the_same() -> None:
     machine = Recording.from_arrays(time_s=time_s, force_n=load)
     sensor = Recording.from_arrays(time_s=time_s, pressure_mbar=100.0 * np.interp(time_s - 0.5, time_s, bent))
     assert float(join(machine, sensor).metadata["join_delay_s"]) == pytest.approx(-0.5, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "rate", "words"),
+    [(0.35, 2e-4, "0.3500 ± 0.0010 s ahead, 200.0 ± 3.0 ppm fast"),
+     (-5.3, -1e-4, "5.3000 ± 0.0010 s behind, 100.0 ± 3.0 ppm slow")],
+)  # fmt: skip
+def test_a_clock_that_is_behind_is_not_said_to_be_ahead_by_less_than_nothing(
+    delay_s: float, rate: float, words: str
+) -> None:
+    assert Alignment(delay_s, 1e-3, rate, 3e-6, 0.0).says == words

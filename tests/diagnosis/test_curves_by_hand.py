@@ -185,7 +185,11 @@ def test_a_shape_is_told_of_slopes_of_either_sign(
 ) -> None:
     place = np.linspace(-1.0, 1.0, 41)
     level = np.where(np.abs(place) < 0.4, middle * place, ends * place)
-    assert words in str(_said(monkeypatch, _branches(place, level)))
+    said = str(_said(monkeypatch, _branches(place, level)))
+    assert words in said
+    # A reading that falls as the load rises is not said to rise by less than nothing.
+    assert ("falls by" in said) is (middle < 0.0 and ends < 0.0)
+    assert ("by -" in said) is (middle * ends < 0.0)
 
 
 def test_what_follows_neither_load_nor_direction_has_no_course(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -404,3 +404,13 @@ def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_th
     assert left_where_judged(sessions, elsewhere, limits) == pytest.approx(0.02, rel=0.02)
     assert left_where_judged(sessions, elsewhere[::-1], limits) < 3e-4
     assert left_where_judged(sessions[:1], elsewhere[1:], limits) == 0.0  # nothing of it is held out
+
+
+def test_what_the_baseline_leaves_open_is_not_said_to_be_mended() -> None:
+    """A zero offset: of each recording's own zero the baseline knows nothing, with the cause or without."""
+    causes: Any = [SimpleNamespace(name="zero_offset")]
+    both = Errors(np.array([1e-4]), np.array([1.0]), 1.0)
+    assert sentence_of("explained", names_in(causes, 0), both, both, None, Thresholds()) == (
+        "the baseline simulation is good to 1 % of full scale on data it was not fitted to, each recording's own zero"
+        " and gain allowed for; zero offset is found in these"
+    )

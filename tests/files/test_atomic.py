@@ -21,7 +21,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smartshoe.errors import UsageError
-from smartshoe.files.atomic import json_text, make_folder, replacing, sync_folder, write_text
+from smartshoe.files.atomic import json_text, make_folder, replacing, results_folder, sync_folder, write_text
 from smartshoe.files.journal import AppendedFile
 
 
@@ -294,3 +294,22 @@ def test_the_content_reaches_the_disk_before_its_name_and_the_name_before_the_re
     monkeypatch.setattr(Path, "replace", renamed)
     write_text(target, "whole")
     assert steps == ["whole", "rename", "folder"]
+
+
+def test_a_folder_made_for_results_that_never_came_goes_again(tmp_path: Path) -> None:
+    def fail(folder: Path, holds: bool) -> None:
+        with results_folder(folder) as made:
+            assert made.is_dir()
+            if holds:
+                write_text(made / "of_use.json", "{}")
+            raise KeyboardInterrupt
+
+    for stood, of_new in ((tmp_path, "a/b"), (tmp_path / "there", "")):
+        stood.mkdir(exist_ok=True)
+        with pytest.raises(KeyboardInterrupt):
+            fail(stood / of_new, holds=False)
+        assert stood.is_dir()
+        assert list(stood.iterdir()) == []
+    with pytest.raises(KeyboardInterrupt):
+        fail(tmp_path / "c" / "d", holds=True)
+    assert (tmp_path / "c" / "d" / "of_use.json").exists()

@@ -152,7 +152,7 @@ def test_what_is_no_course_is_told(tmp_path: Any) -> None:
         with pytest.raises(InputError, match=says) as told:
             Coverage.load(path)
         assert str(path) in str(told.value)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"none\.csv does not exist: check its name and folder"):
         Coverage.load(tmp_path / "none.csv")
 
 

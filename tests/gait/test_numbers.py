@@ -64,6 +64,11 @@ def test_a_load_that_never_comes_has_no_onset() -> None:
     assert growth(crossed, 1.7) == 1.7
 
 
+def test_where_no_sample_lies_by_a_contact_there_is_no_onset() -> None:
+    """As of a logger that takes one sample in ten seconds."""
+    assert np.isnan(rise_places(np.zeros((2, 0)), np.tile([1.0, 2.0, 4.0], (2, 1)), np.full(2, 5.0))).all()
+
+
 @given(values=arrays(float, st.integers(1, 30), elements=st.floats(-9, 9) | st.just(np.nan)))
 @settings(max_examples=20)
 def test_running_median_is_that_of_each_neighbourhood(values: np.ndarray) -> None:

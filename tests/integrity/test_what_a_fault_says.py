@@ -10,8 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from smartshoe.diagnosis import diagnose
 from smartshoe.display import moment
 from smartshoe.integrity import examine
+from smartshoe.integrity._sampling import short_recording
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -71,6 +74,21 @@ def test_a_gap_is_one_and_several_are_counted(missing: tuple[tuple[int, int], ..
 def test_a_recording_of_one_sample_holds_one(count: int, held: str) -> None:
     few = _pressed(READING).taken(np.arange(TIME_S.size) < count)
     assert _said(few) == ("short_recording", f"the recording holds {held}: give at least 100 samples")
+
+
+def test_what_is_over_before_a_reading_answers_is_too_short() -> None:
+    """A logger's nanoseconds that were read as seconds; nothing of the size of their rate is made on the way."""
+    time_s = 2e-11 * np.arange(3000)
+    brief = Recording.from_arrays(time_s=time_s, force_n=np.sin(1e9 * time_s), pressure_mbar=np.cos(1e9 * time_s))
+    for least_s, is_told in ((0.1, True), (1e-8, False)):
+        said = [f.says for f in short_recording(brief, Thresholds(echo_s=least_s))]
+        assert bool(said) == is_told
+    found = diagnose(brief)
+    assert found.verdict == "refused"
+    assert found.limits == (
+        "recording: the recording holds 3000 samples in 6e-08 s: a reading may take 0.1 s to answer its load, so give a"
+        " longer one, or check the unit of its time",
+    )
 
 
 @pytest.mark.parametrize(

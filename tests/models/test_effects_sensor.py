@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from smartshoe.models.effects import Conditions, Effect, Inverse, effect
+from smartshoe.models.effects.hum import _over_floor
 from smartshoe.models.extended import ExtendedModel
 
 STEP_S = 0.02
@@ -425,3 +426,15 @@ def test_c_gives_the_numbers_of_push(tmp_path: Path) -> None:
         by_c = signal.copy()
         run(by_c, time_s, by_c.size)
         assert np.max(np.abs(by_c - inverse.push(signal, time_s))) < 1e-12, name
+
+
+def test_a_tone_beside_which_nothing_is_left_stands_out_without_overflow() -> None:
+    """A load of exactly even triangles, thousands of them: between its harmonics there is not even noise."""
+    power = np.zeros(2000)
+    power[::50] = 1e300
+    with np.errstate(over="raise", invalid="raise", divide="raise"):
+        ratio, _ = _over_floor(power, 20, 3)
+        nothing, _ = _over_floor(np.zeros(100), 20, 3)
+    assert (ratio[::50] > 1e6).all()
+    assert np.count_nonzero(ratio) == 40
+    assert not nothing.any()

@@ -24,6 +24,7 @@ from smartshoe.report.diagnosis._sentences import (
     interval,
     listed,
     parameter_text,
+    percent_of_whole,
     shares,
     shares_text,
     sure,
@@ -145,3 +146,8 @@ def test_words_for_numbers() -> None:
     assert listed(["a_b", "c", "d"]) == "a b, c or d"
     part = shares(replace(case("refused"), explained_percent=120.0, explainable_percent=50.0))
     assert (part.explained, part.left, part.noise) == (100.0, 0.0, 0.0)
+
+
+def test_not_all_is_not_said_to_be_all() -> None:
+    """In large letters too, where 99.6 % was rounded to 100."""
+    assert [percent_of_whole(one) for one in (100.0, 99.6, 99.0, 12.4)] == ["100 %", "over 99 %", "99 %", "12 %"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,10 @@ from pages_made import gait_page, walked
 
 from simulators.people import Person, Walk, trial
 from smartshoe.gait import Coverage, GaitResult, analyse
+from smartshoe.recording import Recording
 from smartshoe.report.gait._page import verdict
+from smartshoe.report.gait.charts import left_and_right
+from smartshoe.report.gait.charts import trial as trial_chart
 from smartshoe.report.gait.terminal import by_foot, depends_on_coverage
 
 
@@ -62,3 +66,17 @@ def test_the_trial_opens_on_some_strides_and_zooms_out(browser: Browser, page: P
     browser.until(f"!{hidden}")
     browser.run(f"{whole}.querySelector('button.whole').click()")
     browser.until(hidden)
+
+
+def test_sentences_of_figures_have_units_and_say_where_a_weight_is_from(walk: GaitResult) -> None:
+    beside = left_and_right(walk)
+    assert beside is not None
+    assert re.search(r"right less left is -?[\d.]+ N, [\d.]+ % of the peak", beside.says)
+    assert re.match(r"Body weight \d+\.?\d* N, from strides\. ", trial_chart(walk).says)
+    made = trial(Person(), Walk(1.3), 12.0, np.random.default_rng(1), sensors=False, noise_n=1.0, name="walk").recording
+    readings = {
+        f"{name}_mbar": 0.2 * made[name].values for name in made.channels if name.startswith(("left_", "right_"))
+    }
+    beside = left_and_right(analyse(Recording.from_arrays(time_s=made.time_s, **readings)))
+    assert beside is not None
+    assert "mbar, " in beside.says

@@ -70,7 +70,8 @@ def delay_s(load_n: Array, estimate_n: Array, sample_time_s: float) -> float | N
         return None
     error = estimate_n - columns @ found
     variance = float(error @ error) / (load_n.size - 3)
-    gain_sd = float(np.sqrt(variance * np.linalg.inv(columns.T @ columns)[0, 0]))
+    # The pseudo-inverse and not the normal matrix, whose condition is the square of the columns'.
+    gain_sd = float(np.sqrt(variance) * np.linalg.norm(np.linalg.pinv(columns)[0]))
     if abs(found[0]) <= NORMAL_95 * gain_sd:
         return None
     delay = float(-(found[1] / scale[1]) / (found[0] / scale[0]))

@@ -22,6 +22,8 @@ from smartshoe.signals.loading import Cycle, by_rate, cycles
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+FEWEST_SAMPLES = 3  # a line goes through any two
+
 
 @dataclass(frozen=True, eq=False)
 class ForceTrace:
@@ -157,11 +159,7 @@ def validate(
     valid = [recording.sensor.present & recording.load.present for recording in given]
     if not any(mask.any() for mask in valid):
         raise InputError(f"{given[0].label}: load and reading are never there together")
-    if all(np.ptp(r[m]) == 0.0 for r, m in zip(readings, valid, strict=True) if m.any()):
-        raise InputError(
-            f"{given[0].label}: the reading never moves, so that nothing can be judged by it: check that the unit is"
-            " connected and that this is its column"
-        )
+    _require_movement(given[0].label, readings, loads, valid)
     gain, offset_n = metrics.best_static(
         np.concatenate([r[m] for r, m in zip(readings, valid, strict=True)]),
         np.concatenate([f[m] for f, m in zip(loads, valid, strict=True)]),
@@ -195,6 +193,21 @@ def validate(
         offset_n,
         unit.symbol,
     )
+
+
+def _require_movement(label: str, readings: list[Array], loads: list[Array], valid: list[Mask]) -> None:
+    """Raise `InputError` where reading or load is the same throughout: any line through them is as good."""
+    for signals, what, mend in (
+        (readings, "reading", "check that the unit is connected and that this is its column"),
+        (loads, "load", "give a recording in which it rises and falls"),
+    ):
+        if all(np.ptp(signal[m]) == 0.0 for signal, m in zip(signals, valid, strict=True) if m.any()):
+            raise InputError(f"{label}: the {what} never moves, so that nothing can be judged by it: {mend}")
+    if (count := sum(int(m.sum()) for m in valid)) < FEWEST_SAMPLES:
+        raise InputError(
+            f"{label} holds {count} samples with both load and reading, through which a line goes without an error:"
+            " record more"
+        )
 
 
 def _mean(values: list[float]) -> float | None:

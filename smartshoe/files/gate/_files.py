@@ -57,9 +57,12 @@ def read_bytes(path: Path, *, at_most: int | None = None) -> bytes:
 
 
 def read_text(path: Path, what: str) -> str:
-    """The UTF-8 text of a small file, ``what`` it should be ("a calibration"); raises `InputError`."""
+    """The UTF-8 text of a small file, without the mark that some editors put before it; raises `InputError`.
+
+    ``what`` it should be ("a calibration") is for the message.
+    """
     content = read_bytes(path, at_most=limits().json_bytes)
     try:
-        return content.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is no text (byte {error.start}): give {what}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -51,6 +52,8 @@ def read_sheet(path: Path | str) -> Sheet:
 
     The one place where a format's reader runs, ours or another's: whatever goes wrong in it becomes one sentence.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise UsageError(f"path is of type {type(path).__name__}: give the name of a file")
     path = Path(path)
     format_ = detect(path)
     with foreign_code(path, format_.title, "export it again"):

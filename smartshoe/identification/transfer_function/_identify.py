@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -118,6 +119,7 @@ def identify_transfer_function(  # noqa: PLR0913 - a public verb
     options = _FitOptions(method, prefilter_rad_s, tolerance, max_iterations)
     _check(structure, options, delay_s, max_delay_s)
     experiments, missing = prepare(u, y, sample_time_s=sample_time_s, time_s=time_s, hold=intersample)
+    _require_within(experiments, delay_s)
     unknowns = zeros + 1 + poles + (delay_s == "estimate")
     nuisances = len(experiments) * ((fixed is None) + (poles if initial_state == "estimate" else 0))
     counted = sum(int(np.count_nonzero(experiment.counted)) for experiment in experiments)
@@ -366,6 +368,13 @@ def _require_distinct(columns: Array) -> None:
         )
 
 
+def _require_within(experiments: Sequence[InputOutput], delay_s: float | str) -> None:
+    """Raise `UsageError` for a number ``delay_s`` by which nothing of an experiment's input is in its output."""
+    shortest_s = min(float(one.time_s[-1] - one.time_s[0]) for one in experiments)
+    if not isinstance(delay_s, str) and delay_s >= shortest_s:
+        raise UsageError(f"delay_s is {delay_s:g} s and the shortest experiment lasts {shortest_s:g} s: give less")
+
+
 def _check(structure: Structure, options: _FitOptions, delay_s: float | str, max_delay_s: float | None) -> None:
     poles, zeros = structure.poles, structure.zeros
     for name, value, allowed in (
@@ -375,6 +384,8 @@ def _check(structure: Structure, options: _FitOptions, delay_s: float | str, max
     ):
         if value not in allowed:
             raise UsageError(f"{name} is {value!r}: give one of {', '.join(allowed)}")
+    if not isinstance(poles, Integral) or not isinstance(zeros, Integral):
+        raise UsageError(f"poles={poles!r} and zeros={zeros!r}: give whole numbers")
     if poles < 1 or zeros < 0:
         raise UsageError(f"poles={poles} and zeros={zeros}: give at least 1 pole and no negative number of zeros")
     if poles < zeros:

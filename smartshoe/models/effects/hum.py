@@ -146,7 +146,9 @@ def _over_floor(power: Array, half: int, apart: int) -> tuple[Array, Array]:
 
     (wide, many), (near, few) = within(half), within(apart)
     count = many - few
-    return power / np.maximum((wide - near) / count, 1e-300), count
+    # A difference of sums is no smaller than their rounding: a load of few tones leaves nothing else between them.
+    rounding = np.finfo(float).eps * running[-1] + np.finfo(float).tiny
+    return power * count / np.maximum(wide - near, rounding), count
 
 
 def _line(

@@ -132,7 +132,7 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         part = sentences.shares(diagnosis)
         said.append(
             (
-                f"{100 * part.explained / max(part.explained + part.left, 1e-9):.0f} %",
+                sentences.percent_of_whole(100 * part.explained / max(part.explained + part.left, 1e-9)),
                 "of what could be explained is explained",
             )
         )

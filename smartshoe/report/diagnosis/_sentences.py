@@ -282,6 +282,11 @@ def shares(diagnosis: Diagnosis) -> Shares:
     return Shares(explained, explainable - explained, 100.0 - explainable)
 
 
+def percent_of_whole(percent: float) -> str:
+    """A share that is not said to be all before it is."""
+    return "over 99 %" if 99.0 < percent < 100.0 else f"{percent:.0f} %"
+
+
 def shares_text(diagnosis: Diagnosis) -> str:
     """The same in a sentence."""
     part = shares(diagnosis)
@@ -290,7 +295,7 @@ def shares_text(diagnosis: Diagnosis) -> str:
         return "Nearly all of the error's variance is noise, which no model explains."
     noise = "under 1 %" if part.noise < 1.0 else f"{part.noise:.0f} %"
     explained = 100.0 * part.explained / explainable
-    of_it = "over 99 %" if 99.0 < explained < 100.0 else f"{explained:.0f} %" if explained >= 0.5 else "none"
+    of_it = percent_of_whole(explained) if explained >= 0.5 else "none"
     return f"{sentence(noise)[:-1]} of the error's variance is noise; of the rest {of_it} is explained."
 
 

@@ -15,6 +15,12 @@ from smartshoe.report.gait.strides import main_strides, whole_of
 from smartshoe.report.numbers import plain
 from smartshoe.signals.masks import runs_of
 
+WEIGHT_FROM = {
+    "given": "as given",
+    "strides": "from strides",
+    "standing": "from standing",
+    "one_shoe": "from one shoe, counted twice",
+}
 PERCENT = np.linspace(0.0, 100.0, POINTS)
 WINDOW_STRIDES = 5
 PHASE_COLOURS = ("line", "heel", "corrected", "meta1")
@@ -69,9 +75,10 @@ def left_and_right(found: GaitResult) -> Chart | None:
     apart = means[1] - means[0]
     at = int(np.abs(apart).argmax())
     share = 100 * float(np.abs(apart).max()) / max(float(np.max(means)), 1e-12)
+    unit = "N" if feet[0].force_n is not None else feet[0].symbol
     says = (
         f"Furthest apart at {PERCENT[at]:.0f} % of the stride: {feet[1].name} less {feet[0].name} is"
-        f" {plain(float(apart[at]), 2)}, {plain(share, 2)} % of the peak."
+        f" {plain(float(apart[at]), 2)} {unit}, {plain(share, 2)} % of the peak."
     )
     panels = [
         Panel(_label(feet[0]), [Line(feet[0].name, means[0], feet[0].name),
@@ -113,7 +120,7 @@ def trial(found: GaitResult) -> Chart:
         weight = found.forces.body_weight
         if weight is not None:
             both.append(Line("body weight", np.full(base.size, weight.value), "corrected", "dashed"))
-            says = f"Body weight {plain(weight.value, 4)} N, {weight.source.replace('_', ' ')}. {says}"
+            says = f"Body weight {plain(weight.value, 4)} N, {WEIGHT_FROM[weight.source]}. {says}"
         panels.append(Panel("total force (N)", both))
     marks = [Mark(start, end, "corrected", "standing") for start, end in found.standing_s]
     return Chart("The trial", says, "time (s)", base, panels, marks=marks, window=some_strides(found))

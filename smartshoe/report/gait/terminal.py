@@ -55,7 +55,7 @@ def by_foot(found: GaitFindings) -> list[tuple[str, list[str]]]:
     rows: list[tuple[str, list[str]]] = [
         ("strides", [str(summary["strides"].get(foot, 0)) for foot in feet]),
         ("stride time (s)", [_cv(summary["stride_time_s"].get(foot)) for foot in feet]),
-        ("step time on to it (s)", [_cv(summary["step_time_s"].get(foot)) for foot in feet]),
+        ("step time to this foot (s)", [_cv(summary["step_time_s"].get(foot)) for foot in feet]),
         ("stance (% of stride)", [plain(summary["stance_percent"].get(foot)) for foot in feet]),
         (f"peak force{mark} (N)", [_cv(summary["peak_n"].get(foot)) for foot in feet]),
         (f"mean peak{mark} ± 95 % (N)", [_peaks(found, foot) for foot in feet]),

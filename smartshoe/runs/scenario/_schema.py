@@ -297,7 +297,7 @@ def read_tables(path: Path | str, what: str = "a scenario") -> tuple[Tables, Sce
     try:
         return tomllib.loads(text), ScenarioText(file, text)
     except (ValueError, RecursionError) as error:  # a number of 5000 digits is a ValueError of its own
-        raise ScenarioError(f"{file} is not valid TOML: {error}") from error
+        raise ScenarioError(f"{file} is not valid TOML: {error}; mend it there") from error
 
 
 def load(path: Path | str, values: Mapping[str, Any] | None = None) -> tuple[Scenario, ScenarioText]:

@@ -77,7 +77,7 @@ def publish(result: ScenarioResult, folder: Path, result_json: str, figures: str
     title, about, trial = result.scenario.title, result.scenario.about, _publish_trial(result, folder)
     commands = [f"smartshoe run {result.source} --seed {result.scenario.seed} --out {folder}"]
     if any(not unit.recordings for unit in result.scenario.unit):
-        commands.append(f"smartshoe simulate {result.source} --out recordings")
+        commands.append(f"smartshoe simulate {result.source} --seed {result.scenario.seed} --out recordings")
     if figures is not None:
         from smartshoe.report.paper.calibration import write_figures
 
@@ -104,7 +104,7 @@ def _unit_report(result: ScenarioResult, unit: UnitResult, diagnosed: DiagnosisL
     unseen = [f"--hold-out {sources[name]}" for name in unit.judged if name not in unit.fitted]
     command = " ".join(["smartshoe diagnose", *fitted, *unseen, f"--out diagnosis/{unit.name}"])
     if simulated:
-        command = f"smartshoe simulate {result.source} --out recordings && {command}"
+        command = f"smartshoe simulate {result.source} --seed {result.scenario.seed} --out recordings && {command}"
     return UnitReport(
         unit.name,
         unit.identified,

@@ -74,7 +74,7 @@ def _write(result: SessionResult, folder: Path) -> tuple[UnitReport, dict[str, P
 def _write_page(result: SessionResult, folder: Path, unit: UnitReport, entry: Entry | None) -> Path:
     plan = result.plan
     about = (
-        f"Pressed by {', '.join(result.recordings)}. Load and reading were put on one time base by the load itself"
+        f"Pressed: {', '.join(result.recordings)}. Load and reading were put on one time base by the load itself"
         f" ({'; '.join(_clocks_text(name, clocks) for name, clocks in result.clocks.items())})."
     )
     facts = {"shoe": plan.shoe, "machine": plan.machine, "serial number": plan.serial_number or "not given",
@@ -106,10 +106,7 @@ def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
 
 
 def _clocks_text(name: str, clocks: Alignment) -> str:
-    return (
-        f"{name}: machine's clock ahead of the shoe's by {clocks.delay_s:.4f} ± {clocks.delay_sd_s:.4f} s,"
-        f" {1e6 * clocks.rate:.1f} ± {1e6 * clocks.rate_sd:.1f} ppm fast"
-    )
+    return f"{name}: beside the shoe's the machine's clock is {clocks.says}"
 
 
 def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | None:

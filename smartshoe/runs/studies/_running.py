@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.errors import RefusedError, UsageError
-from smartshoe.files.atomic import json_text, make_folder, write_text
+from smartshoe.files.atomic import json_text, results_folder, write_text
 from smartshoe.runs.studies._norms import Compared, Norm, compared, read_norms
 from smartshoe.runs.studies._plan import StudyPlan, read_study
 from smartshoe.runs.studies._statistics import (
@@ -182,17 +183,18 @@ def study(
     plan, source = read_study(path)
     if c3d and out is None:
         raise UsageError("C3D files need a folder: give out as well")
-    folder = None if out is None else make_folder(out)
-    c3d_folder = make_folder(folder / "c3d") if folder is not None and c3d else None
-    base = source.path.resolve().parent
-    norms = [] if plan.norms is None else read_norms(base / plan.norms, plan.conditions)
-    analysed = _analysed(plan, base, c3d_folder, jobs, progress)
-    if all(trial.left_out is not None for trial in analysed):
-        raise RefusedError(
-            f"{source.path}: none of {len(analysed)} trials can be used; the first: {analysed[0].left_out}"
-        )
-    result = _concluded(plan, analysed, norms)
-    return result if folder is None else _written(result, folder, source.path)
+    with ExitStack() as stack:
+        folder = None if out is None else stack.enter_context(results_folder(out))
+        c3d_folder = stack.enter_context(results_folder(folder / "c3d")) if folder is not None and c3d else None
+        base = source.path.resolve().parent
+        norms = [] if plan.norms is None else read_norms(base / plan.norms, plan.conditions)
+        analysed = _analysed(plan, base, c3d_folder, jobs, progress)
+        if all(trial.left_out is not None for trial in analysed):
+            raise RefusedError(
+                f"{source.path}: none of {len(analysed)} trials can be used; the first: {analysed[0].left_out}"
+            )
+        result = _concluded(plan, analysed, norms)
+        return result if folder is None else _written(result, folder, source.path)
 
 
 def _analysed(

@@ -97,6 +97,11 @@ class SweepPlan:
 
         Raises `ScenarioError` that names the key.
         """
+        for axis in self.design.axes:
+            try:
+                with_values(self.base, {axis.key: None})
+            except ScenarioError as error:
+                raise self.source.error(("sweep", "vary", axis.key), str(error)) from error
         first = self.tables(0)
         for axis in self.design.axes:
             for value in axis.ends():

@@ -82,3 +82,11 @@ def test_a_ramp_counts_from_three_tenths_of_the_records_load_range_on(height: fl
     load_n = np.interp(time_s, [2, 12, 22, 25, 29, 33], [0.0, 1000.0, 0.0, 0.0, top_n, 0.0])
     found = [cycle.rate_n_per_s for cycle in loading.cycles(time_s, load_n)]
     assert found == pytest.approx([100.0, top_n / 4.0] if counts else [100.0], rel=1e-6)
+
+
+def test_one_ramp_tells_no_delay() -> None:
+    """Its slope is the constant but for rounding: of the normal matrix nothing is left to invert."""
+    time_s = np.arange(0.0, 0.4, 0.02)
+    load_n = 100.0 - 100.0 * np.abs((time_s / 5.0) % 2.0 - 1.0)
+    noise = 0.05 * np.random.default_rng(1).standard_normal(time_s.size)
+    assert metrics.delay_s(load_n, 5.0 + 0.9 * load_n + noise, 0.02) is None

@@ -72,7 +72,10 @@ def test_a_small_scenario_recovers_the_unit_and_reports(tmp_path: Path, capsys: 
     # The paper's left toe. The sensor's zero and the myRIO's 50 mV are absorbed by the offset, not by k1.
     assert parameters["k1"]["value"] == pytest.approx(1.341, abs=5 * parameters["k1"]["sd"] + 0.03)
     assert (out / "calibrations" / "left_toe.json").exists()
-    assert "<svg" in (out / "report.html").read_text()
+    page = (out / "report.html").read_text()
+    assert "<svg" in page
+    # The recordings of this very run, whatever seed was asked for in the scenario's place.
+    assert f"smartshoe simulate {path} --seed 3 --out recordings" in page
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(tmp_path: Path) -> None:

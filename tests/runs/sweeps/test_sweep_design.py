@@ -72,6 +72,7 @@ def test_log_uniform_draws_are_even_in_the_logarithm() -> None:
         ("[1.2, 1.5]", "{uniform = [1.0, 2.0]}", "random design only"),
         ("[1.2, 1.5]", "{from = 1.0, to = 2.0, count = 0}", "whole number from 1"),
         ("[1.2, 1.5]", "[1.2, -1.5]", 'key sweep.vary.unit.left_toe.bladder.k1: with -1.5'),
+        ("unit.left_toe.bladder.k1", "unit.toe.bladder.k1", "line 16, key sweep.vary.unit.toe.bladder.k1: 'unit.toe"),
         ("bladder.k1", "bladder.k7", "line 16, key sweep.vary.unit.left_toe.bladder.k7: with 1.2, this key is not"),
         ("unit.left_toe.bladder.k1", "unit.left_too.bladder.k1", "unit.NAME.KEY with a NAME of left_toe"),
         ("unit.left_toe.bladder.k1", "identify.prefilter", "sweep.vary.identify.prefilter: with 1.2, this key"),
