@@ -198,9 +198,11 @@ def _judged(
     """By what is ``left``, and ``off`` at the full rate, (n,) each, and what was ``won`` on what is held out."""
     fine, known = given.fine, left.known
     elsewhere = off_elsewhere(fine, off, max(left.within.size, beyond_noise(fine, off, thresholds)), thresholds)
-    # Beside causes what is left is weighed against what was wrong.
-    is_shown = found.can_validate and (left.after.is_tested or bool(causes))
-    unproven = 0.0 if is_shown else not_shown_to_be_noise(fine, off, left.after, thresholds, known)
+    unproven = 0.0
+    if not (found.can_validate and left.after.is_tested):
+        # Beside causes what is left is weighed against what was wrong, tested or not.
+        before = [residual_of(one, found.baseline.model) for one in fine] if found.can_validate and causes else None
+        unproven = not_shown_to_be_noise(fine, off, left.after, thresholds, known, before)
     if given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         return _Outcome("unexplained", won, elsewhere, unproven)
     follows = all(name.is_sure and not name.kind_only for name in named.names)

@@ -90,13 +90,17 @@ def not_shown_to_be_noise(
     left: ResidualStructure,
     thresholds: Thresholds,
     known: float = 0.0,
+    before: Sequence[Array] | None = None,
 ) -> float:
     """Rms beyond white noise of all that can be used, where too little is there to test it.
 
-    0 where it is tolerable, or no more than what is ``known`` to be a fault's of the data.
+    0 where it is tolerable, or no more than what is ``known`` to be a fault's of the data, or than laws depart by of
+    what was wrong ``before`` their causes, residuals as well.
     """
-    size = beyond_noise(_all_fitted(sessions), residuals, thresholds)
-    return 0.0 if left.is_noise or size <= max(thresholds.tolerable, known) else size
+    every = _all_fitted(sessions)
+    size = beyond_noise(every, residuals, thresholds)
+    expected = 0.0 if before is None else thresholds.departure * beyond_noise(every, before, thresholds)
+    return 0.0 if left.is_noise or size <= max(thresholds.tolerable, known, expected) else size
 
 
 def left_where_judged(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> float:

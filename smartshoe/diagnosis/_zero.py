@@ -65,10 +65,13 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
             resting = np.abs(load - load[0]) < thresholds.standing
         moved = np.flatnonzero(~resting)
         most = max(1, round(thresholds.hold_s / session.conditions.step_s))  # nothing has crept yet
-        first = slice(0, min(int(moved[0]) if moved.size else resting.size, most))
+        lasts = int(moved[0]) if moved.size else resting.size
+        first = slice(0, min(lasts, most))
         kept = session.fitted[first]
         lasts_s = kept.sum() * session.conditions.step_s
-        if lasts_s >= thresholds.settled_s and abs(_risen(load[first][kept])) < thresholds.still_per_s * lasts_s:
+        # A single sample of a slow log shows no rest, however long it lasts: the load may be on its way.
+        is_rest = lasts > 1 and abs(_risen(load[first][kept])) < thresholds.still_per_s * lasts_s
+        if is_rest and lasts_s >= thresholds.settled_s:
             drifted = float(np.mean(_drifted(session, model)[first][kept]))
             reading = float(np.mean(session.reading[first][kept])) - drifted
             found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -59,8 +60,10 @@ def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
     """Kind ``gaps``: steps of time in which rows are missing; what lies beside a gap stays in use."""
     step = np.diff(recording.time_s)
     usual = float(np.median(step))
-    # A sample is missing from one and a half steps on, if steps are even enough to tell.
-    wide = step > max(1.5 * usual, usual + largest_of_noise(step.size, thresholds) * robust_sd(step - usual))
+    # A sample is missing from one and a half steps on, if steps are even enough to tell. They are never negative, so
+    # that they scatter by ratios: of a log without a clock a step in a thousand is several times the usual one.
+    scatter = robust_sd(np.log(step / usual))
+    wide = np.log(step / usual) > max(math.log(1.5), largest_of_noise(step.size, thresholds) * scatter)
     # A larger share of such steps is how the logger works, which uneven sampling says.
     if not wide.any() or wide.mean() > thresholds.faulty_share:
         return

@@ -249,7 +249,8 @@ def test_where_nothing_can_be_tested_what_is_not_shown_to_be_noise_is_not_explai
         parts.seen.clear()
         parts.unproven = unproven
         assert _run_diagnosis(parts).verdict == verdict
-        sessions, residuals, left, thresholds, known = parts.seen["not_shown_to_be_noise"][0]
+        sessions, residuals, left, thresholds, known, before = parts.seen["not_shown_to_be_noise"][0]
+        assert before is None
         assert (sessions, residuals) == ([FINE], [f"{FINE} 2"])  # at full rate
         assert (left is parts.kinds[1], thresholds, known) == (True, STANDARD, 0.0)
         assert parts.seen["not_explained_of"][0][1:3] == (0.0, unproven)
@@ -280,16 +281,20 @@ def test_what_the_extended_model_does_away_with_for_certain_is_not_good_enough_w
 
 
 def test_a_simulation_is_not_good_enough_where_no_test_would_show_what_is_left(parts: Any) -> None:
-    """Two cycles that can be left out in turn, and too few to tell noise; beside causes it is weighed otherwise."""
+    """Two cycles that can be left out in turn, and too few to tell noise; beside causes it is weighed by what was."""
     for kind in parts.kinds:
         kind.significant, kind.rms = False, 0.0
     parts.unproven = 0.004
     for is_tested, names, verdict in (
-        (True, [], "adequate"), (False, [], "unexplained"), (False, [_name("linear_leak")], "explained"),
+        (True, [], "adequate"), (False, [], "unexplained"), (True, [_name("linear_leak")], "explained"),
+        (False, [_name("linear_leak")], "partly_explained"),
     ):  # fmt: skip
         parts.seen.clear()
         parts.kinds[1].is_tested, parts.names = is_tested, names
         assert _run_diagnosis(parts).verdict == verdict
+        if not is_tested:
+            before = parts.seen["not_shown_to_be_noise"][0][5]
+            assert before == ([f"{FINE} 0"] if names else None)  # what the plain model leaves
 
 
 @pytest.mark.parametrize(

@@ -397,6 +397,11 @@ def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_th
         residuals = [size * wave + one for one in noise]  # of what was fitted and of what was not
         assert not_shown_to_be_noise(sessions, residuals, untested, limits) == pytest.approx(left, rel=0.1)
         assert not_shown_to_be_noise(sessions, residuals, tested, limits) == 0.0  # type: ignore[arg-type]
+        # Beside causes it is no more than laws depart by of what was wrong.
+        for ratio, is_left in ((0.9, True), (1.1, False)):
+            wrong = [ratio / limits.departure * one for one in residuals]
+            found = not_shown_to_be_noise(sessions, residuals, untested, limits, 0.0, wrong)  # type: ignore[arg-type]
+            assert found == pytest.approx(left if is_left else 0.0, rel=0.1)
     elsewhere = [noise[0], 0.02 * wave + noise[1]]
     half = not_shown_to_be_noise(sessions, elsewhere, untested, limits)
     assert half == pytest.approx(0.02 / np.sqrt(2.0), rel=0.05)

@@ -188,6 +188,12 @@ def test_a_load_that_begins_to_rise_at_once_is_no_rest() -> None:
         assert first_rests([one], MODEL, STANDARD).size == (3 if is_told else 0)
 
 
+def test_a_single_sample_of_a_slow_log_is_no_rest() -> None:
+    """Nobody sees whether the load stood still there."""
+    for count, is_told in ((1, False), (2, True)):
+        assert first_rests([_rested(count, step_s=1.8)], MODEL, STANDARD).size == (3 if is_told else 0)
+
+
 def test_a_first_rest_lasts_as_long_as_a_reading_takes_to_settle() -> None:
     """Four tenths of a second: four samples; and no more of it is looked at than of a hold that shows creep."""
     for count, is_told in ((3, False), (4, True)):

@@ -417,6 +417,21 @@ def test_missing_samples_gaps_and_uneven_steps():
     assert kinds(found) == {"uneven_sampling"}
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_log_without_a_clock_has_no_gaps_but_where_steps_are_beyond_its_own_scatter(seed):
+    rng = np.random.default_rng(seed)
+    time_s = np.cumsum(rng.gamma(3.0, 0.01 / 3.0, 9000) + 1e-4)
+    load = 400.0 * (1.0 - np.cos(2.0 * np.pi * time_s / 8.0))
+    reading = 0.12 * load + 0.1 * rng.standard_normal(time_s.size)
+
+    def found(kept):
+        rows = Recording.from_arrays(time_s=time_s[kept], force_n=load[kept], pressure_mbar=reading[kept])
+        return kinds(examine([rows]))
+
+    assert found(np.ones(time_s.size, dtype=bool)) == {"uneven_sampling"}
+    assert found(np.abs(time_s - 40.0) > 0.5) == {"uneven_sampling", "gaps"}
+
+
 def test_mostly_dropped_out_is_refused():
     recording = recorded(dynamic_protocol(), 1)
     reading = np.where(np.random.default_rng(0).random(len(recording)) < 0.7, np.nan, recording.sensor.values)

@@ -186,6 +186,20 @@ def test_a_tone_that_the_load_has_is_the_loads() -> None:
     assert test(CASE.prediction + 0.1 * tone) is None
 
 
+@pytest.mark.parametrize("order", [2, 3, 5])
+def test_a_harmonic_of_the_loads_rhythm_is_what_a_curve_or_a_loop_leaves(order: int) -> None:
+    time_s = STEP_S * np.arange(4000)
+    load = 0.5 - 0.45 * np.cos(2.0 * np.pi * 1.1 * time_s)
+    conditions = Conditions(time_s, load, STEP_S)
+    rng = np.random.default_rng(order)
+
+    def tone(of_hz: float) -> np.ndarray:
+        return 0.001 * np.cos(2.0 * np.pi * of_hz * time_s + 0.4) + FLOOR * rng.standard_normal(time_s.size)
+
+    assert hum.Hum().evidence(tone(1.1 * order), conditions, load) is None
+    assert hum.Hum().evidence(tone(1.1 * (order + 0.5)), conditions, load) is not None
+
+
 @pytest.mark.parametrize(
     "noise",
     [

@@ -15,7 +15,7 @@ from smartshoe.models.effects.exposure import by
 from smartshoe.signals.noise import MAINS_HZ
 
 LOWEST_HZ = 2.0  # below, a line may be the load's own rhythm or an unknown slow effect
-HARMONICS = 7
+HARMONICS = 7  # of the mains, and of the load's own rhythm
 MAINS_TOLERANCE = 2e-3  # of the mains' frequency, and of a logger's clock
 NEIGHBOURS = 60  # bins on either side that give the floor
 HANN_CORRELATION = 1.944  # neighbouring bins behind a Hann window are worth half as many independent ones
@@ -25,6 +25,7 @@ BURST_SAMPLES = 64
 BLOCK_S = 1.0  # over which it is told whether the load rests
 STILL_PER_S = 0.004  # full scales a second: 3 N/s on 800 N
 LEAST_BLOCKS = 8
+OF_HARMONIC = 0.01  # of a polynomial's power in one line: a load without a rhythm has a thousandth in any
 QUIETER = 0.25  # of a tone's power while the load moves: half its amplitude
 
 
@@ -95,7 +96,7 @@ class Hum(NoiseEffect):
         frequency = _refined(residual, near_hz, conditions.step_s)
         if not _is_steady(residual, frequency, conditions.step_s):
             return None
-        if not _stands_at_rest(residual, conditions.load, frequency, conditions.step_s):
+        if not _stands_apart(residual, conditions.load, prediction, frequency, conditions.step_s):
             return None
         cosine, sine = _amplitudes(residual, frequency, conditions.step_s)
         sources = tuple(
@@ -205,8 +206,12 @@ def _is_steady(residual: Array, frequency_hz: float, sample_time_s: float) -> bo
     return bool(np.median(power) > (STEADY + (STEADIER - STEADY) * over / (over + 3.0)) * np.mean(power))
 
 
-def _stands_at_rest(residual: Array, load: Array, frequency_hz: float, sample_time_s: float) -> bool:
-    """Whether the tone is as loud while the ``load`` (n,) rests as while it moves, where there is enough of both."""
+def _stands_apart(residual: Array, load: Array, prediction: Array, frequency_hz: float, sample_time_s: float) -> bool:
+    """Whether the tone is as loud while the ``load`` (n,) rests as while it moves.
+
+    Where there is not enough of both to tell, whether it is no harmonic of what the ``prediction`` (n,) has: that is
+    what a curve or a loop makes of a load with a rhythm.
+    """
     length = max(round(BLOCK_S / sample_time_s), 8)
     count = residual.size // length
     parts, loads = (one[: count * length].reshape(count, length) for one in (residual, load))
@@ -214,7 +219,7 @@ def _stands_at_rest(residual: Array, load: Array, frequency_hz: float, sample_ti
     rates = np.abs(loads[:, half:].mean(axis=1) - loads[:, :half].mean(axis=1)) / (half * sample_time_s)
     still = rates < STILL_PER_S
     if min(still.sum(), (~still).sum()) < LEAST_BLOCKS:
-        return True
+        return not _is_harmonic(prediction, frequency_hz, sample_time_s)
     beside = 4.0 / (length * sample_time_s)
     centred = parts - parts.mean(axis=1, keepdims=True)
     whole, *above = (_tone_powers(centred, frequency_hz + away * beside, sample_time_s) for away in (0.0, 1.0, 1.5))
@@ -224,6 +229,20 @@ def _stands_at_rest(residual: Array, load: Array, frequency_hz: float, sample_ti
     # A power's standard deviation is as large as the power itself.
     unsure = 3.0 * float(floor[still].mean()) / math.sqrt(float(still.sum()))
     return resting + unsure > QUIETER * moving
+
+
+def _is_harmonic(prediction: Array, frequency_hz: float, sample_time_s: float) -> bool:
+    """Whether a curve makes a line at that frequency of a ``prediction`` (n,): Chebyshev's polynomials of it do."""
+    low, high = float(prediction.min()), float(prediction.max())
+    if low == high:
+        return False
+    angle = np.arccos(np.clip(2.0 * (prediction - low) / (high - low) - 1.0, -1.0, 1.0))
+    near = round(frequency_hz * prediction.size * sample_time_s)
+    for order in range(1, HARMONICS + 1):
+        power = _powers(np.cos(order * angle), prediction.size)[0]
+        if float(power[max(near - 1, 0) : near + 2].sum()) > OF_HARMONIC * float(power.sum()):
+            return True
+    return False
 
 
 def _levelled(residual: Array) -> Array:
