@@ -97,17 +97,16 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
     each = [list(_rises(session, thresholds)) for session in sessions]
     rises = [rise for own in each for rise in own]
     rated = [rise for rise in rises if rise.is_rated]
-    hold_s = max(
-        (_longest(_held(session, thresholds)) * session.conditions.step_s for session in sessions), default=0.0
-    )
+    hold_s = max((_longest_read_s(one, _held(one, thresholds)) for one in sessions), default=0.0)
     rested = [(_rested(one, thresholds), one.conditions.step_s) for one in sessions]
-    rests_s = [n * step_s for mask, step_s in rested for n in _runs(mask)]
+    rest_s = max((_longest_read_s(one, mask) for one, (mask, _) in zip(sessions, rested, strict=True)), default=0.0)
+    # What a unit does while nothing presses it shows afterwards, also where nothing is read meanwhile.
+    idle_s = max((_longest(mask) * step_s for mask, step_s in rested), default=0.0)
     pauses = [n * step_s for mask, step_s in rested for n in _runs(_within(mask))]
     # Where a ramp begins and ends is smeared by its window, and found to a sample.
     ends = 1.0 + max((_windows(session) for session in sessions), default=1.0)
     rates = _distinct_rates([(rise.rate, rise.samples) for rise in rated], thresholds.same, ends)
     peaks = _distinct([rise.peak for rise in rises], thresholds.same)
-    rest_s = max(rests_s, default=0.0)
     repeats = _most_alike([(rise.rate, rise.peak) for rise in rated], thresholds.same)
     found = {
         "rates": len(rates) > 1,
@@ -115,7 +114,7 @@ def excitation_of(sessions: Sequence[Session], thresholds: Thresholds) -> Excita
         "steps": any(rise.rate * thresholds.echo_s > thresholds.same for rise in rated),
         "holds": hold_s >= thresholds.hold_s,
         "rests": rest_s >= thresholds.settled_s,
-        "idle": rest_s >= thresholds.idle_s,
+        "idle": idle_s >= thresholds.idle_s,
         "pauses": bool(pauses) and max(pauses) > thresholds.clear * max(min(pauses), thresholds.settled_s),
         "repeats": repeats > 1,
         "minor_loops": any(rise.is_minor for rise in rises),
@@ -212,6 +211,13 @@ def _runs(mask: Mask) -> list[int]:
 
 def _longest(mask: Mask) -> int:
     return max(_runs(mask), default=0)
+
+
+def _longest_read_s(session: Session, mask: Mask) -> float:
+    """How long the reading is there within a run of ``mask`` (n,), at most."""
+    total = np.concatenate([[0], np.cumsum(session.usable)])
+    first, last = runs_of(mask)
+    return float(np.max(total[last] - total[first], initial=0)) * session.conditions.step_s
 
 
 def _distinct(values: Sequence[float], alike: float) -> list[float]:

@@ -16,6 +16,7 @@ from smartshoe.integrity._fault import DataFault, Finding, Integrity
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
 from smartshoe.integrity._held import held_samples
 from smartshoe.integrity._held_rate import at_their_rates
+from smartshoe.integrity._interpolated import where_measured
 from smartshoe.integrity._lattice import quantisation
 from smartshoe.integrity._lines import hum
 from smartshoe.integrity._rails import low_rail, saturation
@@ -114,9 +115,10 @@ def _at_fault(findings: Sequence[Finding], size: int) -> Mask:
 def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
     made = []
     for read, held in at_their_rates(recordings, thresholds):
-        logged, wrapped = unwrapped(read, thresholds)
+        measured, between = where_measured(read, thresholds)
+        logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
-        made.append(_Tamed(logged, recording, (*held, *wrapped, *wild)))
+        made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild)))
     return made
 
 

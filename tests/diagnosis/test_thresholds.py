@@ -33,10 +33,11 @@ def _pressed(reading: Array, load: Array = TRIANGLE, time_s: Array = TIME_S) -> 
     return Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=MBAR * reading)
 
 
-def _session_traits(load: Array, thresholds: Thresholds) -> frozenset[str]:
+def _session_traits(load: Array, thresholds: Thresholds, unread: slice | NDArray[np.intp] = slice(0)) -> frozenset[str]:
     time_s = 0.02 * np.arange(load.size)
     recording = Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=MBAR * load)
     usable = [np.ones(load.size, dtype=bool)]
+    usable[0][unread] = False
     scale = full_scale([recording], usable, STANDARD)
     return excitation_of(prepare([recording], usable, None, scale, 1, STANDARD), thresholds).present
 
@@ -45,6 +46,20 @@ def _held_load(hold_s: float, rest_s: float) -> Array:
     """Two rises to full load at 0.5 full scales a second, a hold, and a rest."""
     corners = np.cumsum([0.0, 5.0, 2.0, hold_s, 2.0, rest_s, 2.0, 1.0, 2.0, 5.0])
     return np.interp(np.arange(0.0, corners[-1], 0.02), corners, [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+
+
+def test_a_hold_or_a_rest_shows_nothing_where_nothing_is_read() -> None:
+    """But a unit that is left alone ages, and shows that afterwards."""
+    load = _held_load(10.0, 70.0)
+    assert {"holds", "rests", "idle"} <= _session_traits(load, STANDARD)
+    begins, ends = (int(np.flatnonzero(load == 1.0)[k]) for k in (0, 500))
+    assert not {"holds"} & _session_traits(load, STANDARD, slice(begins, ends))
+    unread = load < 0.01
+    shown = _session_traits(load, STANDARD, np.flatnonzero(unread))
+    assert "rests" not in shown
+    assert {"holds", "idle"} <= shown
+    # A sample here and there is no hold's end.
+    assert {"holds", "rests"} <= _session_traits(load, STANDARD, slice(0, None, 50))
 
 
 def test_each_number_has_a_unit_a_meaning_and_an_origin() -> None:

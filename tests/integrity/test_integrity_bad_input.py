@@ -67,6 +67,18 @@ def test_a_load_of_a_few_samples_a_ramp_that_is_followed_is_no_noise(period_s: f
     assert "no more than its noise" in not_followed.refusals[0]
 
 
+@pytest.mark.parametrize("first", [0.0, 0.2, 0.35])
+def test_a_reading_that_froze_for_most_of_a_recording_is_told_as_such(first: float) -> None:
+    """What is left of it follows; the whole does not, and that is not because of the unit."""
+    reading, begins = READING.copy(), int(first * TIME_S.size)
+    ends = begins + int(0.65 * TIME_S.size)
+    reading[begins:ends] = READING[begins if begins else ends]
+    found = examine([_recording(force_n=LOAD_N, pressure_mbar=reading)])
+    assert [fault.kind for fault in found.faults] == ["held_samples"]
+    assert found.faults[0].share == pytest.approx(0.65, abs=0.001)
+    assert f"stands still from {TIME_S[begins]:.4g} to" in found.refusals[0]
+
+
 @pytest.mark.parametrize(("load", "reading"), [(1.0, 0.0), (0.0, 1.0)], ids=["reading", "load"])
 def test_a_channel_that_is_constant_is_refused(load: float, reading: float) -> None:
     found = examine([_recording(force_n=40.0 + load * LOAD_N, pressure_mbar=3.0 + reading * READING)])
