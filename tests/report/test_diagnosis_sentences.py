@@ -21,6 +21,7 @@ from smartshoe.report.diagnosis._sentences import (
     Row,
     comparison,
     gain_sentence,
+    heading,
     interval,
     listed,
     parameter_text,
@@ -45,6 +46,14 @@ def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weig
     assert why_this_one(several) == (
         "bouc wen hysteresis and dead band cannot be ruled out, since no equation is exact: take the name as one of 3"
     )
+
+
+def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> None:
+    made = case("one cause")
+    assert heading(made) == "The simulation is wrong, and it is known why"
+    of_zeros = replace(made, extended=made.baseline)
+    assert heading(of_zeros) == "The simulation is good enough, and what recordings have of their own is found"
+    assert heading(replace(of_zeros, verdict="partly_explained")).startswith("The simulation is wrong")
 
 
 def test_effects_without_a_name_are_told_and_free_forms_as_such() -> None:

@@ -44,7 +44,7 @@ def write_diagnosis_page(
     ``facts``: small print by name (files, version). ``protocol_file``: name of the file beside the page that holds
     the next experiment's protocol.
     """
-    said = sentences.HEADINGS[diagnosis.verdict], sentence(diagnosis.says)
+    said = sentences.heading(diagnosis), sentence(diagnosis.says)
     following, found = diagnosis.next_experiment, evidence(diagnosis.traces, diagnosis.full_scale_load_n)
     shown: dict[str, Any] = {
         "title": title,

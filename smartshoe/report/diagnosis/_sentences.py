@@ -23,8 +23,17 @@ HEADINGS = {
     "unexplained": "The simulation is wrong, and no cause can be named",
     "refused": "No diagnosis: this data does not allow one",
 }
+OF_THEIR_OWN = "The simulation is good enough, and what recordings have of their own is found"
 SUREST = 0.99
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
+
+
+def heading(diagnosis: Diagnosis) -> str:
+    """The verdict; where all that is named is of recordings, as a zero is, the plain model allows for it."""
+    before, after = diagnosis.baseline, diagnosis.extended
+    if diagnosis.verdict == "explained" and before and after and before.rmse == after.rmse:
+        return OF_THEIR_OWN
+    return HEADINGS[diagnosis.verdict]
 
 
 def listed(names: Sequence[str], last: str = "or") -> str:

@@ -12,11 +12,11 @@ from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.design import Design
 from smartshoe.models.effects import in_words
 from smartshoe.report.diagnosis._sentences import (
-    HEADINGS,
     comparison,
     fault_text,
     for_this_one,
     gain_text,
+    heading,
     how_much,
     is_free_form,
     listed,
@@ -36,7 +36,7 @@ def print_diagnosis(diagnosis: Diagnosis, title: str = "") -> None:
     """The whole diagnosis as a person reads it; the page of ``--out`` says more."""
     console = new_console()
     # How far off it is, before whether that is good or bad: what is bad for one purpose is good for another.
-    said = [text for text in (how_much(diagnosis), f"{HEADINGS[diagnosis.verdict]}.") if text is not None]
+    said = [text for text in (how_much(diagnosis), f"{heading(diagnosis)}.") if text is not None]
     console.print(f"{title}: {said[0]}" if title else said[0], style="bold", soft_wrap=True)
     for text in (*said[1:], sentence(diagnosis.says)):
         _line(console, text)
