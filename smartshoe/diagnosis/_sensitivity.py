@@ -26,6 +26,7 @@ from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.lags import lagged
 
+
 MOST_LINEARISED = 4  # models about which columns are kept: as much room as they take at once all the same
 
 

@@ -396,39 +396,37 @@ def _orifice(p, laminar):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def orifice(pressures, step_rate, laminar, state, out):  # type: ignore[no-untyped-def]
-    """out (m, n) = ``pressures`` (m, n) - w, with w' = rate p/sqrt(|p|) of what is left, by the implicit trapezoid.
+def orifice(pressure, step_rate, laminar, state, out):  # type: ignore[no-untyped-def]
+    """out (n,) = ``pressure`` (n,) - w, with w' = rate p/sqrt(|p|) of what is left, by the implicit trapezoid.
 
-    ``step_rate`` is rate times step; below ``laminar`` the flow is in proportion. ``state`` (m, 2): w, last flow over
-    rate. A step waits for the one before; those of several pressures fill that time.
+    ``step_rate`` is rate times step; below ``laminar`` the flow is in proportion. ``state`` (2,): w, last flow over
+    rate.
     """
+    w, flow = state
     half = 0.5 * step_rate
     # Half the curvature of what is solved is nowhere more: a step leaves an error of its square times that.
     bend = half / (laminar * math.sqrt(laminar))
-    lost, half_flow = state[:, 0].copy(), half * state[:, 1]
-    left, right = np.zeros(lost.size), np.zeros(lost.size)
-    for k in range(pressures.shape[1]):
-        for i in range(lost.size):
-            # p + half flow(p) = known rises with p: Newton from the last output moved along, held in a bracket.
-            moved = pressures[i, k] - lost[i] - half_flow[i] - right[i]
-            known = right[i] + moved
-            low, high = min(known, 0.0), max(known, 0.0)
-            p = min(max(left[i] + moved, low), high)
-            for _ in range(30):
-                per_pressure = 1.0 / math.sqrt(math.sqrt(p * p + laminar * laminar))
-                flow = p * per_pressure
-                sine = flow * per_pressure
-                slope = 1.0 + half * per_pressure * (1.0 - 0.5 * sine * sine)
-                p, low, high, step = newton(p, p + half * flow - known, slope, low, high)
-                if bend * step * step <= 1e-10:
-                    break
-            half_flow[i] = known - p
-            lost[i] = pressures[i, k] - p
-            left[i], right[i] = p, known
-            out[i, k] = p
-    if pressures.shape[1]:
-        for i in range(lost.size):
-            state[i, 0], state[i, 1] = lost[i], _orifice(left[i], laminar)
+    half_flow = half * flow
+    p, known = 0.0, 0.0
+    for k in range(pressure.size):
+        # p + half flow(p) = known rises with p: Newton from the last output moved along, held in a bracket.
+        moved = pressure[k] - w - half_flow - known
+        known += moved
+        low, high = min(known, 0.0), max(known, 0.0)
+        p = min(max(p + moved, low), high)
+        for _ in range(30):
+            per_pressure = 1.0 / math.sqrt(math.sqrt(p * p + laminar * laminar))
+            flow = p * per_pressure
+            sine = flow * per_pressure
+            slope = 1.0 + half * per_pressure * (1.0 - 0.5 * sine * sine)
+            p, low, high, step = newton(p, p + half * flow - known, slope, low, high)
+            if bend * step * step <= 1e-10:
+                break
+        half_flow = known - p
+        w = pressure[k] - p
+        out[k] = p
+    if pressure.size:
+        state[0], state[1] = w, _orifice(p, laminar)
 
 
 @njit(cache=True)

@@ -22,7 +22,6 @@ BASELINE = (
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
 MOST_SENSITIVITIES = 12  # models under the same conditions of which they are kept
-MOST_AT_ONCE = 8  # signals that pass a block side by side: their steps fill the time that each waits, and the cache
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 
@@ -46,7 +45,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class _Makeup:
+class _Layout:
     """What a chain's effects alone decide, whatever their values: a fit makes thousands of models that share it.
 
     ``order``: numbers of the parts as the signal passes them, None the core; ``in_core``: the effects that stand there.
@@ -58,7 +57,7 @@ class _Makeup:
     in_core: tuple[CoreEffect | None, ...]
 
     @classmethod
-    def of(cls, effects: Sequence[Effect]) -> _Makeup:
+    def of(cls, effects: Sequence[Effect]) -> _Layout:
         """That of a chain of these."""
         in_core = tuple(one if isinstance(one, CoreEffect) else None for one in effects)
         own, core = [("baseline", parameter) for parameter in BASELINE], PLACES.index("core")
@@ -95,11 +94,11 @@ class ExtendedModel:
     @property
     def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
         """(effect's name or "baseline", parameter) in the order of `theta`."""
-        return self._makeup.parameters
+        return self._layout.parameters
 
     @cached_property
-    def _makeup(self) -> _Makeup:
-        return _Makeup.of([part.effect for part in self.parts])
+    def _layout(self) -> _Layout:
+        return _Layout.of([part.effect for part in self.parts])
 
     @property
     def pole_per_s(self) -> float:
@@ -126,7 +125,7 @@ class ExtendedModel:
             k += count
         gain, share, rate = (float(value) for value in theta[: len(BASELINE)])
         made = replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
-        vars(made)["_makeup"] = self._makeup  # the effects are the same
+        vars(made)["_layout"] = self._layout  # the effects are the same
         return made
 
     def with_part(self, added: Effect | str, values: ArrayLike | None = None) -> ExtendedModel:
@@ -146,22 +145,22 @@ class ExtendedModel:
     @property
     def names(self) -> tuple[str, ...]:
         """The effects in it."""
-        return self._makeup.names
+        return self._layout.names
 
     # -- the chain -----------------------------------------------------------------------------------------------
     @cached_property
     def core(self) -> Core:
         """The linear network of wall and gas."""
         elements: list[Element] = [Arm(self.relaxing_share, self.relaxation_rate_per_s)]
-        for part, inside in zip(self.parts, self._makeup.in_core, strict=True):
-            if inside is not None:
-                elements += inside.elements(part.values)
+        for part, effect in zip(self.parts, self._layout.in_core, strict=True):
+            if effect is not None:
+                elements += effect.elements(part.values)
         return network(tuple(elements), self.wall_ratio)
 
     @cached_property
     def chain(self) -> tuple[Part | None, ...]:
         """The blocks in the order in which the signal passes them; None stands for the core."""
-        return tuple(None if k is None else self.parts[k] for k in self._makeup.order)
+        return tuple(None if k is None else self.parts[k] for k in self._layout.order)
 
     def _run(
         self,
@@ -172,18 +171,7 @@ class ExtendedModel:
         core: Core | None = None,
     ) -> Array:
         """The reading's share (n,) from the ``signal`` (n,) into block ``first``; ``core``: another's, alike."""
-        return self.gain * self._passed(signal, conditions, slice(first, None), inputs, core)
-
-    def _passed(
-        self,
-        signal: Array,
-        conditions: Conditions,
-        blocks: slice,
-        inputs: list[Array] | None = None,
-        core: Core | None = None,
-    ) -> Array:
-        """The ``signal`` (n,) behind these ``blocks`` of the chain."""
-        for part in self.chain[blocks]:
+        for part in self.chain[first:]:
             if inputs is not None:
                 inputs.append(signal)
             if part is None:
@@ -191,19 +179,7 @@ class ExtendedModel:
             else:
                 given = self._around(conditions) if part.effect.bends_beside_arm else conditions
                 signal = part.effect.apply(signal, given, part.values)
-        return signal
-
-    def _passed_each(self, signals: Sequence[Array], conditions: Conditions, first: int) -> Sequence[Array]:
-        """Several ``signals`` (n,) behind the chain's end, from the block ``first`` on."""
-        if len(signals) == 1:
-            return [self._passed(signals[0], conditions, slice(first, None))]
-        for part in self.chain[first:]:
-            if part is None:
-                signals = [self.core.simulate(one, conditions.step_s) for one in signals]
-            else:
-                given = self._around(conditions) if part.effect.bends_beside_arm else conditions
-                signals = part.effect.apply_each(signals, given, part.values)
-        return signals
+        return self.gain * signal
 
     def _around(self, conditions: Conditions) -> Conditions:
         """``conditions`` with the relaxing arm: blocks that bend a spring beside it solve the balance of both."""
@@ -225,20 +201,19 @@ class ExtendedModel:
         """For each parameter but the gain."""
         theta, made = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
-        core = self._makeup.order.index(None)
-        # What the arm is felt by: blocks that bend beside it, and the core.
-        beside = [k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm]
+        core = self._layout.order.index(None)
+        # What the arm is felt by first: a block that bends beside it, or the core.
+        arm = next(k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm)
         for j, (owner, parameter) in enumerate(self.parameters):
             if j == 0:
                 continue
             step = derivative_step(parameter, theta[j])
             moved = theta.copy()
             moved[j] += step
-            place = place_of.get(owner, core)
-            first, last = (beside[0], beside[-1]) if owner == "baseline" else (place, place)
+            first = arm if owner == "baseline" else place_of.get(owner, core)
+            trial = self.at(moved)
             alike = first != core and owner != "baseline"  # this parameter does not touch the core
-            own = slice(first, last + 1)
-            made.append(Extension(step, self.at(moved), own, last + 1, self.core if alike else None))
+            made.append(Extension(step, trial, first, self.core if alike else None))
         return tuple(made)
 
     def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
@@ -281,23 +256,15 @@ class ExtendedModel:
             trial, in_core = self.with_part(added, moved), isinstance(added, CoreEffect)
             names = [None if part is None else part.name for part in trial.chain]
             first = names.index(None if in_core else added.name)
-            own, after = slice(first, first + 1), first + in_core  # a block of its own stands before the model's next
-            made.append(Extension(step, trial, own, after, None if in_core else self.core))
+            made.append(Extension(step, trial, first, None if in_core else self.core))
         return tuple(made)
 
     def column_of(self, by: Sequence[Extension], conditions: Conditions, trace: Trace) -> Array:
         """Derivatives (n, k) of the reading with respect to what ``by`` moves; ``trace`` is the model's own."""
         reading, inputs = trace
         out = np.empty((reading.size, len(by)), order="F")
-        alike: dict[int, list[int]] = {}
         for column, one in enumerate(by):
-            alike.setdefault(one.after, []).append(column)
-        for after, columns in alike.items():
-            for k in range(0, len(columns), MOST_AT_ONCE):
-                few = columns[k : k + MOST_AT_ONCE]
-                moved = [by[column].moved(inputs, conditions) for column in few]
-                for column, end in zip(few, self._passed_each(moved, conditions, after), strict=True):
-                    out[:, column] = (self.gain * end - reading) / by[column].step
+            out[:, column] = one.slope(reading, inputs, conditions)
         return out
 
     # -- to and from a file ---------------------------------------------------------------------------------------
@@ -345,20 +312,17 @@ def derivative_step(parameter: EffectParameter, value: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Extension:
-    """A model with one parameter moved by ``step``: its ``own`` blocks, that move by it, the ``core`` where it stays.
-
-    ``after``: the block of the model that did not move that comes then; from it on the chains are the same.
-    """
+    """A model with one parameter moved by ``step``: the ``first`` block that it moves, the ``core`` where it stays."""
 
     step: float
     model: ExtendedModel
-    own: slice
-    after: int
+    first: int
     core: Core | None
 
-    def moved(self, inputs: Sequence[Array], conditions: Conditions) -> Array:
-        """What comes out of its own blocks (n,); ``inputs``: what goes into each of the model that did not move."""
-        return self.model._passed(inputs[self.own.start], conditions, self.own, core=self.core)
+    def slope(self, reading: Array, inputs: Sequence[Array], conditions: Conditions) -> Array:
+        """The reading's derivative (n,), ``inputs`` being what goes into each block of the model that did not move."""
+        moved = self.model._run(inputs[self.first], conditions, self.first, core=self.core)
+        return (moved - reading) / self.step
 
 
 Extensions = tuple[Extension, ...]

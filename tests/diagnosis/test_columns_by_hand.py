@@ -316,21 +316,6 @@ def test_columns_of_a_model_nearby_serve_for_what_is_in_neither() -> None:
             assert rows[:, columns] * found.scales[columns] == pytest.approx(exact, abs=1e-12)
 
 
-def test_columns_about_models_that_read_alike_are_taken_once() -> None:
-    model = MODEL.with_part("delay", np.array([0.11]))
-    sessions = _sessions(model, sizes=(150, 120))
-    found = linearised(model, sessions, STANDARD)
-    assert linearised(model.at(model.theta), [*sessions], STANDARD) is found
-    noisier = replace(STANDARD, imperfection=2.0 * STANDARD.imperfection)
-    for other in (
-        linearised(model.at(1.001 * model.theta), sessions, STANDARD),
-        linearised(model, sessions[:1], STANDARD),
-        linearised(model, sessions, noisier),
-        linearised(model, sessions, STANDARD, found),
-    ):
-        assert other is not found
-
-
 def test_columns_are_what_each_strength_does_to_the_reading() -> None:
     model = MODEL.with_part("dead_band", np.array([0.05, 0.3, 0.1])).with_part("delay", np.array([0.12]))
     sessions = _sessions(model, sizes=(150, 120))

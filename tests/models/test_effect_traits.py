@@ -145,8 +145,8 @@ class Told(Effect):
 
 
 def test_a_model_tells_its_arm_to_what_bends_beside_it_and_to_nothing_else() -> None:
+    at = Conditions(0.05 * np.arange(40), np.linspace(0.0, 1.0, 40), 0.05)
     for bends in (True, False):
-        at = Conditions(0.05 * np.arange(40), np.linspace(0.0, 1.0, 40), 0.05)  # what is known under it goes by names
         one = Told(bends)
         model = BASELINE.with_part(one)
         model.sensitivities(at)
@@ -311,16 +311,3 @@ def test_an_entry_point_to_nowhere_is_refused(installed: ModuleType, monkeypatch
     monkeypatch.setattr(catalogue_module, "entry_points", lambda group: (gone,))
     with pytest.raises(UsageError, match="'gone' cannot be loaded"):
         catalogue()
-
-
-@pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
-def test_signals_side_by_side_are_the_numbers_of_each_alone(one: Effect) -> None:
-    """To the last bit: slopes are taken side by side, and a fit's way hangs on them."""
-    time_s = 0.05 * np.arange(1200)
-    load = 0.5 - 0.5 * np.cos(0.4 * time_s) * np.minimum(time_s / 20.0, 1.0)
-    at = Conditions(time_s, load, 0.05, 1e-3, np.sin(0.1 * time_s), np.roll(load, 40)).within(0.2, 0.5)
-    signals = [share * load - shift for share, shift in ((1.0, 0.0), (0.8, 0.01), (1.1, -0.02))]
-    for values in (typical(one), one.start()):
-        each = one.apply_each(signals, at, values)
-        for signal, found in zip(signals, each, strict=True):
-            np.testing.assert_array_equal(found, one.apply(signal, at, values))

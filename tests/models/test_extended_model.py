@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,21 +80,6 @@ def test_sensitivities_are_those_of_the_whole_chain(name: str) -> None:
             assert_array_equal(slopes[:, j], whole)
     of_it = [j for j, (owner, _) in enumerate(model.parameters) if owner == name]
     assert_array_equal(model.own_sensitivities(name, at, model.trace(at)), slopes[:, of_it])
-
-
-def test_sensitivities_are_taken_once_of_models_that_read_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    at, other = conditions(), conditions()
-    taken: list[int] = []
-    monkeypatch.setattr(ExtendedModel, "column_of", lambda self, by, *_: taken.append(len(by)) or 0.0)
-    model = baseline().with_part(effect("linear_leak"), values_of("linear_leak"))
-    once = model.sensitivities(at)
-    assert model.at(model.theta).sensitivities(at) is once
-    assert taken == [3]
-    moved = (model.at(1.001 * model.theta), model.without("linear_leak"), replace(model, wall_ratio=1.7))
-    for one in moved:
-        one.sensitivities(at)
-    model.sensitivities(other)
-    assert len(taken) == 5
 
 
 @given(st.lists(st.sampled_from(NAMES), min_size=2, max_size=4, unique=True))

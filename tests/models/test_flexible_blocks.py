@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from smartshoe.arrays import Array
 from smartshoe.calibration import ExtendedCompensator
-from smartshoe.kernels.dose import borne
 from smartshoe.models.core import Core, plain
 from smartshoe.models.effects import Conditions, Effect, blocks, catalogue, effect
 from smartshoe.models.effects._monotone_curve import KNOTS
@@ -238,15 +237,6 @@ def test_a_set_by_strokes_counts_loadings_and_no_time(exponent: float) -> None:
     assert short == pytest.approx(3 * 0.01 * 0.6**exponent, rel=0.1)  # the play takes some of each loading
     assert long_ == pytest.approx(short, rel=1e-6)
     assert twice == pytest.approx(2.0 * short, rel=0.02)
-
-
-def test_what_was_borne_is_the_running_sum_that_numpy_gives() -> None:
-    """To the last bit: the slow twin of the kernel."""
-    rng = np.random.default_rng(3)
-    flow, risen, out = rng.random(400), np.cumsum(rng.standard_normal(400)), np.empty(400)
-    borne(flow, risen, 0.02, 0.7, out)
-    each = 0.02 * (flow[1:] + flow[:-1]) + 0.7 * np.maximum(np.diff(risen), 0.0)
-    np.testing.assert_array_equal(out, np.append(0.0, np.cumsum(each)))
 
 
 def test_a_set_by_time_is_that_of_the_permanent_set() -> None:

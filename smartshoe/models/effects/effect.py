@@ -8,7 +8,7 @@ stands at the chain's end. So every strength is a share of full scale.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, TypeVar
 
@@ -230,10 +230,6 @@ class Effect(ABC):
     @abstractmethod
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The block's output (n,) for its input (n,); ``values`` in the order of ``parameters``. Never in place."""
-
-    def apply_each(self, signals: Sequence[Array], conditions: Conditions, values: Array) -> Sequence[Array]:
-        """`apply` to several signals: the same numbers, faster where a block takes them side by side."""
-        return [self.apply(one, conditions, values) for one in signals]
 
     def inverse(self, values: Array, step_s: float) -> Inverse | None:
         """The streaming inverse, None where there is none (a delay, noise, a signal lost to saturation)."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from smartshoe.arrays import Array
@@ -38,21 +36,16 @@ class GasCompression(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The pressure of the stiffer gas."""
-        return self.apply_each([signal], conditions, values)[0]
-
-    def apply_each(self, signals: Sequence[Array], conditions: Conditions, values: Array) -> Sequence[Array]:
-        """The same of several, side by side."""
         from smartshoe.kernels.wall_loop import compressed
 
         arm = arm_beside(conditions)
         ratio = _beside(float(values[0]), arm[0])
         if ratio == 0.0:
-            return [one.copy() for one in signals]
+            return signal.copy()
         # The load of which the linear core made the signal.
-        loads = np.array([one + relaxed(one, conditions) for one in signals])
-        out = np.empty(loads.shape)
-        compressed(loads, ratio, _stiffness(ratio)[0], *arm, out)
-        return list(out)
+        load, out = signal + relaxed(signal, conditions), np.empty(signal.size)
+        compressed(load, ratio, _stiffness(ratio)[0], *arm, out)
+        return out
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -62,21 +62,16 @@ class MullinsSoftening(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without softening would need; ``before["largest_load"]`` counts."""
-        return self.apply_each([signal], conditions, values)[0]
-
-    def apply_each(self, signals: Sequence[Array], conditions: Conditions, values: Array) -> Sequence[Array]:
-        """The same of several, side by side."""
         from smartshoe.kernels.wall_loop import softened
 
         if values[0] == 0.0:
-            return [one.copy() for one in signals]
-        before, loads = float(conditions.before.get("largest_load", 0.0)), np.array(signals)
+            return signal.copy()
+        before, out = float(conditions.before.get("largest_load", 0.0)), np.empty(signal.size)
         share, decay, now, earlier = arm_beside(conditions)
         share *= 1.0 - float(values[5])
         given = *_amounts(values, share), before, dead_zone(conditions), share, decay, now, earlier
-        out = np.empty(loads.shape)
-        softened(loads, *given, out)
-        return list(out)
+        softened(np.ascontiguousarray(signal), *given, out)
+        return out
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -37,19 +37,14 @@ class OrificeLeak(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """What is left of the pressure."""
-        return self.apply_each([signal], conditions, values)[0]
-
-    def apply_each(self, signals: Sequence[Array], conditions: Conditions, values: Array) -> Sequence[Array]:
-        """The same of several, side by side."""
         if values[0] == 0.0:
-            return [one.copy() for one in signals]
+            return signal.copy()
         from smartshoe.kernels.memory import orifice
 
-        pressures = np.array(signals)
-        out = np.empty(pressures.shape)
+        out = np.empty(signal.size)
         rate = float(values[0]) * conditions.step_s
-        orifice(pressures, rate, float(values[1]), np.zeros((len(signals), 2)), out)
-        return list(out)
+        orifice(np.ascontiguousarray(signal), rate, float(values[1]), np.zeros(2), out)
+        return out
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """Add what left, integrated from the pressure that is left: exact."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from smartshoe.arrays import Array
@@ -41,18 +39,13 @@ class WallHardening(Effect):
 
     def apply(self, signal: Array, conditions: Conditions, values: Array) -> Array:
         """The load that a wall without hardening would need."""
-        return self.apply_each([signal], conditions, values)[0]
-
-    def apply_each(self, signals: Sequence[Array], conditions: Conditions, values: Array) -> Sequence[Array]:
-        """The same of several, side by side."""
         if values[0] == 0.0:
-            return [one.copy() for one in signals]
+            return signal.copy()
         from smartshoe.kernels.wall_loop import hardened
 
-        loads = np.array(signals)
-        out = np.empty(loads.shape)
-        hardened(loads, *_coefficients(values), *arm_beside(conditions), out)
-        return list(out)
+        out = np.empty(signal.size)
+        hardened(np.ascontiguousarray(signal), *_coefficients(values), *arm_beside(conditions), out)
+        return out
 
     def inverse_within(self, chain: ChainContext, values: Array, step_s: float) -> Inverse:
         """What the arm bears set apart first."""
