@@ -30,7 +30,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate, combinations, cycle, pairwise
+from itertools import combinations, cycle
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -304,9 +304,8 @@ class Evidence:
 
     def _strengths(self, members: Members, pull: Array) -> tuple[Array, ...]:
         """Each member's (k,), of a solution that begins with them."""
-        ends = [0, *accumulate(len(self.given.candidates[m].columns) for m in members)]
-        own = self.thresholds.strength_sd * pull[: ends[-1]]
-        return tuple(own[first:end] for first, end in pairwise(ends))
+        ends = np.cumsum([len(self.given.candidates[m].columns) for m in members], dtype=np.intp)
+        return tuple(np.split(self.thresholds.strength_sd * pull[: ends[-1]], ends[:-1])) if members else ()
 
     def _described(self, members: Members, pull: Array, fall: float) -> Posterior:
         columns = [self.given.candidates[m].columns for m in members]
@@ -314,7 +313,7 @@ class Evidence:
         sizes = tuple(self.visible_rms(c, s) for c, s in zip(columns, each, strict=True))
         own, beyond = np.split(pull, [sum(map(len, columns))])
         beyond = beyond[: len(members) * self._directions]  # after them come those towards other laws
-        departed = np.sqrt(np.mean(beyond.reshape(-1, self._directions) ** 2, axis=1)).tolist()
+        departed = [float(np.sqrt(np.mean(one**2))) for one in beyond.reshape(-1, self._directions)]
         together = self.visible_rms([c for few in columns for c in few], self.thresholds.strength_sd * own)
         score = self._nothing - fall + self.odds_of(members)
         return Posterior(members, score, each, sizes, tuple(departed or [0.0] * len(members)), together)
@@ -335,7 +334,7 @@ class Evidence:
             for way, own in zip(ways, cycle(strengths), strict=False):
                 share = self.thresholds.departure / math.sqrt(len(way) or 1)
                 index += way
-                sds += [max(share * math.sqrt(float(own @ own)), 1e-7)] * len(way)
+                sds += [max(share * float(np.linalg.norm(own)), 1e-7)] * len(way)
         return np.array(index, dtype=np.intp), np.array(sds)
 
     def _others_of(self, member: int) -> list[int]:
@@ -351,7 +350,7 @@ class Evidence:
         factor = _factor(inner)
         asked = sds * self._reduced[index, 0]
         pull = np.asarray(dpotrs(factor, asked, lower=1)[0]) if index.size else asked
-        return factor, pull, float(asked @ pull) - 2.0 * float(np.sum(np.log(factor.diagonal())))
+        return factor, pull, float(asked @ pull) - 2.0 * float(np.sum(np.log(np.diag(factor))))
 
     def extensions(self, members: Members) -> list[tuple[float, int, Array]]:
         """For each candidate the score of ``members`` with it, its equation taken for exact, and its strengths (k,).
@@ -379,7 +378,7 @@ class Evidence:
             solved = np.linalg.solve(inner, q[:, :, None])[:, :, 0]
             fall = wide * np.sum(q * solved, axis=1) - np.linalg.slogdet(inner)[1]
             found += [
-                (best.score - float(fell) + self._odds_of_each[k], k, wide * strengths)
+                (best.score - float(fell) + self.odds_of((k,)), k, wide * strengths)
                 for k, fell, strengths in zip(numbers, fall, solved, strict=True)
                 if k not in best.members
             ]
@@ -395,13 +394,8 @@ class Evidence:
 
     def odds_of(self, members: Members) -> float:
         """-2 log prior odds against the members of a set: of one effect among all, at one of its shapes."""
-        return sum(self._odds_of_each[m] for m in members)
-
-    @cached_property
-    def _odds_of_each(self) -> list[float]:
-        """The same of each candidate alone."""
         shapes = self.given.shapes
-        return [self.odds + 2.0 * math.log(shapes[one.name]) for one in self.given.candidates]
+        return sum(self.odds + 2.0 * math.log(shapes[self.given.candidates[m].name]) for m in members)
 
 
 def _factor(matrix: Array) -> Array:

@@ -29,13 +29,12 @@ def allowed(evidence: Evidence, found: Posterior) -> bool:
 def additions(evidence: Evidence, members: Members, breadth: int = BREADTH, banned: Collection[str] = ()) -> list[int]:
     """Candidates that promise most beside ``members``, one shape an effect, best first."""
     taken = {evidence.given.candidates[m].slot for m in members}
-    inside = evidence.given.model.names
     best: dict[str, tuple[float, int]] = {}
     for score, k, strengths in evidence.extensions(members):
         one = evidence.given.candidates[k]
         if one.slot in taken or one.name in banned:
             continue
-        if one.name not in inside and len(strengths) == 1 and not one.has_sign_of(strengths):
+        if one.name not in evidence.given.model.names and len(strengths) == 1 and not one.has_sign_of(strengths):
             continue
         if one.name not in best or score < best[one.name][0]:
             best[one.name] = (score, k)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -25,9 +25,6 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.signals.lags import lagged
-
-
-MOST_LINEARISED = 4  # models about which columns are kept: as much room as they take at once all the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +61,12 @@ class Candidate:
 
     def has_sign_of(self, strengths: Array) -> bool:
         """Whether changes (k,) of the strengths lie on the side of null that physics allows."""
-        ways = zip(self._ways, strengths, strict=True)
-        return all((down or value >= 0.0) and (up or value <= 0.0) for (down, up), value in ways)
-
-    @cached_property
-    def _ways(self) -> list[tuple[bool, bool]]:
-        """Whether each strength may lie below null, and above."""
-        return [(p.lower < p.null, p.upper > p.null) for p in self.effect.parameters if p.null is not None]
+        bounded = [p for p in self.effect.parameters if p.null is not None]
+        return all(
+            (p.lower < p.null or value >= 0.0) and (p.upper > p.null or value <= 0.0)
+            for p, value in zip(bounded, strengths, strict=True)
+            if p.null is not None
+        )
 
 
 def available(sessions: Sequence[Session], thresholds: Thresholds) -> list[Effect]:
@@ -265,21 +261,8 @@ def cosines(inner: Array) -> Array:
 def linearised(
     model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, beside: Linearised | None = None
 ) -> Linearised:
-    """The columns about ``model``; ``beside``: those about a model nearby, which serve for what is in neither.
-
-    Kept for a while where all are about it: a model is weighed again under the noise of another, or by itself.
-    """
+    """The columns about ``model``; ``beside``: those about a model nearby, which serve for what is in neither."""
     fitted = tuple(session for session in sessions if session.fitted.any())
-    if beside is not None or not fitted:
-        return _linearised(model, fitted, thresholds, beside)
-    by = model.content, thresholds, *map(id, fitted)  # these live as long as what holds them is kept
-    made = partial(_linearised, model, fitted, thresholds)
-    return fitted[0].conditions.kept("linearised", by, made, MOST_LINEARISED)
-
-
-def _linearised(
-    model: ExtendedModel, fitted: tuple[Session, ...], thresholds: Thresholds, beside: Linearised | None = None
-) -> Linearised:
     inside = {part.name: part for part in model.parts}
     outside = [e for e in available(fitted, thresholds) if e.name not in inside]
     channels = logged_channels(fitted)

@@ -10,19 +10,6 @@ from smartshoe.kernels.memory import NO_LOAD
 
 
 @njit(cache=True)
-def borne(flow, risen, held, by_stroke, out):  # type: ignore[no-untyped-def]
-    """out (n,): X from 0, grown a step by ``held`` times the sum of both flows, ``by_stroke`` times the rise of risen.
-
-    ``flow`` is p^m and ``risen`` z^m, (n,) each.
-    """
-    total = 0.0
-    for k in range(flow.size):
-        if k > 0:
-            total += held * (flow[k] + flow[k - 1]) + by_stroke * max(risen[k] - risen[k - 1], 0.0)
-        out[k] = total
-
-
-@njit(cache=True)
 def set_undone(signal, half, exponent, state, out):  # type: ignore[no-untyped-def]
     """out (n,) with out + set = ``signal`` (n,), set += half (out^m + last out^m) a step, out^m = 0 below zero.
 

@@ -81,7 +81,7 @@ class Core:
         for shift in (0.0, 1.0, 10.0):
             values, vectors = (np.real(found) for found in np.linalg.eig(self.matrix + shift * apart))
             inverse = _inverse(vectors)
-            if inverse is not None and np.vdot(vectors, vectors) * np.vdot(inverse, inverse) < MOST_SKEWED**2:
+            if inverse is not None and np.linalg.norm(vectors) * np.linalg.norm(inverse) < MOST_SKEWED:
                 return values, vectors, inverse
         return values, vectors, np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
 

@@ -21,7 +21,6 @@ BASELINE = (
     EffectParameter("relaxing_share", "1", "k2/(k1 + gas): share of the load that relaxes", None, -0.9, 5.0, 0.1),
     EffectParameter("relaxation_rate", "1/s", "k2/c, the paper's a1", None, 0.01, 50.0, 0.2),
 )
-MOST_SENSITIVITIES = 12  # models under the same conditions of which they are kept
 DERIVATIVE_STEP = 1e-3  # of a parameter's size
 
 
@@ -45,32 +44,6 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layout:
-    """What a chain's effects alone decide, whatever their values: a fit makes thousands of models that share it.
-
-    ``order``: numbers of the parts as the signal passes them, None the core; ``in_core``: the effects that stand there.
-    """
-
-    names: tuple[str, ...]
-    parameters: tuple[tuple[str, EffectParameter], ...]
-    order: tuple[int | None, ...]
-    in_core: tuple[CoreEffect | None, ...]
-
-    @classmethod
-    def of(cls, effects: Sequence[Effect]) -> _Layout:
-        """That of a chain of these."""
-        in_core = tuple(one if isinstance(one, CoreEffect) else None for one in effects)
-        own, core = [("baseline", parameter) for parameter in BASELINE], PLACES.index("core")
-        at = sorted((PLACES.index(one.place), one.name, k) for k, one in enumerate(effects) if in_core[k] is None)
-        return cls(
-            tuple(one.name for one in effects),
-            (*own, *((one.name, parameter) for one in effects for parameter in one.parameters)),
-            (*(k for place, _, k in at if place < core), None, *(k for place, _, k in at if place > core)),
-            in_core,
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class ExtendedModel:
     """The standard linear solid (Chinimilli 2016, equation 2) with effects, ``parts``, at their places of the chain.
 
@@ -91,14 +64,11 @@ class ExtendedModel:
     noise: float = 0.0
 
     # -- parameters as one vector ------------------------------------------------------------------------------
-    @property
+    @cached_property
     def parameters(self) -> tuple[tuple[str, EffectParameter], ...]:
         """(effect's name or "baseline", parameter) in the order of `theta`."""
-        return self._layout.parameters
-
-    @cached_property
-    def _layout(self) -> _Layout:
-        return _Layout.of([part.effect for part in self.parts])
+        own = [("baseline", parameter) for parameter in BASELINE]
+        return (*own, *((part.name, parameter) for part in self.parts for parameter in part.effect.parameters))
 
     @property
     def pole_per_s(self) -> float:
@@ -111,11 +81,6 @@ class ExtendedModel:
         baseline = [self.gain, self.relaxing_share, self.relaxation_rate_per_s]
         return np.concatenate([baseline, *(part.values for part in self.parts)])
 
-    @property
-    def content(self) -> tuple[object, ...]:
-        """What two models have in common that read alike, whatever the conditions: effects and all numbers."""
-        return self.wall_ratio, self.names, *self.theta.tolist()
-
     def at(self, theta: Array) -> ExtendedModel:
         """The same chain with the parameters ``theta`` (p,)."""
         parts, k = [], len(BASELINE)
@@ -124,9 +89,7 @@ class ExtendedModel:
             parts.append(Part(part.effect, np.array(theta[k : k + count], dtype=float)))
             k += count
         gain, share, rate = (float(value) for value in theta[: len(BASELINE)])
-        made = replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
-        vars(made)["_layout"] = self._layout  # the effects are the same
-        return made
+        return replace(self, gain=gain, relaxing_share=share, relaxation_rate_per_s=rate, parts=tuple(parts))
 
     def with_part(self, added: Effect | str, values: ArrayLike | None = None) -> ExtendedModel:
         """This model with one more effect, itself or its name, at null where ``values`` are not given."""
@@ -145,22 +108,30 @@ class ExtendedModel:
     @property
     def names(self) -> tuple[str, ...]:
         """The effects in it."""
-        return self._layout.names
+        return tuple(part.name for part in self.parts)
 
     # -- the chain -----------------------------------------------------------------------------------------------
     @cached_property
     def core(self) -> Core:
         """The linear network of wall and gas."""
         elements: list[Element] = [Arm(self.relaxing_share, self.relaxation_rate_per_s)]
-        for part, effect in zip(self.parts, self._layout.in_core, strict=True):
-            if effect is not None:
-                elements += effect.elements(part.values)
+        for part in self.parts:
+            if isinstance(part.effect, CoreEffect):
+                elements += part.effect.elements(part.values)
         return network(tuple(elements), self.wall_ratio)
 
     @cached_property
     def chain(self) -> tuple[Part | None, ...]:
         """The blocks in the order in which the signal passes them; None stands for the core."""
-        return tuple(None if k is None else self.parts[k] for k in self._layout.order)
+        outside = [part for part in self.parts if not isinstance(part.effect, CoreEffect)]
+        core = PLACES.index("core")
+        before = [part for part in outside if PLACES.index(part.effect.place) < core]
+        after = [part for part in outside if PLACES.index(part.effect.place) > core]
+
+        def order(part: Part) -> tuple[int, str]:
+            return PLACES.index(part.effect.place), part.name
+
+        return (*sorted(before, key=order), None, *sorted(after, key=order))
 
     def _run(
         self,
@@ -201,7 +172,7 @@ class ExtendedModel:
         """For each parameter but the gain."""
         theta, made = self.theta, []
         place_of = {part.name: k for k, part in enumerate(self.chain) if part is not None}
-        core = self._layout.order.index(None)
+        core = self.chain.index(None)
         # What the arm is felt by first: a block that bends beside it, or the core.
         arm = next(k for k, part in enumerate(self.chain) if part is None or part.effect.bends_beside_arm)
         for j, (owner, parameter) in enumerate(self.parameters):
@@ -219,19 +190,14 @@ class ExtendedModel:
     def sensitivities(self, conditions: Conditions, trace: Trace | None = None) -> tuple[Array, Array]:
         """The reading (n,) and its derivatives (n, p) with respect to `theta`, by one-sided differences.
 
-        The chain is run anew only from the first block that a parameter moves; nobody may write to what it gives.
+        The chain is run anew only from the first block that a parameter moves.
         ``trace``: this model's own under the same conditions, where it is known.
         """
-
-        def made() -> tuple[Array, Array]:
-            known = trace or self.trace(conditions)
-            out = np.empty((known[0].size, 1 + len(self._varied)), order="F")
-            out[:, 0] = known[0] / self.gain
-            out[:, 1:] = self.column_of(self._varied, conditions, known)
-            return known[0], out
-
-        # Fits begin where others ended, and what they end at is weighed: the same model is asked for again and again.
-        return conditions.kept("sensitivities", self.content, made, MOST_SENSITIVITIES)
+        trace = trace or self.trace(conditions)
+        out = np.empty((trace[0].size, 1 + len(self._varied)), order="F")
+        out[:, 0] = trace[0] / self.gain
+        out[:, 1:] = self.column_of(self._varied, conditions, trace)
+        return trace[0], out
 
     def own_sensitivities(self, name: str, conditions: Conditions, trace: Trace) -> Array:
         """Of these derivatives those (n, k) with respect to the parameters of the effect ``name``."""

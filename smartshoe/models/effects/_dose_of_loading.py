@@ -43,13 +43,11 @@ class Dose:
 
     def grown(self, signal: Array, conditions: Conditions) -> Array:
         """(n,) how far it has grown: ``size`` X0 log(1 + X/X0)."""
-        from smartshoe.kernels.dose import borne
-
         flow = np.maximum(signal, 0.0) ** self.exponent
         z = np.maximum(cleaned(signal, max(HALF_WIDTH, dead_zone(conditions))), 0.0) ** self.exponent
         held = 0.5 * conditions.step_s * (1.0 - self.by_stroke) / USUAL_STROKE_S
-        dose = np.empty(signal.size)
-        borne(flow, z, held, self.by_stroke, dose)
+        dose = np.zeros(signal.size)
+        np.cumsum(held * (flow[1:] + flow[:-1]) + self.by_stroke * np.maximum(np.diff(z), 0.0), out=dose[1:])
         return self.size * self.early * np.log1p(dose / self.early)
 
     def undone(self, step_s: float, is_gain: bool) -> Undone:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
@@ -34,24 +34,19 @@ def bent(signal: Array, weights: Array) -> Array:
     from smartshoe.kernels.parabolas import along
 
     out = np.empty(signal.size)
-    along(np.ascontiguousarray(signal, dtype=float), KNOTS, *_pieces(*weights.tolist()), out)
+    along(np.ascontiguousarray(signal, dtype=float), KNOTS, *_pieces(weights), out)
     return out
 
 
 def straightened(weights: Array) -> Inverse:
     """The inverse of `bent`: the parabola of the piece solved for its argument, exact to rounding."""
-    start, slope, bend = _pieces(*weights.tolist())
+    start, slope, bend = _pieces(weights)
     return Memoryless(partial(_undo, weights=weights), _c_body(start, slope, bend))
 
 
-@lru_cache(maxsize=64)
-def _pieces(*weights: float) -> tuple[Array, Array, Array]:
-    """Value (6,), slope (6,) and half the second derivative (5,) of the curve at, and after, each knot.
-
-    Kept, since a fit asks for the same few often. Nobody may write to them; were they marked so, kernels would be
-    compiled once more.
-    """
-    slope = 1.0 + np.array(weights)
+def _pieces(weights: Array) -> tuple[Array, Array, Array]:
+    """Value (6,), slope (6,) and half the second derivative (5,) of the curve at, and after, each knot."""
+    slope = 1.0 + np.asarray(weights, dtype=float)
     length = np.diff(KNOTS)
     rise = 0.5 * (slope[1:] + slope[:-1]) * length
     whole = rise.sum()
@@ -61,7 +56,7 @@ def _pieces(*weights: float) -> tuple[Array, Array, Array]:
 
 
 def _undo(signal: Array, time_s: Array, weights: Array) -> Array:
-    start, slope, bend = _pieces(*weights.tolist())
+    start, slope, bend = _pieces(weights)
     y = np.clip(signal, 0.0, 1.0)
     at = np.searchsorted(start[1:-1], y, side="right")
     above = y - start[at]

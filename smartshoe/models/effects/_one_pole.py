@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
@@ -17,12 +16,8 @@ POINTS, WEIGHTS = (0.5 * values for values in np.polynomial.legendre.leggauss(12
 POWERS = (POINTS - 0.5) ** np.arange(4)[:, None]  # (power, point): of s between -1 and 0
 
 
-@lru_cache(maxsize=64)
 def _weights(x: float) -> Array:
-    """(4,) of the samples at `NODES` in w(0) = exp(-x) w(-1) + integral of x exp(x s) u(s) from -1 to 0.
-
-    Kept, since a fit asks for the same few often; nobody may write to them.
-    """
+    """(4,) of the samples at `NODES` in w(0) = exp(-x) w(-1) + integral of x exp(x s) u(s) from -1 to 0."""
     if x < 2.0:
         moments = np.sum(WEIGHTS * x * np.exp(x * POWERS[1]) * POWERS, axis=1)
     else:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -68,7 +68,6 @@ class EffectParameter:
         return (above and value >= self.upper) or (below and value <= self.lower)
 
 
-_Made = TypeVar("_Made")
 LEAST_CHANGE_K = 0.2  # below a cheap probe's noise and steps: such a channel says that the temperature stood still
 MOST_KEPT = 6  # of one name: a law's own, and those with one of its shape's numbers moved
 
@@ -96,24 +95,24 @@ class Conditions:
     relaxing: tuple[float, float] | None = None
     cache: dict[str, Array] = field(default_factory=dict, repr=False)
     """What blocks derive from the load alone (largest so far, cycles done), by name."""
-    _kept: dict[str, dict[tuple[object, ...], Any]] = field(default_factory=dict, init=False, repr=False)
+    _kept: dict[str, dict[tuple[float, ...], Array]] = field(default_factory=dict, init=False, repr=False)
 
     def within(self, share: float, rate_per_s: float) -> Conditions:
         """The same conditions, and what was derived from them, within a model whose arm relaxes so."""
         return replace(self, relaxing=(share, rate_per_s))
 
-    def kept(self, name: str, by: tuple[object, ...], make: Callable[[], _Made], most: int = MOST_KEPT) -> _Made:
-        """What ``make`` derives from these conditions and ``by`` alone: the last few by a name are kept.
+    def kept(self, name: str, numbers: tuple[float, ...], make: Callable[[], Array]) -> Array:
+        """What ``make`` derives from these conditions and ``numbers`` alone: the last few by a name are kept.
 
         A fit asks for the same again wherever it moves another parameter. Nobody may write to what it gives.
         """
-        known: dict[tuple[object, ...], _Made] = self._kept.setdefault(name, {})
-        found = known.pop(by, None)
+        known = self._kept.setdefault(name, {})
+        found = known.pop(numbers, None)
         if found is None:
             found = make()
-            if len(known) >= most:
+            if len(known) >= MOST_KEPT:
                 known.pop(next(iter(known)))
-        known[by] = found  # the last asked for stands last
+        known[numbers] = found  # the last asked for stands last
         return found
 
     @property
