@@ -86,7 +86,7 @@ class Core:
         return values, vectors, np.asarray(np.linalg.pinv(vectors), dtype=np.float64)
 
     def _modes_at(self, step_s: float) -> tuple[Array, Array, Array, Array, Array]:
-        """decay, before, after, what the pressure has of each mode (p,), and the matrix from states to modes."""
+        """decay, before, after (p,), the matrix from modes to states and that from states to modes."""
         values, vectors, inverse = self._vectors
         z = -values * step_s
         decay = np.exp(-z)
@@ -98,7 +98,7 @@ class Core:
             after = np.where(small, 0.5 - z / 6.0 + z * z / 24.0, after)
             before = np.where(small, 0.5 - z / 3.0 + z * z / 8.0, before)
         scale = step_s * (inverse @ self.drive)
-        return decay, scale * before, scale * after, self.read @ vectors, inverse
+        return decay, scale * before, scale * after, vectors, inverse
 
     def simulate(self, load: Array, step_s: float) -> Array:
         """Pressure (n,) for ``load`` (n,), shares of full scale, every ``step_s``; started in steady state."""
@@ -106,10 +106,10 @@ class Core:
             return self.direct * load
         from smartshoe.kernels.modal import respond
 
-        decay, before, after, read, inverse = self._modes(step_s)
+        decay, before, after, vectors, inverse = self._modes(step_s)
         out = np.empty(load.size)
         state = inverse @ self.steady_state(float(load[0]))
-        respond(np.ascontiguousarray(load), decay, before, after, read, self.direct, state, out)
+        respond(np.ascontiguousarray(load), decay, before, after, self.read @ vectors, self.direct, state, out)
         return out
 
     def recursion(self, step_s: float) -> tuple[Array, Array, Array]:

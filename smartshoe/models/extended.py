@@ -155,9 +155,7 @@ class ExtendedModel:
     def _around(self, conditions: Conditions) -> Conditions:
         """``conditions`` with the relaxing arm: blocks that bend a spring beside it solve the balance of both."""
         relaxing = self.relaxing_share, self.relaxation_rate_per_s
-        if conditions.relaxing == relaxing:
-            return conditions
-        return conditions.kept("within", relaxing, lambda: conditions.within(*relaxing))
+        return conditions if conditions.relaxing == relaxing else conditions.within(*relaxing)
 
     def simulate(self, conditions: Conditions) -> Array:
         """The reading (n,) as a share of ``full_scale_reading`` under ``conditions``."""
