@@ -246,8 +246,8 @@ def test_a_range_is_narrow_where_its_least_is_more_than_half_of_its_largest() ->
 
 
 def test_a_narrow_range_is_told_with_its_numbers() -> None:
-    flat, steep = _line(0.8, 1.0, slope=0.5), _line(0.6, 1.0, slope=0.9)
-    for files, gain in (((flat,), 0.5), ((flat, steep), 0.7)):
+    flat, steep = _line(0.8, 1.0, slope=0.6), _line(0.6, 1.0, slope=0.9)
+    for files, gain in (((flat,), 0.6), ((flat, steep), 0.75)):
         (said,) = _told(*files).says
         assert "(641.6 to 798.4 N in file)" in said
         assert f"moves by {0.2 * gain:.3g} mbar/N ({5.0 / gain:.4g} N/mbar): what lies below is extrapolated" in said
