@@ -133,11 +133,10 @@ def test_what_repeats_is_said_and_what_does_not_is_not() -> None:
 
 @pytest.mark.parametrize(("seed", "lacks"), [(403, True), (423, True), (246, False), (20, False)])
 def test_a_lack_is_said_below_one_percent(seed: int, lacks: bool) -> None:
-    """Of white noise by chance: p is 0.007, 0.005, 0.011 and 0.018. No sample lies on a block's border, whatever the last digit."""
+    """Of white noise by chance: p is 0.007, 0.005, 0.011 and 0.018, where no sample lies on a block's border."""
     between = triangles([200.0, 400.0, 200.0, 400.0, 200.0], [1.0037, 2.0, 1.5, 1.7, 1.2])
-    found = lack_of_fit_of(
-        {"r": np.random.default_rng(seed).standard_normal(len(between) + 300)[300:]}, [between], unknowns=0
-    )
+    noise = np.random.default_rng(seed).standard_normal(len(between) + 300)[300:]
+    found = lack_of_fit_of({"r": noise}, [between], unknowns=0)
     assert 0.004 < found.p_value < 0.02
     assert (found.p_value < 0.01) is lacks
     assert ("the model lacks something" in found.says) is lacks
