@@ -98,17 +98,12 @@ def command(
             written = publish(result, target) if target is not None else {}
     if emit_json(whole, json_path):
         return
-    from smartshoe.devices.joining import clock_text
     from smartshoe.report.tables import print_identification, print_validation
 
     print_identification(whole["identification"])
     print_validation(whole["validation"])
-    for experiment in whole["experiments"]:
-        join = experiment["join"]
-        click.echo(
-            f"{experiment['name']}: beside the shoe's the machine's clock is "
-            + clock_text(*(join[key][of] for key in ("delay_s", "rate_ppm") for of in ("value", "sd")))
-        )
+    for said in result.clocks_said:
+        click.echo(said)
     if result.diagnosis is not None:
         click.echo(f"diagnosis: {result.diagnosis.says}")
     for name, path in written.items():

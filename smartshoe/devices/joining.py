@@ -28,14 +28,6 @@ LONGEST_BRIDGED_STEPS = 3.5
 Ticks = Literal["logger", "machine"]
 
 
-def clock_text(delay_s: float, delay_sd_s: float, rate_ppm: float, rate_sd_ppm: float) -> str:
-    """An offset and a rate of one clock beside another, in words."""
-    return (
-        f"{abs(delay_s):.4f} ± {delay_sd_s:.4f} s {'behind' if delay_s < 0 else 'ahead'},"
-        f" {abs(rate_ppm):.1f} ± {rate_sd_ppm:.1f} ppm {'slow' if rate_ppm < 0 else 'fast'}"
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class Alignment:
     """machine time = logger time + ``delay_s`` + ``rate`` (logger time - its middle); sd of both; correlation.
@@ -55,7 +47,10 @@ class Alignment:
     @property
     def says(self) -> str:
         """How the machine's clock stands beside the logger's, in words: numbers below 0 are behind and slow."""
-        return clock_text(self.delay_s, self.delay_sd_s, 1e6 * self.rate, 1e6 * self.rate_sd)
+        return (
+            f"{abs(self.delay_s):.4f} ± {self.delay_sd_s:.4f} s {'behind' if self.delay_s < 0 else 'ahead'},"
+            f" {1e6 * abs(self.rate):.1f} ± {1e6 * self.rate_sd:.1f} ppm {'slow' if self.rate < 0 else 'fast'}"
+        )
 
     def machine_time(self, logger_time_s: Array) -> Array:
         """Logger time (n,) on the machine's clock."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, require_positive
 from smartshoe.diagnosis._baseline import USUAL
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._sensitivity import Linearised, linearised
@@ -109,8 +109,7 @@ def design(
         raise UsageError("a design needs a protocol: give one at least")
     given = {"noise_percent": noise_percent, "strength_percent": strength_percent, "sample_rate_hz": sample_rate_hz}
     for name, value in given.items():
-        if not (np.isfinite(value) and value > 0):
-            raise UsageError(f"{name} is {value:g}: give a positive number")
+        require_positive(value, name)
     limits = thresholds or Thresholds()
     peak_n = max(protocol.peak_load_n for protocol in protocols)
     if not peak_n > 0:

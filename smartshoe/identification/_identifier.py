@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from smartshoe.arrays import Mask
+from smartshoe.arrays import Mask, require_positive
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
 from smartshoe.files.logs.accepted import RecordingLike, recordings_of
 from smartshoe.identification._conclude import Choice, conclude
@@ -111,7 +111,9 @@ def identify(  # noqa: PLR0913 - a public verb
     """
     several = recordings_of(recordings)
     _check_choices(direction, method, structure, initial_state, estimator)
-    _check_positive(prefilter_rad_s=prefilter_rad_s, tolerance=tolerance, max_iterations=max_iterations)
+    require_positive(prefilter_rad_s, "prefilter_rad_s")
+    require_positive(tolerance, "tolerance")
+    require_positive(max_iterations, "max_iterations")
     experiments, reading_unit = prepare(several, counted)
     newtons, scale_note = _scale(several, reading_unit, scale, structure)
     settings = _settings(direction, offset, load_offset_n, delay, initial_state)
@@ -165,12 +167,6 @@ def _check_choices(direction: str, method: str, structure: str, initial_state: s
         raise UsageError("srivc fits three free coefficients: use gn, lm or trf for the grey box")
     if method == "srivc" and estimator not in ("auto", "output_error"):
         raise UsageError(f"srivc has an instrument of its own: use gn, lm or trf with estimator {estimator}")
-
-
-def _check_positive(**numbers: float) -> None:
-    for name, number in numbers.items():
-        if not (np.isfinite(number) and number > 0):
-            raise UsageError(f"{name} is {number:g}: give a positive number")
 
 
 def _fixed(name: str, value: float | str) -> float | None:

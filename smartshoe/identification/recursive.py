@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smartshoe.arrays import Array, Integers
+from smartshoe.arrays import Array, Integers, require_positive
 from smartshoe.calibration import Compensator
 from smartshoe.errors import NotIdentifiableError, UsageError
 from smartshoe.identification._conclude import NAMES, WORST_RELATIVE_GAIN_SD, WORST_RELATIVE_SD, solid_of
@@ -91,9 +91,8 @@ class RecursiveIdentification:
         initial_state: Literal["estimate", "steady"] = "estimate",
         scale: float = 1.0,
     ) -> None:
-        for name, number in (("sample_rate_hz", sample_rate_hz), ("scale", scale)):
-            if not (np.isfinite(number) and number > 0):
-                raise UsageError(f"{name} is {number:g}: give a positive number")
+        require_positive(sample_rate_hz, "sample_rate_hz")
+        require_positive(scale, "scale")
         if direction not in get_args(Direction):
             raise UsageError(f"direction {direction!r} is not known: use one of {', '.join(get_args(Direction))}")
         if initial_state not in ("estimate", "steady"):

@@ -8,10 +8,10 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._held import frozen
 from smartshoe.integrity._view import View
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.signals.lags import lagged
-from smartshoe.signals.masks import runs_of
 
 RISES_WITH_LOAD = ("pressure", "force")
 
@@ -28,9 +28,8 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         follows = view.thresholds.follows
         if view.thresholds.clear * (1.0 - share) <= view.thresholds.same or (share >= follows and moves_with > 0.0):
             return  # of a few samples a ramp, a load looks like noise: what is followed is none
-        frozen = _frozen(view)
-        if frozen is not None:
-            yield frozen
+        if (stands_still := frozen(view)) is not None:
+            yield stands_still
             return
         memory_s = view.thresholds.memory_s
         says = (
@@ -41,28 +40,6 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         if view.load_span <= 2.0 * load.largest * load.quiet_noise:
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
     yield Finding("does_not_follow_load", whole, says, "fatal", True, says)
-
-
-def _frozen(view: View) -> Finding | None:
-    """Kind ``held_samples``: fatal; one value lasts longer than all else, while the load goes through most of its span.
-
-    What little is left may follow as it likes: the load explains hardly any of the whole, and the unit is not why.
-    """
-    starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
-    if starts.size == 0:
-        return None
-    longest = int(np.argmax(stops - starts))
-    first, last = int(starts[longest]), int(stops[longest])
-    at = np.zeros(view.time_s.size, dtype=bool)
-    at[first + 1 : last + 1] = True
-    clear = view.thresholds.clear
-    if clear * at.mean() < 1.0 or clear * float(np.ptp(view.load.values[first : last + 1])) < view.load_span:
-        return None
-    says = (
-        f"the reading stands still from {view.time_s[first]:.4g} to {view.time_s[last]:.4g} s,"
-        f" {100 * float(at.mean()):.0f} % of the samples, while the load moves: find what froze, and record it again"
-    )
-    return Finding("held_samples", view.whole(at), says, "fatal", True, says)
 
 
 def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:

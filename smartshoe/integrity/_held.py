@@ -30,6 +30,28 @@ def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
     yield Finding("held_samples", view.whole(at), said, masks=True)
 
 
+def frozen(view: View) -> Finding | None:
+    """Kind ``held_samples``: fatal; one value lasts longer than all else, while the load goes through most of its span.
+
+    What little is left may follow as it likes: the load explains hardly any of the whole, and the unit is not why.
+    """
+    starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
+    if starts.size == 0:
+        return None
+    longest = int(np.argmax(stops - starts))
+    first, last = int(starts[longest]), int(stops[longest])
+    at = np.zeros(view.time_s.size, dtype=bool)
+    at[first + 1 : last + 1] = True
+    clear = view.thresholds.clear
+    if clear * at.mean() < 1.0 or clear * float(np.ptp(view.load.values[first : last + 1])) < view.load_span:
+        return None
+    says = (
+        f"the reading stands still from {view.time_s[first]:.4g} to {view.time_s[last]:.4g} s,"
+        f" {100 * float(at.mean()):.0f} % of the samples, while the load moves: find what froze, and record it again"
+    )
+    return Finding("held_samples", view.whole(at), says, "fatal", True, says)
+
+
 def held(view: View, bad: Mask) -> Mask:
     """(m,) readings that repeat the last one although noise or motion must have changed it; none that is ``bad``.
 
@@ -152,9 +174,13 @@ def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -
         a, b = np.clip(low, 0, product.size), np.clip(high, 0, product.size)
         turned += turns[b] - turns[a]
         stayed += stays[b] - stays[a]
-    out: Mask = (turned > np.sqrt(thresholds.clear) * stayed) & (
-        turned > thresholds.few
-    )  # white noise: 2.7 times as many
+    out: Mask = _is_noise(turned, stayed, thresholds) & (turned > thresholds.few)
+    return out
+
+
+def _is_noise(turned: Index | np.integer, stayed: Index | np.integer, thresholds: Thresholds) -> Mask:
+    """Whether second differences change sign so much oftener than not: 2.7 times as often in white noise."""
+    out: Mask = np.asarray(turned > np.sqrt(thresholds.clear) * stayed)
     return out
 
 
@@ -248,7 +274,9 @@ def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
             continue
         bends = np.diff(near, 2)
         product = bends[1:] * bends[:-1]
-        alternates = np.sum(product < 0.0) > np.sqrt(given.clear) * np.sum(product > 0.0)  # noise, not curvature
+        alternates = bool(
+            _is_noise(np.count_nonzero(product < 0.0), np.count_nonzero(product > 0.0), given)
+        )  # and no curvature
         least = toggling(given) * view.reading.local_step[first]
         out[i] = alternates and float(np.std(bends)) / SECOND_DIFFERENCE > least
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ LINEAR, CUBIC = (
     np.array([-1, 1]),
     np.array([-2, -1, 1, 2]),
 )  # neighbours, in reaches, that foretell what lies on a piece
-MOST_DIGITS = 8  # behind the point; more are a double's own
+MOST_DIGITS = math.ceil(-math.log10(ROUNDING))  # behind the point; more are a double's own
 SINGLE = float(np.finfo(np.float32).eps)
 
 

@@ -62,8 +62,8 @@ def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
     usual = float(np.median(step))
     # A sample is missing from one and a half steps on, if steps are even enough to tell. They are never negative, so
     # that they scatter by ratios: of a log without a clock a step in a thousand is several times the usual one.
-    scatter = robust_sd(np.log(step / usual))
-    wide = np.log(step / usual) > max(math.log(1.5), largest_of_noise(step.size, thresholds) * scatter)
+    ratio = np.log(step / usual)
+    wide = ratio > max(math.log(1.5), largest_of_noise(step.size, thresholds) * robust_sd(ratio))
     # A larger share of such steps is how the logger works, which uneven sampling says.
     if not wide.any() or wide.mean() > thresholds.faulty_share:
         return

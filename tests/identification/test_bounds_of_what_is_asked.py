@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from presses import press
 from scipy.special import gammaincc
 
+from smartshoe.arrays import require_positive
 from smartshoe.errors import InputError, NotIdentifiableError, UsageError
 from smartshoe.identification import consistency_test, identify
 from smartshoe.identification._consistency import ConsistencyTest
@@ -24,7 +25,6 @@ from smartshoe.identification._experiment import (
 )
 from smartshoe.identification._identifier import (
     _check_choices,
-    _check_positive,
     _fixed,
     _form,
     _scale,
@@ -41,10 +41,11 @@ Array = NDArray[np.float64]
 
 # -- options ---------------------------------------------------------------------------------------------------------
 def test_positive_numbers_are_finite_and_above_nothing() -> None:
-    _check_positive(one=1e-300, two=0.5, three=1e300)
+    for number in (1e-300, 0.5, 1e300):
+        assert require_positive(number, "one") == number
     for number in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(UsageError, match=r"two is .*: give a positive number"):
-            _check_positive(one=1.0, two=number)
+            require_positive(number, "two")
 
 
 def test_a_number_or_the_word_estimate() -> None:

@@ -196,7 +196,7 @@ def validate(
 
 
 def _require_movement(label: str, readings: list[Array], loads: list[Array], valid: list[Mask]) -> None:
-    """Raise `InputError` where reading or load is the same throughout: any line through them is as good."""
+    """Raise `InputError` where reading or load is the same throughout, or samples are so few: a line tells nothing."""
     for signals, what, mend in (
         (readings, "reading", "check that the unit is connected and that this is its column"),
         (loads, "load", "give a recording in which it rises and falls"),

@@ -45,6 +45,13 @@ class SessionResult:
     diagnosis: Diagnosis | None
     without_a_rate: LeaveOneRateOut | None = None
 
+    @property
+    def clocks_said(self) -> list[str]:
+        """How the two clocks lay, in words, an experiment each."""
+        return [
+            f"{name}: beside the shoe's the machine's clock is {clocks.says}" for name, clocks in self.clocks.items()
+        ]
+
     def to_dict(self) -> dict[str, Any]:
         """Schema ``smartshoe.session/1``; the same session gives the same bits."""
         return {

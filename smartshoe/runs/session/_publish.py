@@ -16,7 +16,6 @@ from smartshoe.version import __version__
 
 if TYPE_CHECKING:
     from smartshoe.calibration.store import Entry
-    from smartshoe.devices.joining import Alignment
 
 
 def publish(result: SessionResult, folder: Path) -> dict[str, Path]:
@@ -75,7 +74,7 @@ def _write_page(result: SessionResult, folder: Path, unit: UnitReport, entry: En
     plan = result.plan
     about = (
         f"Pressed: {', '.join(result.recordings)}. Load and reading were put on one time base by the load itself"
-        f" ({'; '.join(_clocks_text(name, clocks) for name, clocks in result.clocks.items())})."
+        f" ({'; '.join(result.clocks_said)})."
     )
     facts = {"shoe": plan.shoe, "machine": plan.machine, "serial number": plan.serial_number or "not given",
              "date": plan.created, "smartshoe": __version__}  # fmt: skip
@@ -96,17 +95,13 @@ def _card(result: SessionResult, entry: Entry | None) -> list[tuple[str, str]]:
     rows.append(
         ("faults that each attempt is searched for", "; ".join(f"{one[0].lower()}{one[1:]}" for one in looked_for))
     )
-    rows += [("clocks", _clocks_text(name, clocks)) for name, clocks in result.clocks.items()]
+    rows += [("clocks", said) for said in result.clocks_said]
     if entry is None:
         return [*rows, ("stored", "only in this folder: with --serial-number it goes into the store")]
     until = "no expiry was set: --valid-for-days sets one"
     if entry.expires is not None:
         until = f"until {entry.expires.date().isoformat()} ({entry.valid_for_days:g} days), or a repair"
     return [*rows, ("stored", f"{entry.path}"), ("valid", until)]
-
-
-def _clocks_text(name: str, clocks: Alignment) -> str:
-    return f"{name}: beside the shoe's the machine's clock is {clocks.says}"
 
 
 def _publish_diagnosis(result: SessionResult, folder: Path) -> DiagnosisLink | None:
