@@ -46,8 +46,8 @@ def names_of(
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
-    Beside one that is sure, and has a law, those are named, too, that are likelier there than not and move the reading
-    by more than all small imperfections of a good unit together: a shadow of another effect is seldom so large.
+    Beside one that is sure, and has a law, those are named, too, that cannot be ruled out and move the reading by more
+    than all small imperfections of a good unit together: a shadow of another effect is seldom so large.
 
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
@@ -72,15 +72,15 @@ def names_of(
         return tuple(
             one
             for one in likely
-            if one.is_sure or (is_firm and one.kind_probability > 0.5 and one.member.size > thresholds.tolerable)
+            if one.is_sure
+            or (is_firm and one.member.size > thresholds.tolerable and _is_possible(one.kind_probability, thresholds))
         )
     larger = tuple(one for one in likely if one.member.size > left)
     if larger and is_followed:
         return larger
     if larger:
         largest = max(larger, key=lambda one: one.member.size)
-        kind = probability_of_kind(largest.member, left, thresholds)
-        if kind > thresholds.equivalent_odds * (1.0 - kind):
+        if _is_possible(probability_of_kind(largest.member, left, thresholds), thresholds):
             return (_doubted(largest),)
     if alone is None:
         return ()
@@ -138,6 +138,11 @@ def _nearest_of_kind(block: Member) -> Effect:
     alike = [e for e in family if e.stage == block.effect.stage and not block.effect.is_memoryless]
     margins = {a.effect: a.margin for a in block.laws}
     return min(alike or family, key=lambda e: margins.get(e.name, math.inf))
+
+
+def _is_possible(probability: float, thresholds: Thresholds) -> bool:
+    """Whether what is as likely cannot be ruled out."""
+    return probability > thresholds.equivalent_odds * (1.0 - probability)
 
 
 def _doubted(name: Name) -> Name:

@@ -205,7 +205,8 @@ def _judged(
         unproven = not_shown_to_be_noise(fine, off, left.after, thresholds, known, before)
     if given.is_no_unit:  # what follows something else than the load is simulated by no unit, however well it fits
         return _Outcome("unexplained", won, elsewhere, unproven)
-    follows = all(name.is_sure and not name.kind_only for name in named.names)
+    # An unsure companion of one that is sure does not say that laws are none.
+    follows = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
     # What is followed is there, though of no kind with a name, or where too little is left to test for more.
     least = max(thresholds.tolerable, thresholds.material, known)
     gained = 0.0 if causes else won.certain_fall(given.scale)

@@ -48,7 +48,7 @@ def verdict_of(
     ``elsewhere``: `off_elsewhere`, or what an effect moves that is followed, but of no kind that has a name, or what
     effects without names do away with.
 
-    ``follows``: every cause has a law, so that what is left may be what laws usually depart by.
+    ``follows``: one cause is sure and all have laws, so that what is left may be what laws usually depart by.
 
     ``known``: what faults of the data add, which is left whatever the model; nothing else is seen below it.
     """
@@ -78,8 +78,8 @@ def off_elsewhere(
 
 
 def names_in(causes: Sequence[Cause], unnamed: int) -> str:
-    """The causes as "a, b and c", and how many effects of the extended model are none."""
-    names = [cause.name.replace("_", " ") for cause in causes]
+    """The causes as "a, b and perhaps c", and how many effects of the extended model are none."""
+    names = [("perhaps " if cause.confidence < 0.5 else "") + cause.name.replace("_", " ") for cause in causes]
     names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 

@@ -79,7 +79,7 @@ class Thresholds:
         1.5e-3,
         "share of full scale",
         "error that small imperfections of a good unit add up to; "
-        "a larger effect is named beside another cause where it is likelier there than not",
+        "a larger effect is named beside another cause unless it can be ruled out",
         "three effects of 0.08 % each: 0.14 %",
         least=0.0,
     )
@@ -120,7 +120,7 @@ class Thresholds:
     equivalent_odds: float = threshold(
         0.3,
         "odds",
-        "odds above which another law, or the one kind that comes nearest, cannot be ruled out",
+        "odds above which another law, or a kind, cannot be ruled out",
         "about 1 in 4",
     )
     kind_odds: tuple[float, ...] = threshold(

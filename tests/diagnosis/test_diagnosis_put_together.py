@@ -421,11 +421,15 @@ def test_what_hides_in_noise_is_not_left(parts: Any) -> None:
     assert parts.seen["noise_kinds"][0][3] is True
 
 
-def test_a_kind_without_a_law_or_in_doubt_leaves_no_more_than_what_is_tolerable(parts: Any) -> None:
-    for kind_only, is_sure in ((False, True), (True, True), (False, False)):
-        verdict = "explained" if is_sure and not kind_only else "partly_explained"
+def test_where_a_kind_has_no_law_or_none_is_sure_no_more_than_what_is_tolerable_may_be_left(parts: Any) -> None:
+    for kind_only, is_sure, other, verdict in (
+        (False, True, True, "explained"),
+        (False, False, True, "explained"),  # what is left is of the one that is sure
+        (False, False, False, "partly_explained"),
+        (True, True, True, "partly_explained"),
+    ):
         parts.seen.clear()
-        parts.names = [_name("linear_leak"), _name("delay", kind_only, is_sure=is_sure)]
+        parts.names = [_name("linear_leak", is_sure=other), _name("delay", kind_only, is_sure=is_sure)]
         told = _run_diagnosis(parts)
         assert (told.verdict, told.leftover is None) == (verdict, verdict == "explained")
 

@@ -288,10 +288,13 @@ def test_where_none_is_sure_and_much_is_left_the_largest_is_half_sure_if_it_cann
     assert not names_of([likely], 0.051, STANDARD)  # and more is left than it explains
 
 
-def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_likelier_than_not() -> None:
+def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_cannot_be_ruled_out() -> None:
     sure = member("rate_gain", size=0.04)
-    likely, less = member(size=0.05, departed=2.5), member(size=0.05, departed=4.0)
-    assert probability_of_kind(less, 0.03, STANDARD) < 0.5 < probability_of_kind(likely, 0.03, STANDARD)
+    likely, open_, less = (member(size=0.05, departed=by) for by in (2.5, 3.5, 4.8))
+    out = STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
+    kinds = [probability_of_kind(one, 0.03, STANDARD) for one in (less, open_, likely)]
+    assert kinds[0] < out < kinds[1] < 0.5 < kinds[2]
+    assert [one.kind_probability for one in names_of([open_, sure], 0.03, STANDARD)][0] == kinds[1]
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
     assert told[0].kind_probability == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence

@@ -99,7 +99,7 @@ def test_a_diagnosis_needs_a_recording_and_takes_what_is_material_from_either() 
 
 
 # -- verdicts ---------------------------------------------------------------------------------------------------------
-CAUSES: Any = [SimpleNamespace(name="linear_leak")]
+CAUSES: Any = [SimpleNamespace(name="linear_leak", confidence=0.9)]
 
 
 def test_what_is_left_is_held_against_what_laws_depart_by_and_what_a_good_unit_leaves() -> None:
@@ -132,8 +132,8 @@ def test_without_a_cause_it_is_adequate_up_to_what_is_tolerable_or_material() ->
     assert verdict_of([], nothing, nothing, STANDARD) == "adequate"
 
 
-def _named(*names: str, unnamed: int = 0) -> str:
-    causes: Any = [SimpleNamespace(name=name) for name in names]
+def _named(*names: str, unnamed: int = 0, **sure: float) -> str:
+    causes: Any = [SimpleNamespace(name=name, confidence=sure.get(name, 0.9)) for name in names]
     return names_in(causes, unnamed)
 
 
@@ -150,6 +150,7 @@ def test_effects_without_a_name_are_counted_behind_the_causes() -> None:
     assert _named("linear_leak") == "linear leak"
     assert _named("dead_band", "delay") == "dead band and delay"
     assert _named("dead_band", "delay", "rate_gain") == "dead band, delay and rate gain"
+    assert _named("dead_band", "delay", dead_band=0.5, delay=0.49) == "dead band and perhaps delay"
     assert _named(unnamed=1) == "1 effect without a name"
     assert _named(unnamed=2) == "2 effects without a name"
     assert _named("linear_leak", unnamed=1) == "linear leak and 1 effect without a name"

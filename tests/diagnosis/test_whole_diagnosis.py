@@ -250,7 +250,7 @@ def _left(rms: float) -> ResidualStructure:
 def test_a_verdict_is_a_sentence_of_what_is_good_named_and_left() -> None:
     limits = Thresholds()
     before, after = Errors(np.array([4e-4]), np.array([1.0]), 1.0), Errors(np.array([1e-4]), np.array([1.0]), 1.0)
-    causes: Any = [SimpleNamespace(name=name) for name in ("dead_band", "delay", "zero_offset")]
+    causes: Any = [SimpleNamespace(name=name, confidence=0.9) for name in ("dead_band", "delay", "zero_offset")]
     large, small = 10.0 * limits.tolerable, 0.1 * limits.material
 
     def said(causes: Any, left: float) -> tuple[str, str]:
@@ -413,7 +413,7 @@ def test_what_is_not_shown_to_be_noise_is_all_beyond_white_noise_that_is_more_th
 
 def test_what_the_baseline_leaves_open_is_not_said_to_be_mended() -> None:
     """A zero offset: of each recording's own zero the baseline knows nothing, with the cause or without."""
-    causes: Any = [SimpleNamespace(name="zero_offset")]
+    causes: Any = [SimpleNamespace(name="zero_offset", confidence=0.9)]
     both = Errors(np.array([1e-4]), np.array([1.0]), 1.0)
     assert sentence_of("explained", names_in(causes, 0), both, both, None, Thresholds()) == (
         "the baseline simulation is good to 1 % of full scale on data it was not fitted to, each recording's own zero"
