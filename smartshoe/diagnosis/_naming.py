@@ -46,8 +46,9 @@ def names_of(
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
-    Beside one that is sure, and has a law, those are named, too, that cannot be ruled out and move the reading by more
-    than all small imperfections of a good unit together: a shadow of another effect is seldom so large.
+    Beside one that is sure, and has a law, those are named, too, that move the reading by more than all small
+    imperfections of a good unit together, and are likelier there than not: a shadow of another effect is seldom so
+    large. Also those that cannot be ruled out and are larger than what the laws of the sure ones usually depart by.
 
     ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
     what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
@@ -69,11 +70,14 @@ def names_of(
     if any(one.is_sure for one in likely):
         # Not beside a kind that no law follows, nor where one may do what another does.
         is_firm = not is_clocked and any(one.kind_probability >= thresholds.least_confidence for one in likely)
+        named = tuple(one for one in likely if one.is_sure)
+        large = max(thresholds.tolerable, thresholds.departure * math.hypot(*(one.member.size for one in named)))
         return tuple(
             one
             for one in likely
-            if one.is_sure
-            or (is_firm and one.member.size > thresholds.tolerable and _is_possible(one.kind_probability, thresholds))
+            if one in named
+            or (is_firm and one.member.size > thresholds.tolerable and one.kind_probability > 0.5)
+            or (is_firm and one.member.size > large and _is_possible(one.kind_probability, thresholds))
         )
     larger = tuple(one for one in likely if one.member.size > left)
     if larger and is_followed:

@@ -79,7 +79,7 @@ class Thresholds:
         1.5e-3,
         "share of full scale",
         "error that small imperfections of a good unit add up to; "
-        "a larger effect is named beside another cause unless it can be ruled out",
+        "a larger effect is named beside another cause where it is likelier there than not",
         "three effects of 0.08 % each: 0.14 %",
         least=0.0,
     )

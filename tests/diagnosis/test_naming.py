@@ -294,7 +294,11 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_cannot_be_
     out = STANDARD.equivalent_odds / (1.0 + STANDARD.equivalent_odds)
     kinds = [probability_of_kind(one, 0.03, STANDARD) for one in (less, open_, likely)]
     assert kinds[0] < out < kinds[1] < 0.5 < kinds[2]
-    assert [one.kind_probability for one in names_of([open_, sure], 0.03, STANDARD)][0] == kinds[1]
+    # What cannot be ruled out is named where it is larger than what the other's law departs by.
+    assert names_of([open_, sure], 0.03, STANDARD)[0].kind_probability == kinds[1]
+    large = replace(sure, size=0.201)
+    assert only(names_of([replace(open_, others_depart=0.03), large], 0.0, STANDARD)).member is large
+    assert len(names_of([replace(open_, others_depart=0.03), replace(sure, size=0.199)], 0.0, STANDARD)) == 2
     told = names_of([likely, sure], 0.03, STANDARD)
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
     assert told[0].kind_probability == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
