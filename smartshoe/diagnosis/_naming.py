@@ -39,7 +39,6 @@ def names_of(
     left: float,
     thresholds: Thresholds,
     *,
-    is_followed: bool = False,
     is_clocked: bool = False,
     is_unsteady: bool = False,
     alone: Effect | None = None,
@@ -50,12 +49,10 @@ def names_of(
     imperfections of a good unit together, and are likelier there than not: a shadow of another effect is seldom so
     large. Also those that cannot be ruled out and are larger than what the laws of the sure ones usually depart by.
 
-    ``is_followed``: all of them leave as little as laws do. What does that is no chance, though each may have a part in
-    what others are named for: where none is sure those are named that are larger than all that is left, as sure as they
-    are. Where much is left beside the largest, that one alone is named if it cannot be ruled out, as half sure at most;
-    else the one of the kind that does most ``alone``, likewise.
+    Where none is sure, those that cannot be ruled out and are larger than all that is left, as half sure at most; else
+    the one of the kind that does most ``alone``, likewise.
     ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
-    curve: none of these is more than half sure, and nothing is named for its size.
+    curve: none of these is more than half sure, and nothing is named for its size beside another.
     ``is_unsteady``: zeros change at moments, of which not all are seen, and others may do what any effect does: none is
     more than half sure.
 
@@ -67,25 +64,17 @@ def names_of(
     ]
     found = {one.effect.name for one in likely}  # what is there itself stands for no other
     likely = [replace(one, equivalents=tuple(name for name in one.equivalents if name not in found)) for one in likely]
-    if any(one.is_sure for one in likely):
+    odds = thresholds.equivalent_odds
+    possible = [one for one in likely if one.kind_probability > odds * (1.0 - one.kind_probability)]
+    if sure := [one for one in likely if one.is_sure]:
         # Not beside a kind that no law follows, nor where one may do what another does.
-        is_firm = not is_clocked and any(one.kind_probability >= thresholds.least_confidence for one in likely)
-        named = tuple(one for one in likely if one.is_sure)
-        large = max(thresholds.tolerable, thresholds.departure * math.hypot(*(one.member.size for one in named)))
-        return tuple(
-            one
-            for one in likely
-            if one in named
-            or (is_firm and one.member.size > thresholds.tolerable and one.kind_probability > 0.5)
-            or (is_firm and one.member.size > large and _is_possible(one.kind_probability, thresholds))
-        )
-    larger = tuple(one for one in likely if one.member.size > left)
-    if larger and is_followed:
-        return larger
-    if larger:
-        largest = max(larger, key=lambda one: one.member.size)
-        if _is_possible(probability_of_kind(largest.member, left, thresholds), thresholds):
-            return (_doubted(largest),)
+        is_firm = not is_clocked and any(one.kind_probability >= thresholds.least_confidence for one in sure)
+        departed = thresholds.departure * math.hypot(*(one.member.size for one in sure))
+        beside = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
+        beside = [one for one in beside if one.kind_probability > 0.5 or one.member.size > departed]
+        return tuple(one for one in likely if one in sure or one in beside)
+    if larger := [one for one in possible if one.member.size > left]:
+        return tuple(_doubted(one) for one in larger)
     if alone is None:
         return ()
     by_itself = (one for one in likely if one.member.effect.kind == alone.kind)
@@ -142,11 +131,6 @@ def _nearest_of_kind(block: Member) -> Effect:
     alike = [e for e in family if e.stage == block.effect.stage and not block.effect.is_memoryless]
     margins = {a.effect: a.margin for a in block.laws}
     return min(alike or family, key=lambda e: margins.get(e.name, math.inf))
-
-
-def _is_possible(probability: float, thresholds: Thresholds) -> bool:
-    """Whether what is as likely cannot be ruled out."""
-    return probability > thresholds.equivalent_odds * (1.0 - probability)
 
 
 def _doubted(name: Name) -> Name:

@@ -139,14 +139,12 @@ def diagnosed(
 class _LeftOver:
     """What the plain model leaves ``before`` effects and the extended one ``after``; ``within`` what was fitted.
 
-    ``is_followed``: all effects together leave as little of what was fitted as laws do. ``known``: rms that faults of
-    the data add to it, a share of full scale.
+    ``known``: rms that faults of the data add to it, a share of full scale.
     """
 
     before: ResidualStructure
     after: ResidualStructure
     within: ResidualStructure
-    is_followed: bool
     known: float
 
 
@@ -156,8 +154,7 @@ def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault], thr
     plain, residuals = ([residual_of(one, model) for one in sessions] for model in models)
     before, after = (residual_structure(sessions, one, thresholds) for one in (plain, residuals))
     within = _left_of_what_was_fitted(sessions, residuals, thresholds)
-    is_followed = fitted_rms(sessions, residuals) <= thresholds.departure * fitted_rms(sessions, plain)
-    return _LeftOver(before, after, within, is_followed, known_error(faults, sessions, given.scale))
+    return _LeftOver(before, after, within, known_error(faults, sessions, given.scale))
 
 
 def _is_silent(found: Inference, given: Prepared) -> bool:
@@ -169,7 +166,7 @@ def _named(found: Inference, given: Prepared, left: _LeftOver, thresholds: Thres
     """The causes in what was ``found``."""
     most = max(left.within.rms, left.within.size)
     zeros = [] if _is_silent(found, given) else _zeros(found, given, most, thresholds, left.within.memory)
-    return causes_among(found, given, zeros, most, thresholds, is_followed=left.is_followed)
+    return causes_among(found, given, zeros, most, thresholds)
 
 
 @dataclass(frozen=True, slots=True)

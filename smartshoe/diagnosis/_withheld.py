@@ -48,14 +48,9 @@ def causes_among(
     zeros: Sequence[Zero],
     left: float,
     thresholds: Thresholds,
-    *,
-    is_followed: bool,
 ) -> Chosen:
-    """Of what was ``found``, and of ``zeros`` that were seen; ``left``: rms of the structure that no effect explains.
-
-    ``is_followed``: all effects together leave as little of what was fitted as laws do.
-    """
-    seen = _shown(found, given, left, thresholds, is_followed=is_followed)
+    """Of what was ``found``, and of ``zeros`` that were seen; ``left``: rms of structure that no effect explains."""
+    seen = _shown(found, given, left, thresholds)
     seen = seen.without(lambda one: moved_of(one) if given.is_moved and one.effect.is_latency else None)
     rivals = seen.names
     seen = seen.without(lambda one: departure_of(one, rivals, thresholds))
@@ -75,7 +70,7 @@ def causes_among(
     return seen.without(lambda one: _crept(one, kept, thresholds))
 
 
-def _shown(found: Inference, given: Prepared, left: float, thresholds: Thresholds, *, is_followed: bool) -> Chosen:
+def _shown(found: Inference, given: Prepared, left: float, thresholds: Thresholds) -> Chosen:
     """The names of what was found that this data shows; what is of no kind with a name gives none to others, either."""
     members = [one for one in found.members if one.name not in found.undone]
     limits: tuple[str, ...] = ()
@@ -85,7 +80,6 @@ def _shown(found: Inference, given: Prepared, left: float, thresholds: Threshold
             members,
             left,
             thresholds,
-            is_followed=is_followed,
             is_clocked=given.excitation.goes_with_the_clock,
             is_unsteady=bool(found.zero_changes),
             alone=found.alone,

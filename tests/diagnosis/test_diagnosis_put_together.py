@@ -211,7 +211,7 @@ def test_a_diagnosis_is_put_together_from_its_parts(parts: Any) -> None:
     ]  # fmt: skip
     assert seen["names_of"][0][1:] == (0.07, STANDARD)  # all beyond noise, of what was fitted
     assert seen["names_of"][1] == {
-        "is_followed": False, "is_clocked": False, "is_unsteady": False, "alone": None,
+        "is_clocked": False, "is_unsteady": False, "alone": None,
     }  # fmt: skip
     assert seen["zeros_of"][0][3:5] == (0.07, 1.0)  # what effects of the core remember
     assert [one.size for one in seen["_with_offset"][0][1]] == [0.2]
@@ -325,16 +325,13 @@ def test_what_an_effect_without_a_name_moves_is_not_explained(parts: Any) -> Non
         assert _run_diagnosis(parts).verdict == verdict
 
 
-def test_it_is_followed_where_a_law_would_leave_as_much(parts: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    for left, is_followed in ((STANDARD.departure, True), (1.01 * STANDARD.departure, False)):
+def test_names_know_whether_loads_go_with_the_clock_and_zeros_change(parts: Any) -> None:
+    for there in (True, False):
         parts.seen.clear()
-        monkeypatch.setattr(_procedure, "fitted_rms", lambda _, of, left=left: left if of[0] == "held 2" else 1.0)
-        parts.given.excitation.goes_with_the_clock = is_followed
-        parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if is_followed else ()
+        parts.given.excitation.goes_with_the_clock = there
+        parts.found.zero_changes = (ZeroChange("a", 1.0, 0.02),) if there else ()
         _run_diagnosis(parts)
-        assert parts.seen["names_of"][1] == {
-            "is_followed": is_followed, "is_clocked": is_followed, "is_unsteady": is_followed, "alone": None,
-        }  # fmt: skip
+        assert parts.seen["names_of"][1] == {"is_clocked": there, "is_unsteady": there, "alone": None}
 
 
 def test_what_is_late_beside_readings_that_were_moved_is_said_and_no_cause(parts: Any) -> None:
