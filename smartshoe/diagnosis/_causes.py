@@ -86,7 +86,7 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
         why = (
             "by itself it predicts best what is left out"
             if does_most_alone
-            else "it is larger than all that is left, or than what small imperfections add up to"
+            else "it is larger than all that is left, or than small imperfections and the laws beside it account for"
         )
         says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
         return [Statement("confidence of its kind", name.kind_probability, thresholds.least_confidence, says)]

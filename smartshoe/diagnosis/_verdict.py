@@ -79,7 +79,8 @@ def off_elsewhere(
 
 def names_in(causes: Sequence[Cause], unnamed: int) -> str:
     """The causes as "a, b and perhaps c", and how many effects of the extended model are none."""
-    names = [("perhaps " if cause.confidence < 0.5 else "") + cause.name.replace("_", " ") for cause in causes]
+    sure_first = sorted(causes, key=lambda cause: cause.confidence < 0.5)
+    names = [("perhaps " if cause.confidence < 0.5 else "") + cause.name.replace("_", " ") for cause in sure_first]
     names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 

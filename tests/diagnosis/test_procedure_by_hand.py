@@ -150,7 +150,7 @@ def test_effects_without_a_name_are_counted_behind_the_causes() -> None:
     assert _named("linear_leak") == "linear leak"
     assert _named("dead_band", "delay") == "dead band and delay"
     assert _named("dead_band", "delay", "rate_gain") == "dead band, delay and rate gain"
-    assert _named("dead_band", "delay", dead_band=0.5, delay=0.49) == "dead band and perhaps delay"
+    assert _named("delay", "dead_band", dead_band=0.5, delay=0.49) == "dead band and perhaps delay"
     assert _named(unnamed=1) == "1 effect without a name"
     assert _named(unnamed=2) == "2 effects without a name"
     assert _named("linear_leak", unnamed=1) == "linear leak and 1 effect without a name"
@@ -346,7 +346,7 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
     named = "it is not sure, since other effects fit nearly as well; it is named because"
-    size = f"{named} it is larger than all that is left, or than what small imperfections add up to"
+    size = f"{named} it is larger than all that is left, or than small imperfections and the laws beside it account for"
     assert doubt.says == size
     for alone, is_why in (("orifice_leak", True), ("delay", False)):  # one of its kind does most by itself, or another
         doubt = _told(monkeypatch, exposed, is_sure=False, alone=effect(alone)).evidence[-1]

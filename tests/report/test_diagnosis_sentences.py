@@ -51,6 +51,8 @@ def test_a_cause_is_said_to_be_less_likely_otherwise_by_what_its_rivals_are_weig
 def test_a_simulation_is_not_wrong_by_what_recordings_have_of_their_own() -> None:
     made = case("one cause")
     assert heading(made) == "The simulation is wrong, and it is known why"
+    doubted = replace(made, causes=(*made.causes, replace(made.causes[0], confidence=0.74)))
+    assert heading(doubted).endswith("it is known what follows it, though not each cause is sure")
     of_zeros = replace(made, extended=made.baseline)
     assert heading(of_zeros) == "The simulation is good enough, and what recordings have of their own is found"
     assert heading(replace(of_zeros, verdict="partly_explained")).startswith("The simulation is wrong")

@@ -23,6 +23,7 @@ HEADINGS = {
     "unexplained": "The simulation is wrong, and no cause can be named",
     "refused": "No diagnosis: this data does not allow one",
 }
+NOT_SURE = "The simulation is wrong, and it is known what follows it, though not each cause is sure"
 OF_THEIR_OWN = "The simulation is good enough, and what recordings have of their own is found"
 SUREST = 0.99
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
@@ -33,6 +34,9 @@ def heading(diagnosis: Diagnosis) -> str:
     before, after = diagnosis.baseline, diagnosis.extended
     if diagnosis.verdict == "explained" and before and after and before.rmse == after.rmse:
         return OF_THEIR_OWN
+    least = diagnosis.thresholds.least_confidence
+    if diagnosis.verdict == "explained" and any(cause.confidence < least for cause in diagnosis.causes):
+        return NOT_SURE
     return HEADINGS[diagnosis.verdict]
 
 
