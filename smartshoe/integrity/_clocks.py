@@ -52,14 +52,17 @@ UNSEEN = Lags(np.zeros(0), np.zeros(0))
 def align(view: View) -> tuple[View, Lags]:
     """The view with its load on the reading's clock, where the clocks differ; else as it was, with all it has found.
 
-    And by how much the reading follows. One that is late by a quarter of a step falls as the load rises: where it
-    follows turned over, and else hardly, that is the view.
+    And by how much the reading follows. One that is late by a quarter of a step, or by half of one, falls as the load
+    rises: where it follows turned over, and else hardly, or far less closely, that is the view. Of loads that rise as
+    they fall either way is as close.
     """
     followed = _followed(view)
-    if not _follows(followed, view.thresholds):
+    is_open = not _follows(followed, view.thresholds)
+    if view.sign < 0 or is_open:
         turned = view.turned()
         over = _followed(turned)
-        if _follows(over, view.thresholds):
+        far = view.thresholds.clear * (1.0 - _closeness(over)) < 1.0 - _closeness(followed)
+        if _follows(over, view.thresholds) and (is_open or far):
             view, followed = turned, over
     if followed is None:
         return view, UNSEEN
@@ -158,9 +161,14 @@ def _followed(view: View) -> _Followed | None:
     return found
 
 
+def _closeness(of: _Followed | None) -> float:
+    """How nearly the reading's edges are the load's, as a correlation."""
+    return -1.0 if of is None else float(np.median(of.weights))
+
+
 def _follows(of: _Followed | None, thresholds: Thresholds) -> bool:
     """Whether the reading's edges are the load's."""
-    return of is not None and float(np.median(of.weights)) >= 1.0 - thresholds.same
+    return _closeness(of) >= 1.0 - thresholds.same
 
 
 def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:

@@ -88,8 +88,8 @@ def test_recordings_of_two_pairs_of_clocks_share_none() -> None:
 
 
 # -- readings ---------------------------------------------------------------------------------------------------------
-def _walked(late_s: float, seed: int = 1) -> Recording:
-    """A few holds among steps of about a second, read ``late_s`` late."""
+def _walked(late_s: float, seed: int = 1, *, held: bool = True) -> Recording:
+    """Steps of about a second, and then a few loads that are ``held``, read ``late_s`` late."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(0.0, 90.0, 1.0 / RATE_HZ)
     load = np.zeros(time_s.size)
@@ -100,9 +100,10 @@ def _walked(late_s: float, seed: int = 1) -> Recording:
         there = (share > 0.0) & (share < 1.0)
         load[there] += height * np.sin(np.pi * share[there]) * (1.0 + 0.4 * np.cos(2.0 * np.pi * share[there])) / 1.4
         begins_s += 1.05 + 0.05 * rng.standard_normal()
-    load += np.interp(
-        time_s, [45.0, 48.0, 60.0, 62.0, 70.0, 71.0, 80.0, 82.0], [0.0, 0.6, 0.6, 0.0, 0.0, 0.4, 0.4, 0.0]
-    )
+    if held:
+        load += np.interp(
+            time_s, [45.0, 48.0, 60.0, 62.0, 70.0, 71.0, 80.0, 82.0], [0.0, 0.6, 0.6, 0.0, 0.0, 0.4, 0.4, 0.0]
+        )
     read = np.interp(time_s - late_s, time_s, load)
     keep = float(np.exp(-1.0 / RATE_HZ / 3.0))
     slow = lfilter([1.0 - keep], [1.0, -keep], read)
@@ -136,6 +137,31 @@ def test_a_walk_that_is_read_late_does_not_fall_as_the_load_rises(late_s: float)
     assert "wrong_sign" not in {fault.kind for fault in found.faults}
     if found.clock_offset_s[0]:
         assert found.clock_offset_s[0] == pytest.approx(late_s, abs=0.06)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.3, 0.4, 0.45, 0.5, -0.4])
+def test_nor_does_one_of_steps_alone_that_is_read_late_by_half_of_one(late_s: float) -> None:
+    """It follows turned over, and far more closely as it is."""
+    found = examine([_walked(late_s, held=False)], STANDARD)
+    assert "wrong_sign" not in {fault.kind for fault in found.faults}
+    assert found.clock_offset_s[0] == pytest.approx(late_s, abs=0.02)
+
+
+@pytest.mark.parametrize("period_s", [0.8, 2.0, 10.0])
+@pytest.mark.parametrize("unit", ["mbar", "counts"])
+def test_a_reading_that_falls_is_late_by_no_half_of_a_period(period_s: float, unit: str) -> None:
+    """Even triangles look the same from above: half a period later the one is the other turned over."""
+    rng = np.random.default_rng(3)
+    time_s = np.arange(0.0, 90.0, 1.0 / RATE_HZ)
+    load = np.abs((time_s / period_s) % 1.0 - 0.5) * np.interp(time_s, [5.0, 80.0], [1.0, 0.6]) * (time_s < 84.0)
+    recording = Recording.from_arrays(
+        time_s=time_s,
+        force_n=800.0 * load + rng.normal(0.0, 0.5, time_s.size),
+        **{f"pressure_{unit}": 100.0 - 100.0 * load + rng.normal(0.0, 0.1, time_s.size)},
+    )
+    found = examine([recording], STANDARD)
+    assert found.clock_offset_s == (0.0,)
+    assert ("wrong_sign" in {fault.kind for fault in found.faults}) == (unit == "mbar")
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.25])
