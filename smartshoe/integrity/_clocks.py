@@ -45,6 +45,11 @@ class Lags:
         """The median lag."""
         return float(np.median(self.lag_s))
 
+    def off_from_s(self, clock: OneClock) -> float:
+        """By how much they are off from a clock's, their median; infinite where nothing tells."""
+        off = np.abs(self.lag_s - clock.before_s - clock.rate * self.at_s)
+        return float(np.median(off)) if off.size else np.inf
+
 
 UNSEEN = Lags(np.zeros(0), np.zeros(0))
 

@@ -51,6 +51,7 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
 NONE: Array = np.zeros(0)
 Clock = tuple[float, float, Lags]  # offset and rate as in `Integrity`, lags that are seen
 UNTOLD: Clock = (0.0, 0.0, UNSEEN)
+Examined = tuple[list[Finding], Mask, Clock]  # of one recording, and its usable samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,9 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     if dropped_to.size + rails.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
         examined = [_examined(one, decided, dropped_to, rails) for one in tamed]
+    examined = [
+        _as_others_follow(tame, examined, number, decided, dropped_to, rails) for number, tame in enumerate(tamed)
+    ]
     kept: list[Recording] = []
     for number, (tame, (findings, mask, clock)) in enumerate(zip(tamed, examined, strict=True)):
         recording = tame.recording
@@ -129,9 +133,12 @@ def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recor
 
 
 def _examined(
-    tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE, rails: Array = NONE
-) -> tuple[list[Finding], Mask, Clock]:
-    """The findings of one recording, its usable samples, its clock; ``dropped_to`` and ``rails`` as in `View`."""
+    tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE, rails: Array = NONE, *, turned: bool = False
+) -> Examined:
+    """The findings of one recording, its usable samples, its clock; ``dropped_to`` and ``rails`` as in `View`.
+
+    ``turned``: its reading rises where it seems to fall.
+    """
     recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
@@ -152,7 +159,7 @@ def _examined(
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
     if view is None:
         return findings, usable, UNTOLD
-    view, seen = align(view)
+    view, seen = align(view.turned() if turned else view)
     for detect in OF_VIEW:
         bad = ~usable[view.index]
         for finding in detect(view, bad):
@@ -164,6 +171,29 @@ def _examined(
         if any(finding.severity == "fatal" for finding in findings):
             break
     return findings, usable, (view.offset_s, view.rate, seen)
+
+
+def _as_others_follow(
+    tame: _Tamed, examined: Sequence[Examined], number: int, thresholds: Thresholds, dropped_to: Array, rails: Array
+) -> Examined:
+    """What was ``examined`` of one recording; turned over where its reading goes against the load, but for their clock.
+
+    Steps that are read late by half of one fall as the load rises; by the lag that all others have they rise.
+    """
+    mine = examined[number]
+    others = [lags for k, (_, _, (*_, lags)) in enumerate(examined) if k != number and lags.at_s.size]
+    theirs = one_clock(others, thresholds)
+    if theirs is None or not _is_against(mine):
+        return mine
+    over = _examined(tame, thresholds, dropped_to, rails, turned=True)
+    as_it_is, turned = (one[2][2] for one in (mine, over))
+    is_nearer = turned.off_from_s(theirs) < as_it_is.off_from_s(theirs)
+    is_one = is_nearer and one_clock([*others, turned], thresholds) is not None
+    return over if is_one and not _is_against(over) else mine
+
+
+def _is_against(examined: Examined) -> bool:
+    return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in examined[0])
 
 
 def _lacking(recording: Recording) -> str | None:

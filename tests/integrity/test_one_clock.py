@@ -147,6 +147,25 @@ def test_nor_does_one_of_steps_alone_that_is_read_late_by_half_of_one(late_s: fl
     assert found.clock_offset_s[0] == pytest.approx(late_s, abs=0.02)
 
 
+@pytest.mark.parametrize("late_s", [1.6, 2.5])
+@pytest.mark.parametrize("seed", [2, 3])
+def test_steps_alone_are_read_as_late_as_other_recordings(late_s: float, seed: int) -> None:
+    """By themselves they follow as closely half a step earlier, turned over."""
+    alone, beside = _walked(late_s, seed, held=False), _ramps(late_s)
+    assert examine([alone], STANDARD).clock_offset_s[0] != pytest.approx(late_s, abs=0.03)
+    found = examine([beside, alone], STANDARD)
+    assert {fault.kind for fault in found.faults} == {"two_clocks"}
+    assert found.clock_offset_s == pytest.approx((late_s, late_s), abs=0.03)
+    assert found.one_clock is not None
+
+
+def test_a_reversed_reading_among_others_on_one_clock_stays_so() -> None:
+    ramps, other = _ramps(0.0), _ramps(0.0, seed=4)
+    turned = other.with_channel(replace(other.sensor, values=-other.sensor.values))
+    found = examine([ramps, turned], STANDARD)
+    assert [(fault.kind, fault.recording) for fault in found.faults] == [("wrong_sign", 1)]
+
+
 @pytest.mark.parametrize("period_s", [0.8, 2.0, 10.0])
 @pytest.mark.parametrize("unit", ["mbar", "counts"])
 def test_a_reading_that_falls_is_late_by_no_half_of_a_period(period_s: float, unit: str) -> None:
