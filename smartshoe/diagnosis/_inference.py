@@ -186,7 +186,7 @@ class _Judged:
 
     def members(self) -> tuple[Member, ...]:
         """Each effect weighed against its alternatives."""
-        return members_of(self.evidence, self.best, self.refused, self.fit)
+        return members_of(self.evidence, self.best, self.fit)
 
 
 def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:

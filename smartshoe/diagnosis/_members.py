@@ -71,7 +71,7 @@ class Member:
         return self.effect.name
 
 
-def members_of(evidence: Evidence, best: Posterior, refused: Sequence[str], extended: Fit) -> tuple[Member, ...]:
+def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Member, ...]:
     likelihood = extended.likelihood
     chosen, thresholds = [evidence.given.candidates[member] for member in best.members], evidence.thresholds
     less = [fit(likelihood, _without(one.name, extended.model), FEW_STEPS) for one in chosen]
@@ -91,7 +91,7 @@ def members_of(evidence: Evidence, best: Posterior, refused: Sequence[str], exte
                 one.effect,
                 float(sizes[k]),
                 best.departed[k],
-                alternatives(evidence, best, member, refused),
+                alternatives(evidence, best, member),
                 less[k],
                 _other_laws(
                     one, less[k], extended, _shapes_beside(best, member, evidence), thresholds, is_ended=is_ended
@@ -165,8 +165,10 @@ def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
     return min((model.with_part(law, values) for values in begun), key=likelihood.cost)
 
 
-def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequence[str]) -> tuple[Alternative, ...]:
+def alternatives(evidence: Evidence, best: Posterior, member: int) -> tuple[Alternative, ...]:
     """What could stand in a member's place: every other effect at its best shape, and nothing.
+
+    Also one that was taken out beside it: there each did what the other does.
 
     Nothing, whether the others' equations depart as their own do, towards any of their families, or in all that their
     effects add.
@@ -177,7 +179,7 @@ def alternatives(evidence: Evidence, best: Posterior, member: int, refused: Sequ
         for weighed, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))
     ]
     found = [Alternative(None, min(margins))]
-    for k in additions(evidence, less, 2 * BREADTH, refused):
+    for k in additions(evidence, less, 2 * BREADTH):
         one = evidence.given.candidates[k]
         if one.name == evidence.given.candidates[member].name or one.effect.is_flexible:
             continue

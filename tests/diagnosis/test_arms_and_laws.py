@@ -323,6 +323,13 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     ):  # fmt: skip
         assert told(_weighed("leak", ("near", 99.0), departed=departed, size=size, is_ended=is_ended)) == []
         assert (asked == ["found", other]) is is_tried
+    # Or where that is likelier in its place, as what was taken out beside it may be.
+    rival = _weighed("leak", ("near", 99.0), size=0.01)
+    for margin, is_tried in ((0.0, False), (-0.1, True)):
+        near = (replace(one, margin=margin) if one.effect == "dead_band" else one for one in rival.alternatives)
+        rival.alternatives = tuple(near)
+        assert told(rival) == []
+        assert (asked == ["found", other]) is is_tried
     scores |= {other: 70.0, "near for lag": 60.0}
     more = _weighed("leak", ("near", 99.0), departed=2.0), _weighed("lag", ("near", 1.0))
     assert told(*members, *more) == ["near for lag", other, "without lag"]

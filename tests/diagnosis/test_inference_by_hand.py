@@ -225,7 +225,7 @@ def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(mon
 
     monkeypatch.setattr(_inference, "fit", fit)
     monkeypatch.setattr(_inference, "evidence_about", about)
-    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, refused, fit: sets[fit.model])
+    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: sets[fit.model])
     plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
     first: Any = SimpleNamespace(thresholds=STANDARD, of="whole")
     whole: Any = SimpleNamespace(model="whole", likelihood="likelihood")
@@ -455,9 +455,7 @@ class _Judge:
         monkeypatch.setattr(_inference, "extrapolating", lambda *given: self.beyond.pop() if self.beyond else None)
         self.weighed_about: list[Any] = []
         monkeypatch.setattr(_inference, "evidence_about", self.about)
-        monkeypatch.setattr(
-            _inference, "members_of", lambda evidence, best, refused, *rest: (best.members, tuple(refused))
-        )
+        monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
 
     def about(self, model: Any, sessions: Any, other: Any) -> Any:
         self.weighed_about.append(model.names)
@@ -484,13 +482,13 @@ class _Judge:
 def test_what_does_not_follow_what_is_left_out_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = _Judge(monkeypatch)
     fit, members, refused = judge.judged()
-    assert (fit.model.names, members, refused) == (("a", "b"), ((0, 1), ()), ())
+    assert (fit.model.names, members, refused) == (("a", "b"), (0, 1), ())
     judge.follows = ("b",)
     fit, members, refused = judge.judged()
-    assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
+    assert (fit.model.names, members, refused) == (("b",), (1,), ("a",))
     judge.follows, judge.beyond = ("a", "b"), ["b"]
     fit, members, refused = judge.judged()
-    assert (fit.model.names, members, refused) == (("a",), ((0,), ("b",)), ("b",))
+    assert (fit.model.names, members, refused) == (("a",), (0,), ("b",))
 
 
 def test_effects_are_weighed_about_the_model_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -511,7 +509,7 @@ def test_of_effects_that_undo_one_another_the_idle_one_goes(monkeypatch: pytest.
     judge = _Judge(monkeypatch)
     judge.costs, judge.undone = {("a",): 3.0, ("b",): 2.0}, [["a", "b"]]
     fit, members, refused = judge.judged()
-    assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
+    assert (fit.model.names, members, refused) == (("b",), (1,), ("a",))
     enough = 0.5 * np.sqrt(STANDARD.clear)
     for error, is_needed in ((0.999 * enough, False), (1.001 * enough, True)):
         judge.errors[("b",)], judge.undone = error, [["a", "b"]]
@@ -541,7 +539,7 @@ def test_a_model_that_others_had_bent_is_begun_anew_from_the_plain_one(
     judge = _Judge(monkeypatch)
     judge.follows, judge.errors[("b",)] = ("b",), error
     fit, members, refused = judge.judged()
-    assert (fit, members, refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
+    assert (fit, members, refused) == (judge.plain, (), ("a", "b"))
     judge.errors[("b",)] = 0.9999
     assert judge.judged()[0].how == "followed"
     judge.follows, judge.errors[("a", "b")] = ("a", "b"), error
@@ -555,13 +553,13 @@ def test_of_a_set_that_does_not_stand_as_much_is_kept_as_does(monkeypatch: pytes
     judge = _Judge(monkeypatch)
     judge.falls, judge.left_out = [("a", "b")], {("a",): 2.0, ("b",): 1.0}
     fit, members, refused = judge.judged()
-    assert (fit.model.names, members, refused) == (("b",), ((1,), ("a",)), ("a",))
+    assert (fit.model.names, members, refused) == (("b",), (1,), ("a",))
     assert judge.inference().is_stepped_down
     found = judge.inference().with_nothing_but(judge.plain)
-    assert (found.fit, found.members(), found.refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
+    assert (found.fit, found.members(), found.refused) == (judge.plain, (), ("a", "b"))
     judge.falls.append(("b",))
     fit, members, refused = judge.judged()
-    assert (fit, members, refused) == (judge.plain, ((), ("a", "b")), ("a", "b"))
+    assert (fit, members, refused) == (judge.plain, (), ("a", "b"))
     judge.falls = []
     assert not judge.inference().is_stepped_down
 
@@ -569,9 +567,9 @@ def test_of_a_set_that_does_not_stand_as_much_is_kept_as_does(monkeypatch: pytes
 def test_what_went_astray_leaves_the_plain_model_and_what_that_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = _Judge(monkeypatch)
     judge.stands = False
-    assert judge.judged()[:2] == (judge.plain, ((), ("a", "b")))
+    assert judge.judged()[:2] == (judge.plain, ())
     judge.plain.model = judge.model("b")
-    assert judge.judged()[:2] == (judge.plain, ((1,), ("a",)))
+    assert judge.judged()[:2] == (judge.plain, (1,))
     judge.stands, judge.follows = True, ("b",)
     fit, members, _ = judge.judged()
-    assert (fit, members) == (judge.plain, ((1,), ("a",)))
+    assert (fit, members) == (judge.plain, (1,))

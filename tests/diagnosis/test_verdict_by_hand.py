@@ -368,7 +368,7 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
     )
     monkeypatch.setattr(_inference, "extrapolating", lambda *given: None)
     monkeypatch.setattr(_inference, "evidence_about", lambda one, sessions, other: (other, other.posterior((0,))))
-    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, refused, *rest: (best.members, tuple(refused)))
+    monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
     state: Any = SimpleNamespace(
         given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
         fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda sessions: "likelihood",
@@ -376,7 +376,7 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
     found: Any = _judged(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
     assert found.fit.model.names == names
     gone = () if len(names) > 1 else ("b",)
-    assert (found.members(), found.refused) == ((tuple(range(len(names))), gone), gone)
+    assert (found.members(), found.refused) == (tuple(range(len(names))), gone)
 
 
 def test_gains_of_their_own_are_said_with_the_recordings_that_lie_farthest_apart() -> None:
