@@ -32,6 +32,7 @@ class GaussMarkov:
     ``coloured`` (Kolmogorov's statistic of the innovations' spectrum), ``surprises`` (their kurtosis beyond a normal
     deviate's) and ``follows`` (correlation of their squares with load or its rate, the larger), both in deviations.
     ``flatness`` is the excess kurtosis of the blocks themselves: 0 of noise, -1.5 of a sine, -2 of two levels.
+    ``held_rms`` is what ``rms`` is while the load is held.
     """
 
     rms: float
@@ -41,13 +42,22 @@ class GaussMarkov:
     follows: float
     flatness: float
     thresholds: Thresholds
+    held_rms: float = 0.0
 
     @property
     def is_noise(self) -> bool:
         """Whether nothing speaks against noise."""
-        # What seems to remember longer may as well be a drift.
-        forgets = self.tau_s < self.thresholds.lasting_s
-        return self._is_white and forgets and max(abs(self.surprises), self.follows) < self._deviations
+        return self._would_be_noise and self.follows < self._deviations
+
+    @property
+    def beyond_noise(self) -> float:
+        """Rms of what is no noise: nothing, all of it, or what it is larger by than while the load is held.
+
+        The last where nothing else speaks against noise: then that is as large under any load.
+        """
+        if self.is_noise:
+            return 0.0
+        return math.sqrt(max(self.rms**2 - self.held_rms**2, 0.0)) if self._would_be_noise else self.rms
 
     @property
     def switches(self) -> bool:
@@ -61,6 +71,12 @@ class GaussMarkov:
     def of_a_mean(self, duration_s: float) -> float:
         """Standard deviation of its mean over ``duration_s``: what a memory covers counts once (Box and Jenkins)."""
         return self.rms * math.sqrt(min(2.0 * self.tau_s / duration_s, 1.0))
+
+    @property
+    def _would_be_noise(self) -> bool:
+        """Whether it is white, Gaussian and forgets: what seems to remember longer may as well be a drift."""
+        forgets = self.tau_s < self.thresholds.lasting_s
+        return self._is_white and forgets and abs(self.surprises) < self._deviations
 
     @property
     def _is_white(self) -> bool:
@@ -122,7 +138,7 @@ def gauss_markov_of(
     foretold = max(float(covariance[0]) - surprise, 0.0)
     one, two = (_lagged(blocks, lag, thresholds) / there for lag in (1, 2))
     rms = math.sqrt(max(_remembered(float(covariance[0]), one, two), foretold))
-    return GaussMarkov(rms, tau_s, *tests, flatness, thresholds)
+    return GaussMarkov(rms, tau_s, *tests, flatness, thresholds, rms * _share_while_held(blocks, thresholds))
 
 
 def _blocks(session: Session, residual: Array, thresholds: Thresholds) -> _Blocks:
@@ -195,6 +211,16 @@ def _lagged(blocks: Sequence[_Blocks], lag: int, thresholds: Thresholds) -> floa
     products = np.concatenate([one.residual[lag:] * one.residual[: one.residual.size - lag] for one in blocks])
     found = float(products.sum())
     return found if found > largest_of_noise(1, thresholds) * math.sqrt(float(products @ products)) else 0.0
+
+
+def _share_while_held(blocks: Sequence[_Blocks], thresholds: Thresholds) -> float:
+    """By what share (rms, at most 1) neighbours move together while the load is held, of what they do on the whole."""
+    products = np.concatenate([one.residual[1:] * one.residual[:-1] for one in blocks])
+    there = np.concatenate([one.there[1:] & one.there[:-1] for one in blocks])
+    held = np.concatenate([np.maximum(one.rate[1:], one.rate[:-1]) < thresholds.still_per_s for one in blocks]) & there
+    if held.sum() < thresholds.least_samples or products[there].mean() <= 0.0:
+        return 0.0
+    return math.sqrt(min(max(float(products[held].mean() / products[there].mean()), 0.0), 1.0))
 
 
 def _kolmogorov(innovations: Array) -> float:

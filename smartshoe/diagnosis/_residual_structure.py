@@ -60,7 +60,7 @@ class ResidualStructure:
             return [self.repeating.rms] if self.repeating.significant else []
         found = [one.rms for one in (self.repeating, self.slow) if one.significant]
         # What has a memory, and is no stationary noise by at least one test, is structure though it does not repeat.
-        remembered = min(self.memory.rms, self.size) if self.memory is not None else 0.0
+        remembered = min(self.memory.beyond_noise, self.size) if self.memory is not None else 0.0
         return [*found, remembered] if remembered > 0.0 else found
 
 

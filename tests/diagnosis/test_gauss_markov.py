@@ -184,3 +184,37 @@ def test_without_jitter_the_load_stays_as_it_is():
     one = recording(noise=NOISE)
     load, reading = one.force_n / 800.0, one.sensor.values / 140.0
     assert as_sampled(load, reading, 1 / RATE_HZ, STANDARD) is load
+
+
+@pytest.mark.parametrize("louder", [1.25, 1.4])
+def test_slow_noise_that_is_louder_as_the_load_moves_is_structure_by_what_it_is_louder(
+    sessions: list[Session], louder: float
+) -> None:
+    """While the load is held it is the noise that is there all along."""
+    moves = [np.where(np.abs(one.conditions.rate_per_s) < STANDARD.still_per_s, 1.0, louder) for one in sessions]
+    told = []
+    for seed in range(6):
+        plain = noises(sessions, seed, 0.5, 0.01)
+        found = gauss_markov_of(sessions, [by * one for by, one in zip(moves, plain, strict=True)], STANDARD)
+        assert found is not None
+        quiet = gauss_markov_of(sessions, plain, STANDARD)
+        assert quiet is not None
+        assert quiet.beyond_noise == 0.0
+        if not found.is_noise:  # as it may be where it is hardly louder
+            told.append((found.beyond_noise, found.rms, quiet.rms))
+    assert len(told) >= 3
+    beyond, whole, noise = np.sqrt(np.mean(np.square(told), axis=0))
+    assert beyond == pytest.approx(np.sqrt(whole**2 - noise**2), rel=0.35)
+    assert beyond < 0.8 * whole
+
+
+def test_what_switches_is_structure_though_it_does_so_while_the_load_is_held(sessions: list[Session]) -> None:
+    rng = np.random.default_rng(5)
+    levels = [
+        0.01 * np.sign(np.repeat(rng.standard_normal(one.reading.size // 40 + 1), 40)[: one.reading.size])
+        for one in sessions
+    ]
+    found = gauss_markov_of(sessions, [a + b for a, b in zip(levels, noises(sessions, 3), strict=True)], STANDARD)
+    assert found is not None
+    assert not found.is_noise
+    assert found.beyond_noise == found.rms > 0.005
