@@ -47,8 +47,12 @@ class Lags:
 
     def off_from_s(self, clock: OneClock) -> float:
         """By how much they are off from a clock's, their median; infinite where nothing tells."""
-        off = np.abs(self.lag_s - clock.before_s - clock.rate * self.at_s)
+        off = np.abs(self.lag_s - clock.lag_s(self.at_s))
         return float(np.median(off)) if off.size else np.inf
+
+    def are_of(self, clock: OneClock, thresholds: Thresholds) -> bool:
+        """Whether they lie on a clock's, but for a share of its longest."""
+        return bool(self.at_s.size) and _describes(clock.lag_s(self.at_s), self.lag_s, thresholds)
 
 
 UNSEEN = Lags(np.zeros(0), np.zeros(0))
@@ -96,7 +100,7 @@ def one_clock(each: Sequence[Lags], thresholds: Thresholds) -> OneClock | None:
     rate = _slope(at_s, lag_s)
     middle_s = np.array([one.middle_s for one in there])
     for found in (OneClock(float(np.mean(middle_s)), 0.0), OneClock(float(np.median(lag_s - rate * at_s)), rate)):
-        lines = [found.before_s + found.rate * one.at_s for one in there]
+        lines = [found.lag_s(one.at_s) for one in there]
         off = [one.lag_s - line for one, line in zip(there, lines, strict=True)]
         allowed = thresholds.same * float(np.max(np.abs([*middle_s, *np.concatenate(lines)])))
         within = max(float(np.quantile(np.abs(one), 1.0 - thresholds.same)) for one in off)

@@ -12,7 +12,7 @@ from smartshoe.display import first_names
 from smartshoe.errors import InputError
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
 from smartshoe.integrity._dropouts import dropouts, load_dropouts
-from smartshoe.integrity._fault import DataFault, Finding, Integrity
+from smartshoe.integrity._fault import DataFault, Finding, Integrity, OneClock
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
 from smartshoe.integrity._held import held_samples
 from smartshoe.integrity._held_rate import at_their_rates
@@ -87,9 +87,13 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     if dropped_to.size + rails.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
         examined = [_examined(one, decided, dropped_to, rails) for one in tamed]
-    examined = [
-        _as_others_follow(tame, examined, number, decided, dropped_to, rails) for number, tame in enumerate(tamed)
-    ]
+    against = [_is_against(findings) for findings, _, _ in examined]
+    with_load = [lags for (_, _, (*_, lags)), is_against in zip(examined, against, strict=True) if not is_against]
+    if any(against) and (theirs := one_clock(with_load, decided)) is not None:
+        examined = [
+            _as_others_follow(tame, one, theirs, decided, dropped_to, rails) if is_against else one
+            for tame, one, is_against in zip(tamed, examined, against, strict=True)
+        ]
     kept: list[Recording] = []
     for number, (tame, (findings, mask, clock)) in enumerate(zip(tamed, examined, strict=True)):
         recording = tame.recording
@@ -174,26 +178,20 @@ def _examined(
 
 
 def _as_others_follow(
-    tame: _Tamed, examined: Sequence[Examined], number: int, thresholds: Thresholds, dropped_to: Array, rails: Array
+    tame: _Tamed, mine: Examined, theirs: OneClock, thresholds: Thresholds, dropped_to: Array, rails: Array
 ) -> Examined:
-    """What was ``examined`` of one recording; turned over where its reading goes against the load, but for their clock.
+    """A recording whose reading goes against the load, turned over where by the clock of the others it goes with it.
 
     Steps that are read late by half of one fall as the load rises; by the lag that all others have they rise.
     """
-    mine = examined[number]
-    others = [lags for k, (_, _, (*_, lags)) in enumerate(examined) if k != number and lags.at_s.size]
-    theirs = one_clock(others, thresholds)
-    if theirs is None or not _is_against(mine):
-        return mine
     over = _examined(tame, thresholds, dropped_to, rails, turned=True)
     as_it_is, turned = (one[2][2] for one in (mine, over))
-    is_nearer = turned.off_from_s(theirs) < as_it_is.off_from_s(theirs)
-    is_one = is_nearer and one_clock([*others, turned], thresholds) is not None
-    return over if is_one and not _is_against(over) else mine
+    is_theirs = turned.are_of(theirs, thresholds) and turned.off_from_s(theirs) < as_it_is.off_from_s(theirs)
+    return over if is_theirs and not _is_against(over[0]) else mine
 
 
-def _is_against(examined: Examined) -> bool:
-    return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in examined[0])
+def _is_against(findings: Sequence[Finding]) -> bool:
+    return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in findings)
 
 
 def _lacking(recording: Recording) -> str | None:

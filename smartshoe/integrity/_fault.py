@@ -73,6 +73,10 @@ class OneClock:
     before_s: float
     rate: float
 
+    def lag_s(self, at_s: Array) -> Array:
+        """(w,) lags at moments ``at_s`` (w,) from the beginning of a recording."""
+        return self.before_s + self.rate * at_s
+
 
 @dataclass(frozen=True, eq=False)
 class Integrity:
