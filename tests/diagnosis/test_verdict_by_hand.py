@@ -284,9 +284,9 @@ def test_what_neighbours_share_is_the_sum_of_their_products() -> None:
 
 def test_what_remembers_nothing_is_no_structure() -> None:
     nothing: Any = SimpleNamespace(significant=False, rms=0.0)
-    memory: Any = SimpleNamespace(is_noise=False, rms=0.003)
+    memory: Any = SimpleNamespace(is_noise=False, beyond_noise=0.003)
     for rms, size, found in ((0.003, 0.002, 0.002), (0.0, 0.002, 0.0), (0.003, 0.0, 0.0)):
-        memory.rms = rms
+        memory.beyond_noise = rms
         left = ResidualStructure(nothing, nothing, memory, "", size)
         assert (left.rms, left.significant) == (found, found > 0.0)
 
