@@ -58,8 +58,9 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
         if not one.effect.why_unnamed:  # what no law does has been weighed against those that come near
             tried += [a.fit for a in one.laws if a.fit is not None and a.margin < most]
         other = _nearest_of_another_kind(one, found.model)
-        is_open = other is not None and (one.departed > 1.0 or one.is_ended or other.margin < 0.0)
-        if other is not None and is_open and one.size > evidence.thresholds.tolerable:
+        if other is None or one.size <= evidence.thresholds.tolerable:
+            continue
+        if one.departed > 1.0 or one.is_ended or other.margin < 0.0:
             # What departs by more than equations do, or lies where its kind ends, may be of another kind; or where that
             # is the likelier, and was taken out beside this one.
             law = catalogue()[str(other.effect)]

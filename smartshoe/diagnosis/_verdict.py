@@ -15,6 +15,7 @@ from smartshoe.diagnosis._result import Cause, Verdict
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
+from smartshoe.models.effects import in_words
 
 NO_CAUSE = "no cause can be named from this data (see its limits)"
 
@@ -79,8 +80,8 @@ def off_elsewhere(
 
 def names_in(causes: Sequence[Cause], unnamed: int) -> str:
     """The causes as "a, b and perhaps c", and how many effects of the extended model are none."""
-    sure_first = sorted(causes, key=lambda cause: cause.confidence < 0.5)
-    names = [("perhaps " if cause.confidence < 0.5 else "") + cause.name.replace("_", " ") for cause in sure_first]
+    names = [in_words(cause.name) for cause in causes if cause.confidence >= 0.5]
+    names += [f"perhaps {in_words(cause.name)}" for cause in causes if cause.confidence < 0.5]
     names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 

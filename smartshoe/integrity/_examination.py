@@ -49,9 +49,6 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     hum,
 )
 NONE: Array = np.zeros(0)
-Clock = tuple[float, float, Lags]  # offset and rate as in `Integrity`, lags that are seen
-UNTOLD: Clock = (0.0, 0.0, UNSEEN)
-Examined = tuple[list[Finding], Mask, Clock]  # of one recording, and its usable samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +63,22 @@ class _Tamed:
     findings: tuple[Finding, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _Examined:
+    """What was found in one recording, its ``usable`` samples (n,), its clock as in `Integrity`, lags that are seen."""
+
+    findings: list[Finding]
+    usable: Mask
+    offset_s: float = 0.0
+    rate: float = 0.0
+    lags: Lags = UNSEEN
+
+    @property
+    def is_against(self) -> bool:
+        """Whether its reading goes against the load, or not with it."""
+        return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in self.findings)
+
+
 def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = None) -> Integrity:
     """What is wrong with the data of ``recordings``, before any model; deterministic.
 
@@ -76,27 +89,25 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         raise InputError("there is no recording to examine: give at least one file")
     faults: list[DataFault] = []
     usable: list[Mask] = []
-    clocks: list[Clock] = []
     refusals: list[str] = []
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
     examined = [_examined(one, decided) for one in tamed]
-    told = [finding for findings, _, _ in examined for finding in findings]
+    told = [finding for one in examined for finding in one.findings]
     dropped_to = np.unique(np.concatenate([one.values for one in told] or [NONE]))
     rails = np.unique([one.rail for one in told if one.rail is not None])
     if dropped_to.size + rails.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
         examined = [_examined(one, decided, dropped_to, rails) for one in tamed]
-    against = [_is_against(findings) for findings, _, _ in examined]
-    with_load = [lags for (_, _, (*_, lags)), is_against in zip(examined, against, strict=True) if not is_against]
-    if any(against) and (theirs := one_clock(with_load, decided)) is not None:
+    with_load = [one.lags for one in examined if not one.is_against]
+    if len(with_load) < len(examined) and (theirs := one_clock(with_load, decided)) is not None:
         examined = [
-            _as_others_follow(tame, one, theirs, decided, dropped_to, rails) if is_against else one
-            for tame, one, is_against in zip(tamed, examined, against, strict=True)
+            _as_others_follow(tame, one, theirs, decided, dropped_to, rails) if one.is_against else one
+            for tame, one in zip(tamed, examined, strict=True)
         ]
     kept: list[Recording] = []
-    for number, (tame, (findings, mask, clock)) in enumerate(zip(tamed, examined, strict=True)):
-        recording = tame.recording
+    for number, (tame, one) in enumerate(zip(tamed, examined, strict=True)):
+        recording, findings, mask = tame.recording, one.findings, one.usable
         kept.append(_with_known_load(recording, findings))
         faults += [_fault(number, recording, finding) for finding in findings]
         refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
@@ -107,10 +118,9 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
                 f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
             ]
         usable.append(np.zeros_like(mask) if refused else mask)
-        clocks.append(clock)
         refusals += refused[:1]
-    offset_s, rate, lags = zip(*clocks, strict=True)
-    shared = one_clock([one for one, mask in zip(lags, usable, strict=True) if mask.any()], decided)
+    shared = one_clock([one.lags for one, mask in zip(examined, usable, strict=True) if mask.any()], decided)
+    offset_s, rate = tuple(one.offset_s for one in examined), tuple(one.rate for one in examined)
     return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
 
 
@@ -138,8 +148,8 @@ def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recor
 
 def _examined(
     tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE, rails: Array = NONE, *, turned: bool = False
-) -> Examined:
-    """The findings of one recording, its usable samples, its clock; ``dropped_to`` and ``rails`` as in `View`.
+) -> _Examined:
+    """What was found in one recording; ``dropped_to`` and ``rails`` as in `View`.
 
     ``turned``: its reading rises where it seems to fall.
     """
@@ -147,7 +157,7 @@ def _examined(
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
     if findings:
-        return findings, ~usable, UNTOLD
+        return _Examined(findings, ~usable)
     findings = [*tame.findings, *(finding for detect in OF_RECORDING for finding in detect(recording, thresholds))]
     for finding in findings:
         if finding.masks:
@@ -162,7 +172,7 @@ def _examined(
             says = "load and reading are hardly ever there at the same time: record them together"
             findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
     if view is None:
-        return findings, usable, UNTOLD
+        return _Examined(findings, usable)
     view, seen = align(view.turned() if turned else view)
     for detect in OF_VIEW:
         bad = ~usable[view.index]
@@ -174,24 +184,19 @@ def _examined(
                 usable &= ~finding.cut_off
         if any(finding.severity == "fatal" for finding in findings):
             break
-    return findings, usable, (view.offset_s, view.rate, seen)
+    return _Examined(findings, usable, view.offset_s, view.rate, seen)
 
 
 def _as_others_follow(
-    tame: _Tamed, mine: Examined, theirs: OneClock, thresholds: Thresholds, dropped_to: Array, rails: Array
-) -> Examined:
+    tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, dropped_to: Array, rails: Array
+) -> _Examined:
     """A recording whose reading goes against the load, turned over where by the clock of the others it goes with it.
 
     Steps that are read late by half of one fall as the load rises; by the lag that all others have they rise.
     """
     over = _examined(tame, thresholds, dropped_to, rails, turned=True)
-    as_it_is, turned = (one[2][2] for one in (mine, over))
-    is_theirs = turned.are_of(theirs, thresholds) and turned.off_from_s(theirs) < as_it_is.off_from_s(theirs)
-    return over if is_theirs and not _is_against(over[0]) else mine
-
-
-def _is_against(findings: Sequence[Finding]) -> bool:
-    return any(finding.kind in ("wrong_sign", "does_not_follow_load") for finding in findings)
+    is_theirs = over.lags.are_of(theirs, thresholds) and over.lags.off_from_s(theirs) < mine.lags.off_from_s(theirs)
+    return over if is_theirs and not over.is_against else mine
 
 
 def _lacking(recording: Recording) -> str | None:

@@ -130,6 +130,10 @@ def _ramps(late_s: float, drift: float = 0.0, seed: int = 2, step_s: float = 20.
     )
 
 
+def _reversed(recording: Recording) -> Recording:
+    return recording.with_channel(replace(recording.sensor, values=-recording.sensor.values))
+
+
 @pytest.mark.parametrize("late_s", [0.0, 0.05, 0.2, 0.25, 0.3, 0.35])
 def test_a_walk_that_is_read_late_does_not_fall_as_the_load_rises(late_s: float) -> None:
     """By a quarter of a step the reading is high where the load is low."""
@@ -160,9 +164,7 @@ def test_steps_alone_are_read_as_late_as_other_recordings(late_s: float, seed: i
 
 
 def test_a_reversed_reading_among_others_on_one_clock_stays_so() -> None:
-    ramps, other = _ramps(0.0), _ramps(0.0, seed=4)
-    turned = other.with_channel(replace(other.sensor, values=-other.sensor.values))
-    found = examine([ramps, turned], STANDARD)
+    found = examine([_ramps(0.0), _reversed(_ramps(0.0, seed=4))], STANDARD)
     assert [(fault.kind, fault.recording) for fault in found.faults] == [("wrong_sign", 1)]
 
 
@@ -186,8 +188,7 @@ def test_a_reading_that_falls_is_late_by_no_half_of_a_period(period_s: float, un
 @pytest.mark.parametrize("late_s", [0.0, 0.25])
 def test_a_walk_whose_reading_is_reversed_is_told_so_however_late(late_s: float) -> None:
     walked = _walked(late_s)
-    turned = walked.with_channel(replace(walked.sensor, values=-walked.sensor.values))
-    assert "wrong_sign" in {fault.kind for fault in examine([turned], STANDARD).faults}
+    assert "wrong_sign" in {fault.kind for fault in examine([_reversed(walked)], STANDARD).faults}
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.0005])

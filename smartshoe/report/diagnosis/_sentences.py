@@ -30,14 +30,17 @@ NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
 
 
 def heading(diagnosis: Diagnosis) -> str:
-    """The verdict; where all that is named is of recordings, as a zero is, the plain model allows for it."""
+    """The verdict, and whether each cause is sure.
+
+    Where all that is named is of recordings, as a zero is, the plain model allows for it.
+    """
+    if diagnosis.verdict != "explained":
+        return HEADINGS[diagnosis.verdict]
     before, after = diagnosis.baseline, diagnosis.extended
-    if diagnosis.verdict == "explained" and before and after and before.rmse == after.rmse:
+    if before and after and before.rmse == after.rmse:
         return OF_THEIR_OWN
-    least = diagnosis.thresholds.least_confidence
-    if diagnosis.verdict == "explained" and any(cause.confidence < least for cause in diagnosis.causes):
-        return NOT_SURE
-    return HEADINGS[diagnosis.verdict]
+    is_sure = all(cause.confidence >= diagnosis.thresholds.least_confidence for cause in diagnosis.causes)
+    return HEADINGS["explained"] if is_sure else NOT_SURE
 
 
 def listed(names: Sequence[str], last: str = "or") -> str:
