@@ -91,13 +91,11 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
         says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
         return [Statement("confidence of its kind", name.kind_probability, thresholds.least_confidence, says)]
     if name.kind_only:
-        is_certain = name.kind_probability >= thresholds.least_confidence
         says = (
-            "the kind is sure, the law is not: no equation of it fits better than others"
-            if is_certain
-            else "no equation of its kind fits: it may be of a kind that the catalogue does not have"
+            "the kind is sure, the law is not: no equation of it fits better than others, and it may be of a kind that"
+            " the catalogue does not have"
         )
-        return [Statement("kind", float(is_certain), 1.0, says)]
+        return [Statement("kind", name.kind_probability, thresholds.least_confidence, says)]
     return []
 
 

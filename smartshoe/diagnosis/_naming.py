@@ -68,10 +68,10 @@ def names_of(
     possible = [one for one in likely if one.kind_probability > odds * (1.0 - one.kind_probability)]
     if sure := [one for one in likely if one.is_sure]:
         # Not beside a kind that no law follows, nor where one may do what another does.
-        is_firm = not is_clocked and any(one.kind_probability >= thresholds.least_confidence for one in sure)
+        is_firm = not is_clocked and not all(one.kind_only for one in sure)
         departed = thresholds.departure * math.hypot(*(one.member.size for one in sure))
         beside = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
-        beside = [one for one in beside if one.kind_probability > 0.5 or one.member.size > departed]
+        beside = [one for one in beside if confidence_of(one, thresholds) > 0.5 or one.member.size > departed]
         return tuple(one for one in likely if one in sure or one in beside)
     if larger := [one for one in possible if one.member.size > left]:
         return tuple(_doubted(one) for one in larger)
@@ -101,9 +101,6 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     # One that follows less than half of it is none that it may be.
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
     kin = tuple(name for name in others if name not in ruled_out)
-    # Of a family of one law nothing follows better or worse than another.
-    lawless = probability_of_kind(one, left, thresholds, lawless=bool(others))
-    kind = lawless if lawless >= thresholds.least_confidence else min(lawless, 0.5)
     return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
 
 
@@ -137,27 +134,31 @@ def _doubted(name: Name) -> Name:
     return replace(name, kind_probability=min(name.kind_probability, 0.5), is_sure=False)
 
 
-def probability_of_kind(one: Member, left: float, thresholds: Thresholds, *, lawless: bool = False) -> float:
+def probability_of_kind(one: Member, left: float, thresholds: Thresholds) -> float:
     """That an effect of this family is there: a logistic of three ratios, each without a unit, and the evidence for it.
 
     What no equation follows over the effect's size: structure that is ``left``, and what the other effects' equations
     are asked to depart by (one that is as small as that is likely another's shadow). How far its own equation is asked
-    to depart. How alike what it adds is to what another effect adds. ``lawless``: no law of the family follows it
-    better than another, which speaks for a law, or a kind, that the catalogue does not have.
+    to depart. How alike what it adds is to what another effect adds.
     """
-    intercept, per_left, per_departed, without_law, per_likeness = thresholds.kind_odds
+    intercept, per_left, per_departed, per_likeness = thresholds.kind_odds
     left = math.hypot(left, one.others_depart)
     ratio = (left + thresholds.imperfection) / (one.size + thresholds.imperfection)
     score = intercept + per_left * math.log(ratio) + per_departed * one.departed
-    score += without_law * lawless + per_likeness * one.likeness
+    score += per_likeness * one.likeness
     nothing = next((a.margin for a in one.alternatives if a.effect is None), math.inf)
     return 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-max(nothing, 0.0) / 2.0))
 
 
 def confidence_of(name: Name, thresholds: Thresholds) -> float:
-    """That it is what it is named, or one of its equivalents: more than by its odds where it is sure, else no more."""
+    """That it is what it is named, or one of its equivalents: more than by its odds where it is sure, else no more.
+
+    Half at most where no law of the kind follows: it may be of a law, or a kind, that the catalogue does not have.
+    """
     kind = name.kind_probability
-    if not name.is_sure or kind < thresholds.least_confidence:
+    if name.kind_only:
+        return min(kind, 0.5)
+    if not name.is_sure:
         return kind
     return kind / (kind + (1.0 - kind) * math.exp(-thresholds.named_odds))
 

@@ -124,11 +124,10 @@ class Thresholds:
         "about 1 in 4",
     )
     kind_odds: tuple[float, ...] = threshold(
-        (2.77, -1.12, -0.99, -1.09, -2.22),
+        (2.77, -1.12, -0.99, -2.22),
         "log odds",
         "a kind's log odds: intercept; per log of what no equation explains over its size; "
-        "per standard deviation of its departure; where no law of it fits; for its likeness to another effect "
-        "that is there",
+        "per standard deviation of its departure; for its likeness to another effect that is there",
         "logistic regression on the effects in 661 simulated cases of two worlds",
         least=-math.inf,
     )
@@ -209,8 +208,8 @@ class Thresholds:
             for value in given if several and isinstance(given, tuple) else (given,):
                 if not _is_within(value, one):
                     raise UsageError(f"{one.name} is {value!r}: give a {_asked(one)} ({one.metadata['unit']})")
-        if not isinstance(self.kind_odds, tuple) or len(self.kind_odds) != 5:
-            raise UsageError(f"kind_odds is {self.kind_odds!r}: give a tuple of five numbers (log odds)")
+        if not isinstance(self.kind_odds, tuple) or len(self.kind_odds) != 4:
+            raise UsageError(f"kind_odds is {self.kind_odds!r}: give a tuple of four numbers (log odds)")
         rises = isinstance(self.memory_s, tuple) and all(a < b for a, b in pairwise(self.memory_s))
         if not (self.memory_s and rises):
             raise UsageError(

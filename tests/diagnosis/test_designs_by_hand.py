@@ -406,16 +406,15 @@ def _member(
 
 
 def test_a_kind_is_as_sure_as_its_logistic_says() -> None:
-    """2.77; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -1.09; -2.22 a likeness."""
-    for size, departed, left, margin, lawless, others, likeness in (
-        (0.01, 0.5, 0.002, 40.0, False, 0.003, 0.4), (0.001, 2.0, 0.01, 3.0, True, 0.0, 0.0),
-        (0.05, 0.0, 0.0, 0.5, False, 0.01, 0.9),
+    """2.77; -1.12 per log of what no equation follows over the size; -0.99 per deviation; -2.22 a likeness."""
+    for size, departed, left, margin, others, likeness in (
+        (0.01, 0.5, 0.002, 40.0, 0.003, 0.4), (0.001, 2.0, 0.01, 3.0, 0.0, 0.0), (0.05, 0.0, 0.0, 0.5, 0.01, 0.9),
     ):  # fmt: skip
         ratio = (math.hypot(left, others) + 2e-4) / (size + 2e-4)
-        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departed - 1.09 * lawless - 2.22 * likeness
+        score = 2.77 - 1.12 * math.log(ratio) - 0.99 * departed - 2.22 * likeness
         expected = 1.0 / (1.0 + math.exp(-score)) / (1.0 + math.exp(-margin / 2.0))
         one = _member(size, departed, margin, others=others, likeness=likeness)
-        assert probability_of_kind(one, left, STANDARD, lawless=lawless) == pytest.approx(expected)
+        assert probability_of_kind(one, left, STANDARD) == pytest.approx(expected)
     worse = probability_of_kind(_member(margin=-5.0), 0.002, STANDARD)
     assert worse == pytest.approx(0.5 * probability_of_kind(_member(margin=None), 0.002, STANDARD))
 

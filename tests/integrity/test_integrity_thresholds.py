@@ -182,7 +182,7 @@ def test_where_nothing_is_asked_for_the_record_decides_as_it_is() -> None:
         ("memory_s", (), "a tuple of numbers that rise"),
         ("memory_s", (3.0, 3.0), "a tuple of numbers that rise"),
         ("memory_s", 3.0, "a tuple of numbers that rise"),
-        ("kind_odds", (1.0, 2.0), "a tuple of five"),
+        ("kind_odds", (1.0, 2.0), "a tuple of four"),
     ],
 )
 def test_what_nothing_can_be_decided_by_is_refused(name: str, number: object, asked: str) -> None:
