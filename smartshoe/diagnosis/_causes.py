@@ -11,7 +11,7 @@ from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import Name, confidence_of
 from smartshoe.diagnosis._parameters import in_unit, parameters_of
-from smartshoe.diagnosis._result import Cause, Rival, Statement
+from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Cause, Rival, Statement
 from smartshoe.diagnosis._session import Scale, Session
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -89,13 +89,13 @@ def _how_sure(name: Name, found: Inference, thresholds: Thresholds) -> list[Stat
             else "it is larger than all that is left, or than small imperfections and the laws beside it account for"
         )
         says = f"it is not sure, since other effects fit nearly as well; it is named because {why}"
-        return [Statement("confidence of its kind", name.kind_probability, thresholds.least_confidence, says)]
+        return [Statement(OF_A_DOUBTED_CAUSE, name.kind_probability, thresholds.least_confidence, says)]
     if name.kind_only:
         says = (
             "the kind is sure, the law is not: no equation of it fits better than others, and it may be of a kind that"
             " the catalogue does not have"
         )
-        return [Statement("kind", name.kind_probability, thresholds.least_confidence, says)]
+        return [Statement(OF_A_KIND, name.kind_probability, thresholds.least_confidence, says)]
     return []
 
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from smartshoe.calibration import Calibration
 
 Verdict = Literal["adequate", "explained", "partly_explained", "unexplained", "refused"]
+# Statistics whose statements say why a cause, or its law, is not sure.
+OF_A_DOUBTED_CAUSE, OF_A_KIND = "confidence of its kind", "kind"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,11 @@ class Cause:
     def name(self) -> str:
         """The effect's identifier."""
         return self.effect.name
+
+    @property
+    def doubt(self) -> str:
+        """Why it is not sure, or its law is not, as its evidence says; empty where nothing does."""
+        return next((one.says for one in self.evidence if one.statistic in (OF_A_DOUBTED_CAUSE, OF_A_KIND)), "")
 
     def to_dict(self) -> dict[str, Any]:
         """The contract's entry in ``causes``."""

@@ -14,6 +14,7 @@ from diagnoses_made import CASES, FULL_READING, LEAK, LEAK_CAUSE, NAME, RUN_NEXT
 from looks import look, unfold
 
 from smartshoe.diagnosis import Trace
+from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Statement
 from smartshoe.models.effects import effect
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._page import write_diagnosis_page
@@ -175,6 +176,23 @@ def test_a_free_form_is_told_as_such_with_its_own_parameters(
     said = capsys.readouterr().out
     assert re.search(r"sensor lag\W+free form\W+no equation fits well enough", said)
     assert "direction" not in said
+
+
+@pytest.mark.parametrize("statistic", [OF_A_KIND, OF_A_DOUBTED_CAUSE])
+def test_why_a_cause_is_not_sure_is_said_where_it_is_named(
+    statistic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once, and not among what is folded."""
+    why = "the kind is sure, the law is not"
+    doubted = replace(LEAK_CAUSE, evidence=(*LEAK_CAUSE.evidence, Statement(statistic, 0.9, 0.75, why)))
+    assert (LEAK_CAUSE.doubt, doubted.doubt) == ("", why)
+    made = replace(case("one cause"), causes=(doubted,))
+    text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
+    assert text.count("The kind is sure, the law is not.") == 1
+    assert text.index("The kind is sure") < text.index("What speaks for it")
+    monkeypatch.setenv("COLUMNS", "240")
+    print_diagnosis(made)
+    assert f"; {why}" in capsys.readouterr().out
 
 
 def test_the_comparison_and_the_shares_are_those_of_the_diagnosis() -> None:

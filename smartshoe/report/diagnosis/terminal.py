@@ -116,7 +116,8 @@ def _sure(cause: Cause) -> str:
 
 
 def _about(cause: Cause) -> str:
-    return f"{in_words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
+    said = f"{in_words(cause.name)}: {cause.effect.says}; {why_this_one(cause)}"
+    return f"{said}; {cause.doubt}" if cause.doubt else said
 
 
 def _several(console: Console, heading: str, lines: Sequence[str], most: int | None = MOST_FAULTS) -> None:
