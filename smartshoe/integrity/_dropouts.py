@@ -23,11 +23,11 @@ from smartshoe.signals.masks import runs_of
 def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``dropouts``; masked. To nothing or to rest, and to the upper end, where a wire that breaks reads as well.
 
-    A value that another recording of the unit dropped to (``view.dropped_to``) needs no fall from a large load here.
+    A value that another recording of the unit dropped to (``view.ends``) needs no fall from a large load here.
     """
     if view.span == 0.0:
         return
-    known = view.sign * view.dropped_to
+    known = view.sign * view.ends.dropouts
     is_upper = known > float(view.curve[1].max())
     at = dropped(view)
     if at.any() and not _one_level(view, at):

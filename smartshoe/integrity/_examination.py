@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Mask
 from smartshoe.display import first_names
 from smartshoe.errors import InputError
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
@@ -22,7 +22,7 @@ from smartshoe.integrity._lines import hum
 from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
-from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity._view import UNKNOWN_ENDS, Ends, Signal, View
 from smartshoe.integrity._wild import with_missing, without_wild
 from smartshoe.integrity._wrapped import unwrapped
 from smartshoe.integrity.thresholds import Thresholds, decided_by
@@ -48,7 +48,6 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     quantisation,
     hum,
 )
-NONE: Array = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,16 +92,14 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
     examined = [_examined(one, decided) for one in tamed]
-    told = [finding for one in examined for finding in one.findings]
-    dropped_to = np.unique(np.concatenate([one.values for one in told] or [NONE]))
-    rails = np.unique([one.rail for one in told if one.rail is not None])
-    if dropped_to.size + rails.size and len(recordings) > 1:
+    ends = _ends_told_by([finding for one in examined for finding in one.findings])
+    if ends.dropouts.size + ends.rails.size and len(recordings) > 1:
         # What one recording teaches about the unit holds for the others.
-        examined = [_examined(one, decided, dropped_to, rails) for one in tamed]
+        examined = [_examined(one, decided, ends) for one in tamed]
     with_load = [one.lags for one in examined if not one.is_against]
     if len(with_load) < len(examined) and (theirs := one_clock(with_load, decided)) is not None:
         examined = [
-            _as_others_follow(tame, one, theirs, decided, dropped_to, rails) if one.is_against else one
+            _as_others_follow(tame, one, theirs, decided, ends) if one.is_against else one
             for tame, one in zip(tamed, examined, strict=True)
         ]
     kept: list[Recording] = []
@@ -110,7 +107,7 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
         recording, findings, mask = tame.recording, one.findings, one.usable
         kept.append(_with_known_load(recording, findings))
         faults += [_fault(number, recording, finding) for finding in findings]
-        refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
+        refused = [f"{recording.label}: {one.says}" for one in findings if one.severity == "fatal"]
         faulty = _at_fault(findings, mask.size)
         if not refused and (decided.clear * (1.0 - faulty.mean()) < 1.0 or not mask.any()):
             refused = [
@@ -122,6 +119,11 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     shared = one_clock([one.lags for one, mask in zip(examined, usable, strict=True) if mask.any()], decided)
     offset_s, rate = tuple(one.offset_s for one in examined), tuple(one.rate for one in examined)
     return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
+
+
+def _ends_told_by(findings: Sequence[Finding]) -> Ends:
+    rails = [one.rail for one in findings if one.rail is not None]
+    return Ends(np.unique(np.concatenate([np.zeros(0), *(one.values for one in findings)])), np.unique(rails))
 
 
 def _at_fault(findings: Sequence[Finding], size: int) -> Mask:
@@ -146,13 +148,8 @@ def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recor
     return with_missing(recording, recording.load, np.any(none, axis=0)) if none else recording
 
 
-def _examined(
-    tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE, rails: Array = NONE, *, turned: bool = False
-) -> _Examined:
-    """What was found in one recording; ``dropped_to`` and ``rails`` as in `View`.
-
-    ``turned``: its reading rises where it seems to fall.
-    """
+def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *, turned: bool = False) -> _Examined:
+    """What was found in one recording; ``turned``: its reading rises where it seems to fall."""
     recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
@@ -162,17 +159,13 @@ def _examined(
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
-    view = None
-    lacking = _lacking(recording)
-    if lacking is not None:
-        findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
-    else:
-        view = _view(tame.recording, thresholds, dropped_to, rails)
-        if view is None:
-            says = "load and reading are hardly ever there at the same time: record them together"
-            findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
+    if (lacking := _lacking(recording)) is not None:
+        fatal = Finding.fatal("no_reference", np.ones(len(recording), dtype=bool), lacking)
+        return _Examined([*findings, fatal], usable)
+    view = _view(tame.recording, thresholds, ends)
     if view is None:
-        return _Examined(findings, usable)
+        says = "load and reading are hardly ever there at the same time: record them together"
+        return _Examined([*findings, Finding.fatal("missing_samples", ~usable, says)], usable)
     view, seen = align(view.turned() if turned else view)
     for detect in OF_VIEW:
         bad = ~usable[view.index]
@@ -187,14 +180,12 @@ def _examined(
     return _Examined(findings, usable, view.offset_s, view.rate, seen)
 
 
-def _as_others_follow(
-    tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, dropped_to: Array, rails: Array
-) -> _Examined:
+def _as_others_follow(tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, ends: Ends) -> _Examined:
     """A recording whose reading goes against the load, turned over where by the clock of the others it goes with it.
 
     Steps that are read late by half of one fall as the load rises; by the lag that all others have they rise.
     """
-    over = _examined(tame, thresholds, dropped_to, rails, turned=True)
+    over = _examined(tame, thresholds, ends, turned=True)
     is_theirs = over.lags.are_of(theirs, thresholds) and over.lags.off_from_s(theirs) < mine.lags.off_from_s(theirs)
     return over if is_theirs and not over.is_against else mine
 
@@ -216,16 +207,15 @@ def _lacking(recording: Recording) -> str | None:
     return None if readings else f"there is no reading: name its column with --sensor{among}"
 
 
-def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array, rails: Array = NONE) -> View | None:
+def _view(recording: Recording, thresholds: Thresholds, ends: Ends) -> View | None:
     """The recording where load and reading are both present, the reading rising with load; None where hardly ever."""
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
     if index.size < thresholds.least_samples:
         return None
     time_s, load_n, reading = recording.time_s[index], load.si[index], sensor.values[index]
-    force = Signal(load_n, thresholds)
-    read = Signal(reading, thresholds)
-    view = View(recording, index, time_s, force, read, 1, thresholds, dropped_to=dropped_to, rails=rails)
+    signals = Signal(load_n, thresholds), Signal(reading, thresholds)
+    view = View(recording, index, time_s, *signals, 1, thresholds, ends=ends)
     at, middle = view.curve
     falls = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
     return view.turned() if falls else view

@@ -39,7 +39,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         )
         if view.load_span <= 2.0 * load.largest * load.quiet_noise:
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
-    yield Finding("does_not_follow_load", whole, says, "fatal", True, says)
+    yield Finding.fatal("does_not_follow_load", whole, says)
 
 
 def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
@@ -53,7 +53,7 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
             f"the load is negative in compression (it runs from {at[0]:.4g} to {at[-1]:.4g} N): turn its sign,"
             " compression is positive (a minus before the column does so: --force '-COLUMN')"
         )
-        yield Finding("wrong_sign", whole, says, "fatal", True, says)
+        yield Finding.fatal("wrong_sign", whole, says)
     elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD:
         name = view.recording.sensor.name
         says = f"the {name} falls as the load rises: turn the sign of one of the two (load is positive in compression)"

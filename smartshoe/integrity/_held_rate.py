@@ -34,7 +34,7 @@ def _held_for(recording: Recording, thresholds: Thresholds) -> dict[str, tuple[i
     A coarse grid repeats values as well, but goes on by single steps of it, each as soon as it is due.
     """
     found = {}
-    for channel in (*recording.of_role("load"), *recording.of_role("sensor")):
+    for channel in recording.loads_and_sensors:
         change = np.abs(np.diff(channel.values[channel.present]))
         at = np.flatnonzero(change)
         if at.size < thresholds.few**2:

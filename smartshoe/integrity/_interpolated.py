@@ -37,8 +37,7 @@ def where_measured(recording: Recording, thresholds: Thresholds) -> tuple[Record
 
     Between them that channel is no measurement: taken for one, the chords of its course would be the unit's dynamics.
     """
-    channels = (*recording.of_role("load"), *recording.of_role("sensor"))
-    found = {one.name: _lines(recording.time_s, one, thresholds) for one in channels}
+    found = {one.name: _lines(recording.time_s, one, thresholds) for one in recording.loads_and_sensors}
     told = {name: lines for name, lines in found.items() if lines is not None}
     if not told:
         return recording, []
@@ -204,8 +203,7 @@ def _taken_at(recording: Recording, slow: str, moments: Array) -> Recording:
             at = np.clip(np.searchsorted(t, moments), 2, t.size - 2)
             lines = [one.values[i] + (moments - t[i]) * _slope(t, one.values, i, k) for i, k in ((at - 1, -1), (at, 1))]
             values = 0.5 * (lines[0] + lines[1])
-        made = Channel.from_values(name, values, one.unit, one.role)
-        channels[name] = replace(made, range_=one.range_, resolution=one.resolution)
+        channels[name] = one.with_values(values)
     return replace(recording, time_s=moments, channels=channels)
 
 

@@ -62,6 +62,13 @@ def white_noise(values: Array, thresholds: Thresholds, step: float) -> Array:
     return local_scale(second, thresholds, step)
 
 
+def turns(values: Array) -> tuple[Mask, Mask]:
+    """(n - 3,) each: where second differences change sign, as white noise's mostly do; and where they keep it."""
+    second = np.diff(values, 2)
+    product = second[1:] * second[:-1]
+    return product < 0.0, product > 0.0
+
+
 def slope_change(values: Array, noise: Array, near: int, largest: float) -> Array:
     """(n,) the largest change of increment (per sample) within ``near`` samples, less ``largest`` times the noise.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from smartshoe.integrity._scales import (
     lattice_step,
     local_scale,
     slope_change,
+    turns,
     white_noise,
 )
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -86,10 +87,9 @@ class Signal:
     @cached_property
     def is_noisy(self) -> bool:
         """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
-        second = np.diff(self.values, 2)
-        product = second[1:] * second[:-1]
+        turned, stayed = turns(self.values)
         least = max(toggling(self.thresholds) * self.step, self.thresholds.material * float(np.ptp(self.values)))
-        return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > least
+        return bool(turned.sum() > stayed.sum()) and self.quiet_noise > least
 
     @cached_property
     def outlying(self) -> Array:
@@ -110,13 +110,23 @@ class Signal:
 
 
 @dataclass(frozen=True, eq=False)
+class Ends:
+    """Readings, as recorded, to which a unit's sensor drops out, ``dropouts`` (v,), and where it ends, ``rails``."""
+
+    dropouts: Array
+    rails: Array
+
+
+UNKNOWN_ENDS = Ends(np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """A recording with both signals.
 
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
-    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out, ``rails`` (r,) those at
-    which its sensor is known to end. ``is_swapped``: load and reading have changed places.
+    ``ends``: what all recordings tell of the unit's sensor. ``is_swapped``: load and reading have changed places.
     """
 
     recording: Recording
@@ -128,8 +138,7 @@ class View:
     thresholds: Thresholds
     offset_s: float = 0.0
     rate: float = 0.0
-    dropped_to: Array = field(default_factory=lambda: np.zeros(0))
-    rails: Array = field(default_factory=lambda: np.zeros(0))
+    ends: Ends = UNKNOWN_ENDS
     is_swapped: bool = False
 
     @cached_property
@@ -310,8 +319,8 @@ class View:
         return replace(self, load=load, reading=reading, sign=-self.sign)
 
     def swapped(self) -> View:
-        """The reading for the load and the load for the reading; no value that this dropped to is known."""
-        return replace(self, load=self.reading, reading=self.load, sign=1, dropped_to=np.zeros(0), is_swapped=True)
+        """The reading for the load and the load for the reading, of which no ends are known."""
+        return replace(self, load=self.reading, reading=self.load, sign=1, ends=UNKNOWN_ENDS, is_swapped=True)
 
     def whole(self, at: Mask) -> Mask:
         """A mask (m,) over this view as one over all of the recording's samples."""
