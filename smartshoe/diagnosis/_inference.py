@@ -93,13 +93,13 @@ def infer(
         return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), can_validate)
     begun = State(evidence, best, plain)
     if is_stretched(plain.model):
-        begun = simpler(with_a_latency(begun, sessions), begun, sessions)
-    state = _sought(begun, sessions, progress)
+        begun = simpler(with_a_latency(begun), begun)
+    state = _sought(begun, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
-    with_blocks, lawful = state, with_laws(state, plain.model, sessions)
+    with_blocks, lawful = state, with_laws(state, plain.model)
     if lawful is not state:
-        state = law_or_block(settled(lawful, sessions, progress), state, sessions)
+        state = law_or_block(settled(lawful, progress), state)
     if (gained := with_likelier_gains(state, sessions)) is not None:
         progress("going through it again beside what recordings have of their own")
         beside = infer(start, gained, thresholds, progress)
@@ -119,7 +119,7 @@ def infer(
             state, found = with_blocks, other
     found, members = _likeliest(found, plain, sessions, progress)
     if found.is_stepped_down:
-        first = _first_step(begun, state, sessions)
+        first = _first_step(begun, state)
         again = None if first is None else _judged(first, plain, sessions)
         if again is not None and not again.is_stepped_down:
             found, members = _likeliest(again, plain, sessions, progress)
@@ -147,18 +147,18 @@ def infer(
     )
 
 
-def _sought(begun: State, sessions: Sequence[Session], progress: Progress) -> State:
+def _sought(begun: State, progress: Progress) -> State:
     """What settles from ``begun``, also with other arms of the baseline where it came to one that effects had bent."""
-    state = settled(begun, sessions, progress)
+    state = settled(begun, progress)
     if is_beyond_memory(state.fit.model, begun.thresholds):
         progress("beginning anew from arms as units have")
-        state = better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
+        state = better_from(with_a_usual_arm(begun), state, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        state = better_from(with_another_pole(state, sessions), state, sessions, progress)
+        state = better_from(with_another_pole(state), state, progress)
     if state.fit.model.relaxing_share < 0.0:
-        state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
-    return better_from_one(begun, state, sessions, progress)
+        state = better_from(with_an_arm_that_creeps(state), state, progress)
+    return better_from_one(begun, state, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,7 @@ class _Judged:
 def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     """What of a state's effects predicts what is left out, fitted at last."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
-    likelihood, most = state.likelihood(sessions), error_of(sessions, plain.model)
+    likelihood, most = state.likelihood(), error_of(sessions, plain.model)
     left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
     whole = fit(likelihood, with_members(given, best, extended.model, likelihood))
     extended = left_out.following(whole)
@@ -228,7 +228,7 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     extended = extended if extra else weighed(likelihood, plain.model)  # the plain fit knows another noise
     kept = extended.model.names
     if refused and kept:
-        evidence, best = evidence_about(extended.model, sessions, evidence)
+        evidence, best = evidence_about(extended.model, evidence)
     else:
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     left = tuple(name for name in undone if name in kept)
@@ -241,25 +241,25 @@ def _likeliest(
 ) -> tuple[_Judged, tuple[Member, ...]]:
     """The likeliest set that changes of one member or law lead to from ``found``, and its members, weighed."""
     while True:
-        found, members = _without_redundant(found, plain, sessions)
+        found, members = _without_redundant(found, plain)
         told = [one for one in members if one.name not in plain.model.names]  # two clocks were told before any model
-        for better in likelier(found.fit, found.evidence, told, sessions):
+        for better in likelier(found.fit, found.evidence, told):
             progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
             other = _judged(better, plain, sessions)
-            if _is_likelier(other, found, sessions):
+            if _is_likelier(other, found):
                 found = other
                 break
         else:  # no change is likelier, or leads to a set that is
             return found, members
 
 
-def _is_likelier(other: _Judged, found: _Judged, sessions: Sequence[Session]) -> bool:
+def _is_likelier(other: _Judged, found: _Judged) -> bool:
     """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``."""
-    new, old = (evidence_about(one.fit.model, sessions, found.evidence)[1].score for one in (other, found))
+    new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
 
 
-def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) -> tuple[_Judged, tuple[Member, ...]]:
+def _without_redundant(found: _Judged, plain: Fit) -> tuple[_Judged, tuple[Member, ...]]:
     """``found`` without effects that another of their family makes immaterial, and its members, weighed.
 
     A lag and a delay beside it, of which neither is needed where the other is, are each too small for a name.
@@ -267,7 +267,7 @@ def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) 
     members = found.members()
     while (less := _redundant(members, plain, found.evidence.thresholds)) is not None:
         refitted = fit(found.fit.likelihood, less.without.model)
-        evidence, best = evidence_about(refitted.model, sessions, found.evidence)
+        evidence, best = evidence_about(refitted.model, found.evidence)
         found = replace(found, fit=refitted, evidence=evidence, best=best)
         members = found.members()
     return found, members
@@ -286,14 +286,13 @@ def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) ->
     return min(twice, key=lambda one: one.size, default=None)
 
 
-def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> State | None:
+def _first_step(begun: State, state: State) -> State | None:
     """The first set of the last search, before other effects bent it: it may stand where what it led to does not."""
     path = [model for model in state.path if len(model.parts) > len(begun.fit.model.parts)]
     if not path or {*path[0].names} == {*state.fit.model.names}:
         return None
-    likelihood = begun.likelihood(sessions)
-    evidence, best = evidence_about(path[0], sessions, begun.evidence)
-    return State(evidence, best, fit(likelihood, path[0]), state.banned)
+    evidence, best = evidence_about(path[0], begun.evidence)
+    return State(evidence, best, fit(begun.likelihood(), path[0]), state.banned)
 
 
 def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Judged] | None:
@@ -306,7 +305,7 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
     if before <= thresholds.tolerable:
         return None
     left_out = LeftOut(sessions, begun.evidence.noise_sd, plain.model, thresholds)
-    likelihood, standing = begun.likelihood(sessions), []
+    likelihood, standing = begun.likelihood(), []
     nothing = begun.evidence.posterior(begun.start)
     for k in additions(begun.evidence, begun.start, BREADTH):
         best = begun.evidence.posterior((*begun.start, k))

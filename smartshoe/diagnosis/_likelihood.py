@@ -34,13 +34,13 @@ def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) 
 
 
 class Likelihood:
-    """What a model's parameters are judged by: ``sessions``, the noise, and nuisances that belong to a session."""
+    """What a model's parameters are judged by: ``sessions`` of which anything is fitted, the noise, their nuisances."""
 
     def __init__(
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
         self.sessions = tuple(session for session in sessions if session.fitted.any())
-        self.noise_sd = noise_sd
+        self.noise_sd, self.thresholds = noise_sd, thresholds
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._rows: list[Array] = []  # `rows_of` where they were last asked for, with room for one column more
         self._scales = np.zeros(0)

@@ -319,7 +319,7 @@ def test_what_is_found_is_begun_with_at_about_its_size(two: tuple[Linearised, Ev
 def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linearised, Evidence]) -> None:
     given, _ = two
     plain = fit(Likelihood(given.sessions, SD, MODEL, STANDARD), MODEL)
-    state = state_at(plain, given.sessions, STANDARD)
+    state = state_at(plain)
     assert state.start == ()
     assert state.improved == pytest.approx(state.evidence.posterior(()).score - state.best.score)
     assert state.improved > state.evidence.odds
@@ -327,7 +327,7 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
     large = max(state.best.sizes)
     for linear, bends in ((0.5 * large, True), (2.0 * large, False)):
         limits = replace(STANDARD, linear=linear)
-        again = state_at(plain, given.sessions, limits)
+        again = state_at(fit(Likelihood(given.sessions, SD, MODEL, limits), MODEL))
         assert again.bends is bends
         # Only one change where it bends: the next linearisation may tell another.
         assert (len(again.best.members) == 1) is bends

@@ -139,7 +139,7 @@ def test_without_gains_the_offset_and_past_are_all_that_is_a_recordings_own(sess
 
 
 def _state(model: ExtendedModel, sessions: list[Session]) -> State:
-    return state_at(fit(Likelihood(sessions, SD, model, STANDARD), model), sessions, STANDARD)
+    return state_at(fit(Likelihood(sessions, SD, model, STANDARD), model))
 
 
 def test_gains_are_asked_for_where_more_is_left_than_imperfections_or_something_goes_with_cycles() -> None:

@@ -367,11 +367,11 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
         _inference, "cancelling", lambda sessions, one, thresholds: list(one.names) if len(one.names) > 1 else []
     )
     monkeypatch.setattr(_inference, "extrapolating", lambda *given: None)
-    monkeypatch.setattr(_inference, "evidence_about", lambda one, sessions, other: (other, other.posterior((0,))))
+    monkeypatch.setattr(_inference, "evidence_about", lambda one, other: (other, other.posterior((0,))))
     monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
     state: Any = SimpleNamespace(
         given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
-        fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda sessions: "likelihood",
+        fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda: "likelihood",
     )  # fmt: skip
     found: Any = _judged(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
     assert found.fit.model.names == names
