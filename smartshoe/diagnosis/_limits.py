@@ -185,8 +185,10 @@ def past_of(zero: Zero, scale: Scale) -> str:
     )
 
 
-def crept_of(drift: Name, tare: Zero) -> str:
-    """What is said of a drift of the zero that a tare may make by creeping."""
+def crept_of(drift: Name, tare: Zero | None) -> str | None:
+    """What is said of a drift of the zero that a tare may make by creeping, where there is one."""
+    if tare is None:
+        return None
     return (
         f"{drift.effect.name.replace('_', ' ')} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
         f" which a tare of {100 * tare.size:.2g} % may do by creeping, so that it is not named (zero the load cell, and"

@@ -37,6 +37,7 @@ class Prepared:
     is_no_unit: bool
     clocks: Sequence[tuple[Effect, Array]]
     is_moved: bool
+    thresholds: Thresholds
 
 
 def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> Prepared:
@@ -64,4 +65,4 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
-    return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved)
+    return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)
