@@ -8,15 +8,13 @@ from dataclasses import replace
 from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL, with_usual_arm
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, fit
 from smartshoe.diagnosis._members import begun_with
-from smartshoe.diagnosis._search import BREADTH, additions
+from smartshoe.diagnosis._search import BREADTH, SWAPS, additions
 from smartshoe.diagnosis._sensitivity import available
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
-
-PROMISING = 3  # of fits from far away, that go on to their end: a resolution
 
 
 def with_another_pole(state: State) -> State:
@@ -130,7 +128,7 @@ def _usual(found: Sequence[Fit], state: State) -> Sequence[Fit]:
 
 def _likeliest(found: Sequence[Fit], state: State) -> list[Fit]:
     """The few that promise most, the likeliest first, the odds against effects counted."""
-    return sorted(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))[:PROMISING]
+    return sorted(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))[:SWAPS]
 
 
 def _at_their_end(few: Iterable[Fit]) -> list[Fit]:

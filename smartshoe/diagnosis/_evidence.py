@@ -66,6 +66,10 @@ class Posterior:
     departed: tuple[float, ...]
     together: float = 0.0
 
+    def without(self, member: int) -> Members:
+        """The set but for one of its members."""
+        return tuple(m for m in self.members if m != member)
+
 
 @dataclass(frozen=True, eq=False)
 class _Columns:

@@ -34,19 +34,19 @@ from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
-from smartshoe.diagnosis._session import Session, load_cycles
+from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
 from smartshoe.diagnosis._settling import (
     Progress,
     better_from,
     better_from_one,
     law_or_block,
-    listed,
     settled,
     simpler,
 )
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import listed
 from smartshoe.models.effects.effect import CoreEffect, Effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -327,7 +327,7 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
 
 def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
-    fitted = [session for session in sessions if session.fitted.any()]
+    fitted = fitted_of(sessions)
     return len(fitted) if len(fitted) > 1 else load_cycles(fitted, thresholds)
 
 

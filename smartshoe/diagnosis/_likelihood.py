@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dposv
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged, where
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel, Trace
 
@@ -39,7 +39,7 @@ class Likelihood:
     def __init__(
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
-        self.sessions = tuple(session for session in sessions if session.fitted.any())
+        self.sessions = fitted_of(sessions)
         self.noise_sd, self.thresholds = noise_sd, thresholds
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._rows: list[Array] = []  # `rows_of` where they were last asked for, with room for one column more

@@ -15,14 +15,13 @@ from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._session import Scale, Session
-from smartshoe.diagnosis._settling import listed
+from smartshoe.diagnosis._session import Scale, Session, fitted_of
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
-from smartshoe.models.effects import Effect
+from smartshoe.models.effects import Effect, in_words, listed
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
@@ -38,7 +37,7 @@ def parted_clocks(
     """
     if not {one.name for one, _ in told} & {*model.names}:
         return None
-    middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in sessions if one.fitted.any()]))
+    middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in fitted_of(sessions)]))
     lag_s = sum(one.late_s(values, middle_s) for one, values in told)
     fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
@@ -54,7 +53,7 @@ def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> s
 
     A block of what no law does is one where it differs from a law by more than laws do.
     """
-    told = name.effect.name.replace("_", " ")
+    told = in_words(name.effect.name)
     part = model.part(name.member.name)
     if part.effect.why_unnamed and name.by is None and part.effect.departs_by(part.values) > thresholds.law_departure:
         return f"the reading {part.effect.why_unnamed}, which no effect of the catalogue does, so that it is not named"
@@ -88,7 +87,7 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
     ways = "; or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
     ways = ways or "more load cycles"
     return (
-        f"{name.effect.name.replace('_', ' ')} fits, but recordings of one load cycle cannot show it, so that it is"
+        f"{in_words(name.effect.name)} fits, but recordings of one load cycle cannot show it, so that it is"
         f" not named; it needs {ways}"
     )
 
@@ -96,7 +95,7 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
 def moved_of(name: Name) -> str:
     """What is said of a latency that is left where readings were moved to the load's clock before."""
     return (
-        f"{name.effect.name.replace('_', ' ')} fits, but readings were moved to the load's clock before, each by its"
+        f"{in_words(name.effect.name)} fits, but readings were moved to the load's clock before, each by its"
         " own lag, of which it may be a rest, so that it is not named"
     )
 
@@ -104,7 +103,7 @@ def moved_of(name: Name) -> str:
 def few_cycles_of(name: Name, cycles: int) -> str:
     """What is said of an effect beside as many surer ones as there are load cycles to tell them by."""
     return (
-        f"{name.effect.name.replace('_', ' ')} fits, but so few load cycles ({cycles}) show no more than as many"
+        f"{in_words(name.effect.name)} fits, but so few load cycles ({cycles}) show no more than as many"
         " causes, so that it is not named (repeat the cycles)"
     )
 
@@ -121,7 +120,7 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
     surest = max(alike, key=lambda one: one.kind_probability, default=name)
     if surest is name or name.member.size > thresholds.law_departure * surest.member.size:
         return None
-    said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
+    said, other = (in_words(one.effect.name) for one in (name, surest))
     return (
         f"{said} fits, but it may be no more than the error of the equation of {other} (both are"
         f" {name.effect.mechanism or 'curves of the load'}), so that it is not named"
@@ -190,7 +189,7 @@ def crept_of(drift: Name, tare: Zero | None) -> str | None:
     if tare is None:
         return None
     return (
-        f"{drift.effect.name.replace('_', ' ')} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
+        f"{in_words(drift.effect.name)} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
         f" which a tare of {100 * tare.size:.2g} % may do by creeping, so that it is not named (zero the load cell, and"
         " log a rest)"
     )

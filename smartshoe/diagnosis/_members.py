@@ -11,7 +11,7 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
-from smartshoe.diagnosis._search import BREADTH, additions, allowed
+from smartshoe.diagnosis._search import BREADTH, RIVALS, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
@@ -19,7 +19,6 @@ from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
 SIZES = (0.5, 5.0, 20.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
-FEW_SHAPES = 2  # of a law, the likeliest by a linearisation, from which its fit begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +125,7 @@ def _without(name: str, model: ExtendedModel) -> ExtendedModel:
 
 def _shapes_beside(best: Posterior, member: int, evidence: Evidence) -> dict[str, list[Mapping[str, float]]]:
     """The shapes of each effect in a member's place, the likeliest first."""
-    less = tuple(m for m in best.members if m != member)
+    less = best.without(member)
     shapes: dict[str, list[Mapping[str, float]]] = {}
     for _, k, _ in sorted(evidence.extensions(less), key=lambda extension: extension[0]):
         one = evidence.given.candidates[k]
@@ -151,7 +150,7 @@ def _other_laws(
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
-        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:FEW_SHAPES])
+        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:RIVALS])
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
@@ -173,7 +172,7 @@ def alternatives(evidence: Evidence, best: Posterior, member: int) -> tuple[Alte
     Nothing, whether the others' equations depart as their own do, towards any of their families, or in all that their
     effects add.
     """
-    less = tuple(m for m in best.members if m != member)
+    less = best.without(member)
     margins = [
         weighed.posterior(less, of_any_law=wider).score - weighed.posterior(best.members, of_any_law=wider).score
         for weighed, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))

@@ -17,7 +17,7 @@ from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.display import moment
-from smartshoe.models.effects import Conditions, effect, told_apart_by
+from smartshoe.models.effects import Conditions, effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
 from smartshoe.protocol import Protocol
 
@@ -30,10 +30,6 @@ SHOWN_BY: dict[Exposure, str] = {
     "pauses": "pauses",
     "steps": "steps",
 }
-ONE_CYCLE = (
-    "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be held"
-    " against another, so that no cause can be told"
-)
 
 
 def next_experiment(
@@ -61,7 +57,11 @@ def next_experiment(
     if not doubtful and (found.own_gains or found.zero_changes):
         return NextExperiment(pair, "repeat", None, _again(found))
     if not doubtful and not found.can_validate:
-        return NextExperiment(pair, "repeat", None, ONE_CYCLE)
+        says = (
+            "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be"
+            " held against another, so that no cause can be told"
+        )
+        return NextExperiment(pair, "repeat", None, says)
     if not doubtful:
         least = excitation.thresholds.least_confidence
         is_open = open_ or any(cause.equivalents or cause.confidence < least for cause in causes)
@@ -79,7 +79,7 @@ def next_experiment(
     }
     best = max(expected, key=lambda name: expected[name])
     names = (cause.name, *cause.equivalents)
-    both = f"{cause.name} and {rival}".replace("_", " ")
+    both = listed((cause.name, rival), "and")
     channel = _channel(cause.name, rival, sessions)
     no_name = -2.0 * math.log(excitation.thresholds.false_name)  # less tells nothing apart
     if expected[best] < no_name:
@@ -92,7 +92,7 @@ def next_experiment(
         if by > max(margin, expected[best] / excitation.thresholds.clear)
     }
     if not telling:
-        instead = f"log the {channel} too" if channel else f"{cause.name.replace('_', ' ')} follows better"
+        instead = f"log the {channel} too" if channel else f"{in_words(cause.name)} follows better"
         says = (
             f"none of the {len(expected)} protocols is expected to tell {both} apart better than this data already"
             f" does: {instead}"

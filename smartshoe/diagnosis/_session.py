@@ -8,7 +8,7 @@ mostly gone; and a fit costs a fraction.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -107,6 +107,11 @@ class Session:
     def judged(self) -> Mask:
         """(n,) the samples that a fit must not use, for judging it."""
         return self.usable & self.held_out
+
+
+def fitted_of(sessions: Iterable[Session]) -> tuple[Session, ...]:
+    """Those of which anything is fitted."""
+    return tuple(session for session in sessions if session.fitted.any())
 
 
 def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds) -> Scale:
@@ -448,7 +453,7 @@ def _neighbour(recording: Recording) -> Channel | None:
 
 def load_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """How often the load rises in recordings of which anything is fitted."""
-    return sum(_rises(session.conditions, thresholds) for session in sessions if session.fitted.any())
+    return sum(_rises(session.conditions, thresholds) for session in fitted_of(sessions))
 
 
 def have_later_cycles(sessions: Sequence[Session], thresholds: Thresholds) -> bool:

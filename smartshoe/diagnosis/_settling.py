@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
 from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis._search import MOST_MEMBERS, additions
+from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, additions
 from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import in_words
+from smartshoe.models.effects import listed
 from smartshoe.models.extended import ExtendedModel
 
 Progress = Callable[[str], None]
@@ -22,7 +22,6 @@ Progress = Callable[[str], None]
 # equation fits, is left unnamed.
 ROUNDS = 6
 ROUND_STEPS = 6  # of a fit that is linearised anew anyway
-RIVALS = 2  # that are fitted beside a set that bends
 
 
 def settled(state: State, progress: Progress, known: State | None = None) -> State:
@@ -122,11 +121,6 @@ def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood
 def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
     """Whether two models have the same effects, and hardly read differently."""
     return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
-
-
-def listed(names: Iterable[str]) -> str:
-    """Identifiers as words, one after the other."""
-    return ", ".join(map(in_words, names))
 
 
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:

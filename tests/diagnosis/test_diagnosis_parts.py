@@ -195,10 +195,10 @@ def test_a_gains_interval_holds_the_gain_and_shrinks_to_nothing_for_nothing() ->
     plain = baseline_of(sessions, scale)
     start = fit(likelihood_of(sessions, plain), plain).model
     better = fit(likelihood_of(sessions, plain), start.with_part(effect("gas_compression"))).model
-    won = gain(errors(sessions, start), errors(sessions, better), scale)
+    won = gain(errors(sessions, start), errors(sessions, better), scale, Thresholds())
     assert won.ci95[0] <= won.gain_percent <= won.ci95[1]
     assert won.gain_percent > 30.0
-    nothing = gain(errors(sessions, start), errors(sessions, start), scale)
+    nothing = gain(errors(sessions, start), errors(sessions, start), scale, Thresholds())
     assert nothing.gain_percent == 0.0
     assert nothing.ci95 == (0.0, 0.0)
 

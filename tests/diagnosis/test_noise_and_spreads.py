@@ -51,7 +51,7 @@ def test_where_nothing_is_held_out_no_number_is_said() -> None:
     nothing = errors([], ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar"))
     assert nothing.is_empty
     assert nothing.squares.shape == nothing.counts.shape == (0,)
-    found = gain(nothing, nothing, Scale(800.0, 140.0, MILLIBAR))
+    found = gain(nothing, nothing, Scale(800.0, 140.0, MILLIBAR), STANDARD)
     assert not found.is_loss
     assert found.to_dict() == {
         "rmse_before": None, "rmse_after": None, "unit": "mbar", "gain_percent": None, "ci95": [None, None],

@@ -12,7 +12,7 @@ from test_diagnosis_parts import MODEL
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._residual_structure import where
+from smartshoe.diagnosis._residual_structure import worst_place
 from smartshoe.diagnosis._session import Scale, kernel, prepare, smoothed
 from smartshoe.models.effects import Conditions
 from smartshoe.units import MILLIBAR
@@ -65,4 +65,4 @@ def test_where_a_residual_is_largest_is_told_of_as_many_stretches_as_there_are_s
     one: Any = SimpleNamespace(
         conditions=Conditions(np.arange(count) * 1.0, load, 1.0), usable=np.ones(count, dtype=bool), recording=run
     )
-    assert where([one], [load + 0.1], STANDARD).endswith(f"; the worst stretch is short, {stretch}")
+    assert worst_place([one], [load + 0.1], STANDARD).endswith(f"; the worst stretch is short, {stretch}")
