@@ -61,9 +61,9 @@ UNSEEN = Lags(np.zeros(0), np.zeros(0))
 def align(view: View) -> tuple[View, Lags]:
     """The view with its load on the reading's clock, where the clocks differ; else as it was, with all it has found.
 
-    And by how much the reading follows. One that is late by a quarter of a step, or by half of one, falls as the load
-    rises: where it follows turned over, and else hardly, or far less closely, that is the view. Of loads that rise as
-    they fall either way is as close.
+    And the lags that were seen. A reading that is late by a quarter or half of a period seems to fall as the load
+    rises: it is turned over where it follows the load only so, or far more closely so. Of loads that rise as they fall
+    both ways are as close, and it is left as it is.
     """
     followed = _followed(view)
     is_open = not _follows(followed, view.thresholds)

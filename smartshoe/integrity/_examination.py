@@ -15,10 +15,10 @@ from smartshoe.integrity._dropouts import dropouts, load_dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity, OneClock
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
 from smartshoe.integrity._held import held_samples
-from smartshoe.integrity._held_rate import at_their_rates
-from smartshoe.integrity._interpolated import where_measured
-from smartshoe.integrity._lattice import quantisation
-from smartshoe.integrity._lines import hum
+from smartshoe.integrity._held_rate import without_held
+from smartshoe.integrity._hum import hum
+from smartshoe.integrity._interpolated import without_interpolated
+from smartshoe.integrity._quantisation import quantisation
 from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
@@ -86,39 +86,52 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     """
     if not recordings:
         raise InputError("there is no recording to examine: give at least one file")
-    faults: list[DataFault] = []
-    usable: list[Mask] = []
-    refusals: list[str] = []
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
-    examined = [_examined(one, decided) for one in tamed]
-    ends = _ends_told_by([finding for one in examined for finding in one.findings])
-    if ends.dropouts.size + ends.rails.size and len(recordings) > 1:
-        # What one recording teaches about the unit holds for the others.
-        examined = [_examined(one, decided, ends) for one in tamed]
-    with_load = [one.lags for one in examined if not one.is_against]
-    if len(with_load) < len(examined) and (theirs := one_clock(with_load, decided)) is not None:
-        examined = [
-            _as_others_follow(tame, one, theirs, decided, ends) if one.is_against else one
-            for tame, one in zip(tamed, examined, strict=True)
-        ]
-    kept: list[Recording] = []
-    for number, (tame, one) in enumerate(zip(tamed, examined, strict=True)):
-        recording, findings, mask = tame.recording, one.findings, one.usable
-        kept.append(_with_known_load(recording, findings))
-        faults += [_fault(number, recording, finding) for finding in findings]
-        refused = [f"{recording.label}: {one.says}" for one in findings if one.severity == "fatal"]
-        faulty = _at_fault(findings, mask.size)
-        if not refused and (decided.clear * (1.0 - faulty.mean()) < 1.0 or not mask.any()):
-            refused = [
-                f"{recording.label}: {100 * float(faulty.mean()):.0f} % of the samples are faulty"
-                f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
-            ]
-        usable.append(np.zeros_like(mask) if refused else mask)
-        refusals += refused[:1]
+    examined = _examined_together(tamed, decided)
+    each = list(zip(tamed, examined, strict=True))
+    refused = [_refusal(tame.recording, one, decided) for tame, one in each]
+    usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
     shared = one_clock([one.lags for one, mask in zip(examined, usable, strict=True) if mask.any()], decided)
-    offset_s, rate = tuple(one.offset_s for one in examined), tuple(one.rate for one in examined)
-    return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
+    return Integrity(
+        tuple(_with_known_load(tame.recording, one.findings) for tame, one in each),
+        tuple(
+            _fault(number, tame.recording, finding)
+            for number, (tame, one) in enumerate(each)
+            for finding in one.findings
+        ),
+        tuple(usable),
+        tuple(one.offset_s for one in examined),
+        tuple(one.rate for one in examined),
+        shared,
+        tuple(why for why in refused if why is not None),
+    )
+
+
+def _examined_together(tamed: Sequence[_Tamed], thresholds: Thresholds) -> list[_Examined]:
+    """What was found in each recording, by all that the others tell of the sensor's ends and of the clocks."""
+    examined = [_examined(one, thresholds) for one in tamed]
+    ends = _ends_told_by([finding for one in examined for finding in one.findings])
+    if ends.dropouts.size + ends.rails.size and len(tamed) > 1:
+        examined = [_examined(one, thresholds, ends) for one in tamed]
+    with_load = [one.lags for one in examined if not one.is_against]
+    if len(with_load) == len(examined) or (theirs := one_clock(with_load, thresholds)) is None:
+        return examined
+    return [
+        _as_others_follow(tame, one, theirs, thresholds, ends) if one.is_against else one
+        for tame, one in zip(tamed, examined, strict=True)
+    ]
+
+
+def _refusal(recording: Recording, found: _Examined, thresholds: Thresholds) -> str | None:
+    """Why a recording is of no use, or None: a fatal fault, or hardly any sample that is not at fault."""
+    says = next((one.says for one in found.findings if one.severity == "fatal"), None)
+    masking = [one for one in found.findings if one.masks]
+    faulty = float(np.any([one.at for one in masking], axis=0).mean()) if masking else 0.0
+    if says is None and (thresholds.clear * (1.0 - faulty) < 1.0 or not found.usable.any()):
+        kinds = ", ".join(sorted({one.kind for one in masking}))
+        says = f"{100 * faulty:.0f} % of the samples are faulty ({kinds}): record it again"
+    return None if says is None else f"{recording.label}: {says}"
 
 
 def _ends_told_by(findings: Sequence[Finding]) -> Ends:
@@ -126,16 +139,10 @@ def _ends_told_by(findings: Sequence[Finding]) -> Ends:
     return Ends(np.unique(np.concatenate([np.zeros(0), *(one.values for one in findings)])), np.unique(rails))
 
 
-def _at_fault(findings: Sequence[Finding], size: int) -> Mask:
-    """(n,) samples of a recording of ``size`` that a fault masks."""
-    masks = [finding.at for finding in findings if finding.masks]
-    return np.any(masks, axis=0) if masks else np.zeros(size, dtype=bool)
-
-
 def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
     made = []
-    for read, held in at_their_rates(recordings, thresholds):
-        measured, between = where_measured(read, thresholds)
+    for read, held in without_held(recordings, thresholds):
+        measured, between = without_interpolated(read, thresholds)
         logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
         made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild)))

@@ -33,7 +33,7 @@ def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
 def frozen(view: View) -> Finding | None:
     """Kind ``held_samples``: fatal; one value lasts longer than all else, while the load goes through most of its span.
 
-    What little is left may follow as it likes: the load explains hardly any of the whole, and the unit is not why.
+    Asked where the load explains hardly any of the reading: that is why, and not the unit.
     """
     starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
     if starts.size == 0:

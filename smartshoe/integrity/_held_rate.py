@@ -12,7 +12,7 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
 
-def at_their_rates(recordings: Sequence[Recording], thresholds: Thresholds) -> list[tuple[Recording, list[Finding]]]:
+def without_held(recordings: Sequence[Recording], thresholds: Thresholds) -> list[tuple[Recording, list[Finding]]]:
     """Each recording at the moments at which the slowest of load and reading was read, and what is said of it.
 
     Between them that channel says nothing: taken for a load, its steps would be the reading's delay. What one recording

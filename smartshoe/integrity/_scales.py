@@ -101,7 +101,7 @@ def own_corner(values: Array, near: int) -> Array:
     return out
 
 
-def lattice_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
+def grid_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
     """The step of the grid on which values lie; 0 where there is none that can be found.
 
     ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left

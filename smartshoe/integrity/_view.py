@@ -12,7 +12,7 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._scales import (
     SECOND_DIFFERENCE,
     five_point_median,
-    lattice_step,
+    grid_step,
     local_scale,
     slope_change,
     turns,
@@ -48,7 +48,7 @@ class Signal:
     @cached_property
     def step(self) -> float:
         """The grid's step, 0 where there is none."""
-        return lattice_step(*self.levels, self.thresholds)
+        return grid_step(*self.levels, self.thresholds)
 
     @cached_property
     def least_gap(self) -> Array:

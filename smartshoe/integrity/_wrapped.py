@@ -15,8 +15,8 @@ WORDS = (8, 10, 12, 14, 16, 18, 20, 24, 32)  # bits of counters and converters
 def unwrapped(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
     """``recording`` with load and reading as they were before a counter ran over, and what is said of it.
 
-    Only whole numbers come from a counter. Its word is the shortest that holds them all. Its least value is the one
-    nearest to zero that this leaves open.
+    Only whole numbers come from a counter. Its word is the shortest that holds them all. What is counted on is shifted
+    by whole words, until its least value is nearest to zero.
     """
     findings = []
     for channel in recording.loads_and_sensors:
