@@ -91,7 +91,7 @@ def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
 
 
 def with_arm(model: ExtendedModel, arm: Arm) -> ExtendedModel:
-    """``model`` with another arm, which reads as much of a fast load: what a held one reads is for the arm to say."""
+    """``model`` with another arm and the same gain for fast loads; the static gain follows from the arm's share."""
     fast = model.gain / (1.0 + model.relaxing_share)
     return replace(model, gain=fast * (1.0 + arm.share), relaxing_share=arm.share, relaxation_rate_per_s=arm.rate_per_s)
 

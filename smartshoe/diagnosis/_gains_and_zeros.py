@@ -1,8 +1,8 @@
 """Whether each recording has a gain of its own, as where a unit is taken out and put back between recordings.
 
-Or other ones in its course, or other zeros, as where it slips. What goes with the time or the cycles of a recording
-would be taken for it: two drifts together make of two recordings what either has throughout, and one drift makes half
-of what changes at a moment. So such gains, and zeros, are weighed against what was found, as one more hypothesis.
+Or whether gain or zero change at moments within a recording, as where a unit slips. Effects that go with time or cycles
+can imitate both: two drifts make two recordings differ throughout, one drift follows half of a step. So gains and zeros
+of the recordings' own are one more hypothesis, weighed against the effects that were found.
 """
 
 from __future__ import annotations
@@ -246,11 +246,11 @@ def are_told(state: State, found: _Gained, gained: _Gained) -> bool:
 def foretells(
     model: ExtendedModel, plain: ExtendedModel, state: State, sessions: Sequence[Session], gained: Sequence[Session]
 ) -> bool:
-    """Whether ``model``, found beside what ``gained`` have of their own, is worth more than ``plain`` without that.
+    """Whether ``model``, found beside the gains or zeros of ``gained``, predicts ``sessions`` better than ``plain``.
 
-    What stands for another recording is the gain of all, and no zero that changed. Gains of whole recordings bend what
-    is fitted to few of them, so that there it must but follow ``sessions`` as they are; what changes within each is
-    seen by what each tells of the others.
+    By the gain that all share, and zeros that do not change: what is a recording's own says nothing of another one.
+    What changes within recordings is tested by leaving these out in turn. Gains of whole recordings are not, since they
+    bend what is fitted to fewer of them: there the model must but follow what was fitted.
     """
     if not any(one.gain_changes or one.zero_changes for one in gained):
         return error_of(sessions, model) < error_of(sessions, plain)

@@ -103,12 +103,7 @@ def infer(
     if (gained := with_likelier_gains(state, sessions)) is not None:
         progress("going through it again beside what recordings have of their own")
         beside = infer(start, gained, thresholds, progress)
-        if not (beside.own_gains or beside.zero_changes):
-            about = gained, beside.fit.model
-            beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
-        if foretells(beside.fit.model, plain.model, state, sessions, gained):
-            return replace(beside, baseline=plain)
-        return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)
+        return _beside_own(beside, plain, gained, foretells(beside.fit.model, plain.model, state, sessions, gained))
     progress("weighing alternatives")
     found = _judged(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
@@ -147,6 +142,16 @@ def infer(
     )
 
 
+def _beside_own(beside: Inference, plain: Fit, gained: Sequence[Session], is_foretold: bool) -> Inference:
+    """What was found ``beside`` gains or zeros of the recordings' own, with these; no effect where none foretells."""
+    if not (beside.own_gains or beside.zero_changes):
+        about = gained, beside.fit.model
+        beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
+    if is_foretold:
+        return replace(beside, baseline=plain)
+    return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)
+
+
 def _sought(begun: State, progress: Progress) -> State:
     """What settles from ``begun``, also with other arms of the baseline where it came to one that effects had bent."""
     state = settled(begun, progress)
@@ -163,11 +168,11 @@ def _sought(begun: State, progress: Progress) -> State:
 
 @dataclass(frozen=True, eq=False)
 class _Judged:
-    """What of a state's effects predicts what is left out: the set and its ``fit``, and what was taken out of it.
+    """The effects of a state that survive cross-validation: their set and ``fit``; those ``refused`` do not.
 
-    ``is_stepped_down``: effects were taken out for no other reason than that what is left out is foreseen better. That
-    shows which laws may be likelier in the place of those that are left. As an answer it is none: what was chosen for
-    what is left out says nothing of whether it is there, nor of any other recording.
+    ``is_stepped_down``: the whole extension failed, and effects were dropped one by one until the rest stood. Such a
+    set was selected on what is left out, so that this validates it no longer: it shows where to look for likelier
+    laws, and is no answer.
     """
 
     evidence: Evidence

@@ -17,11 +17,11 @@ from smartshoe.models.extended import ExtendedModel
 def with_laws(given: State, plain: ExtendedModel) -> State:
     """``given`` with a law in the place of a flexible block, where one follows nearly as well.
 
-    No law is exact: one that leaves less than the square of the usual departure, of what the flexible block explains,
-    is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
-    One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
-    is, so that only fits of the whole model compare them fairly. Nothing in its place leaves no more than the ``plain``
-    model does.
+    No law is exact: the nearest is taken that leaves less than ``law_departure``² of what the block explains, or less
+    than ``departure``² where one of its shapes lies at a bound, beyond which the equation means something else. Below
+    ``departure``² the block is banned from then on: what the law misses is no other curve. Both are fitted as whole
+    models, since a linearisation bends a block earlier than a law. What the block explains is counted from no effect in
+    its place, which leaves no more than the ``plain`` model does.
     """
     state, about = given, given.fit.model
     flexible = [one for one in given.chosen if one.effect.is_flexible]

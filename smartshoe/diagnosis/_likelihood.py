@@ -139,10 +139,9 @@ class Fit:
     @cached_property
     def covariance(self) -> Array:
         """(p, p) of theta; most fits are only compared, and never asked for it."""
-        logarithmic = _are_logarithmic(self.model)
-        scale = np.where(logarithmic, self.model.theta, 1.0)
-        precision = _precision(self.model, logarithmic)
-        inner = self.likelihood.normal(self.model)[2] * np.outer(scale, scale) + np.diag(precision)
+        prior = _Prior.about(self.model)
+        scale = np.where(prior.logarithmic, self.model.theta, 1.0)
+        inner = self.likelihood.normal(self.model)[2] * np.outer(scale, scale) + np.diag(prior.precision)
         return np.asarray(_inverse(inner) * np.outer(scale, scale))
 
 

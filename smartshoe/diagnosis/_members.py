@@ -165,12 +165,10 @@ def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int) -> tuple[Alternative, ...]:
-    """What could stand in a member's place: every other effect at its best shape, and nothing.
+    """What could stand in a member's place: every other effect at its best shape, also what was refused; or nothing.
 
-    Also one that was taken out beside it: there each did what the other does.
-
-    Nothing, whether the others' equations depart as their own do, towards any of their families, or in all that their
-    effects add.
+    The margin to nothing is the least of three: the other members' equations depart as in the search, towards all laws
+    of their families, or in all that their effects add.
     """
     less = best.without(member)
     margins = [

@@ -92,8 +92,8 @@ def evidence_about(
 ) -> tuple[Evidence, Posterior]:
     """The evidence about a model, of the sessions and under the noise of the ``other``, and the model's own set in it.
 
-    ``beside``: columns about a model nearby. What is in neither counts as no more than an imperfection, for which they
-    serve.
+    ``beside``: the linearisation about a model nearby, whose columns serve for effects that are in neither model: these
+    count as imperfections only.
     """
     evidence = Evidence(linearised(model, other.given.sessions, other.thresholds, beside), other.noise_sd)
     return evidence, evidence.posterior(_set_of(model, evidence.given))
