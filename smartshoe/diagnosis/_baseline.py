@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import marginal
-from smartshoe.diagnosis._session import Scale, Session, fitted_of
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
 from smartshoe.signals.lags import lagged

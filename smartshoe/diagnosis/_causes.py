@@ -12,7 +12,8 @@ from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import Name, confidence_of
 from smartshoe.diagnosis._parameters import in_unit, parameters_of
 from smartshoe.diagnosis._result import Cause, Rival, Statement
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import catalogue, in_words

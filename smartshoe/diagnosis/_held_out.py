@@ -15,8 +15,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import finite_or_none

@@ -11,7 +11,8 @@ from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._ranges import ranges_of
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis._scale import Scale, full_scale, thinning
+from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect

@@ -31,7 +31,8 @@ from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import beyond
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (

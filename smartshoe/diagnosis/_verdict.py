@@ -12,7 +12,8 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
-from smartshoe.diagnosis._session import Scale, Session, fitted_of
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import listed

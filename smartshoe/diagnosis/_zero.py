@@ -15,7 +15,8 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of
-from smartshoe.diagnosis._session import Scale, Session, begins_unloaded, fitted_of
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, shift_of
 from smartshoe.models.extended import ExtendedModel
@@ -123,7 +124,7 @@ def zeros_of(
     rests = first_rests(sessions, model, thresholds)
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size:
-        return _unseen(sessions, model, left, remembered, sensor, machine, thresholds)
+        return _unseen(sessions, model, left, remembered, thresholds)
     loads, readings, drifted = rests.T
     sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
@@ -169,11 +170,9 @@ def _unseen(
     model: ExtendedModel,
     left: float,
     remembered: float,
-    sensor: Effect,
-    machine: Effect,
     thresholds: Thresholds,
 ) -> tuple[Zero, ...]:
-    """The zero of a unit that is never seen unloaded at first: by its model, and either of the two may be it."""
+    """The zero of a unit that is never seen unloaded at first: by its model, and an offset or a tare may be it."""
     found = offsets(sessions, model)
     mean = float(np.mean(found))
     fitted = fitted_of(sessions)
@@ -187,4 +186,5 @@ def _unseen(
     sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
     if abs(mean) > thresholds.foreign_zero or abs(mean) < largest_of_noise(1, thresholds) * sd:
         return ()
-    return (Zero(sensor, mean, sd, abs(mean), (machine.name,), _is_past(mean, sessions, model, thresholds)),)
+    is_past = _is_past(mean, sessions, model, thresholds)
+    return (Zero(shift_of("reading"), mean, sd, abs(mean), (shift_of("load").name,), is_past),)

@@ -19,6 +19,7 @@ from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, basel
 from smartshoe.diagnosis._force import force_error
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
@@ -33,7 +34,6 @@ from smartshoe.diagnosis._sensitivity import (
     nuisances,
     where,
 )
-from smartshoe.diagnosis._session import Scale
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect, is_told_from_its_family
 from smartshoe.models.effects.exposure import WORDS

@@ -20,7 +20,8 @@ from smartshoe.diagnosis._lack_of_fit import repeating, slow
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._next_experiment import expected_margin
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
+from smartshoe.diagnosis._scale import Scale, full_scale, thinning
+from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -71,7 +72,7 @@ def test_held_out_recordings_are_never_fitted() -> None:
     pair = [recording(seed=1), recording(seed=2)]
     usable = [one.sensor.present for one in pair]
     scale = full_scale(pair, usable, Thresholds())
-    first, second = prepare(pair, usable, [False, True], scale, 3, Thresholds())
+    first, second = prepare(pair, usable, [False, True], scale, [3], Thresholds())
     assert first.fitted.all()
     assert not second.fitted.any()
 

@@ -15,9 +15,10 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._next_experiment import expected_margin
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._search import additions, allowed, search, step
 from smartshoe.diagnosis._sensitivity import Linearised, departures, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import Scale, Session, prepare
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._state import searched, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.models.effects import Conditions, effect
@@ -47,7 +48,7 @@ def _run(model: ExtendedModel, seed: int, noise: float = SD) -> Recording:
 def _sessions(model: ExtendedModel, count: int = 2, noise: float = SD, thinned: int = 12) -> list[Session]:
     runs = [_run(model, seed, noise) for seed in range(count)]
     usable = [one.sensor.present for one in runs]
-    return prepare(runs, usable, [False] * count, SCALE, thinned, STANDARD)
+    return prepare(runs, usable, [False] * count, SCALE, [thinned], STANDARD)
 
 
 @pytest.fixture(scope="module")

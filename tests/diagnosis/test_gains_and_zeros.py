@@ -24,8 +24,9 @@ from smartshoe.diagnosis._gains_and_zeros import (
 )
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import Scale, Session, prepare
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._state import State, state_at
 from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import error_of
@@ -55,7 +56,7 @@ def _run(number: int, gain: float, **metadata: str) -> Recording:
 
 def _sessions(*runs: Recording) -> list[Session]:
     usable = [one.sensor.present for one in runs]
-    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), 4, STANDARD)
+    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), [4], STANDARD)
 
 
 @pytest.fixture(scope="module")

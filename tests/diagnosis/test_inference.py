@@ -15,8 +15,9 @@ from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds, described
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._session import prepare
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -59,7 +60,7 @@ def small() -> Linearised:
     pair = [recording(MODEL.with_part(effect("gas_compression"), np.array([0.05])), seed) for seed in range(2)]
     usable = [one.sensor.present for one in pair]
     scale = full_scale(pair, usable, Thresholds())
-    sessions = prepare(pair, usable, [False, False], scale, 8, Thresholds())
+    sessions = prepare(pair, usable, [False, False], scale, [8], Thresholds())
     return linearised(baseline_of(sessions, scale), sessions, Thresholds())
 
 

@@ -13,7 +13,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._held_out import errors, gain
 from smartshoe.diagnosis._lack_of_fit import _mean_variance
 from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._validation import _spread
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR

@@ -13,7 +13,7 @@ from smartshoe.diagnosis._arms import arms_of, effect_count, with_another_pole, 
 from smartshoe.diagnosis._laws import _is_stretched
 from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._parameters import parameters_of
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._state import state_at
 from smartshoe.models.effects import effect
 from smartshoe.models.elements import Arm

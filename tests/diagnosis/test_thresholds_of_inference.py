@@ -16,8 +16,9 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._scale import Scale, full_scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
-from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._validation import LeftOut, extrapolating
 from smartshoe.diagnosis._verdict import verdict_of
 from smartshoe.diagnosis._zero import zeros_of
@@ -43,7 +44,7 @@ def _recording(model: ExtendedModel = MODEL, seed: int = 0, peak: float = 1.0, o
 def _sessions(runs: list[Recording], held: list[bool]) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in runs]
     scale = full_scale(runs, usable, STANDARD)
-    return prepare(runs, usable, held, scale, 1, STANDARD), scale
+    return prepare(runs, usable, held, scale, [1], STANDARD), scale
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ from smartshoe.diagnosis._limits import (
     zero_changes_said,
 )
 from smartshoe.diagnosis._residual_structure import ResidualStructure
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._validation import cancelling
 from smartshoe.diagnosis._verdict import known_error, verdict_of
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping

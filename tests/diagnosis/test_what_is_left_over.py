@@ -20,7 +20,8 @@ from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, at_full_rate
 from smartshoe.diagnosis._validation import extrapolating
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
