@@ -35,14 +35,7 @@ from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
 from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
-from smartshoe.diagnosis._settling import (
-    Progress,
-    better_from,
-    better_from_one,
-    law_or_block,
-    settled,
-    simpler,
-)
+from smartshoe.diagnosis._settling import Progress, better_from, better_from_one, law_or_block, settled, simpler
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
 from smartshoe.integrity.thresholds import Thresholds
@@ -130,16 +123,7 @@ def infer(
         if best_alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
             found = best_alone[1]
             members, refused = found.members(), tuple(name for name in refused if name not in found.fit.model.names)
-    return Inference(
-        plain,
-        found.fit,
-        members,
-        screening,
-        likeness,
-        refused,
-        undone=found.undone,
-        alone=alone,
-    )
+    return Inference(plain, found.fit, members, screening, likeness, refused, undone=found.undone, alone=alone)
 
 
 def _beside_own(beside: Inference, plain: Fit, gained: Sequence[Session], is_foretold: bool) -> Inference:

@@ -83,12 +83,7 @@ def diagnosed(
     noise_variance = max(best.rmse**2 - structure**2, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
-        fine,
-        extended,
-        integrity.faults,
-        explained or left.after.is_noise,
-        thresholds.material,
-        left.within.memory,
+        fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
     )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)

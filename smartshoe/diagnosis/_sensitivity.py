@@ -312,15 +312,7 @@ def linearised(
     scales[scales < FLOOR] = 1.0  # what is less than any noise is rounding, and is not made as large as the others
     for columns in rows:
         columns /= scales
-    return Linearised(
-        model,
-        fitted,
-        tuple(rows),
-        scales,
-        3,
-        tuple(candidates),
-        thresholds,
-    )
+    return Linearised(model, fitted, tuple(rows), scales, 3, tuple(candidates), thresholds)
 
 
 def _place(one: Candidate) -> tuple[str, tuple[float, ...]]:

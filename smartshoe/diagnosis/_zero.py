@@ -166,11 +166,7 @@ def creeping(zeros: Sequence[Zero], drift: Effect, size: float, thresholds: Thre
 
 
 def _unseen(
-    sessions: Sequence[Session],
-    model: ExtendedModel,
-    left: float,
-    remembered: float,
-    thresholds: Thresholds,
+    sessions: Sequence[Session], model: ExtendedModel, left: float, remembered: float, thresholds: Thresholds
 ) -> tuple[Zero, ...]:
     """The zero of a unit that is never seen unloaded at first: by its model, and an offset or a tare may be it."""
     found = offsets(sessions, model)

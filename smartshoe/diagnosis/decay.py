@@ -107,17 +107,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
         f" {'only a logged load tells apart' if standing == 'absent' else 'a load that stands still cannot tell apart'}"
     )
     return Decay(
-        onset_s,
-        tau_s,
-        ci95_s,
-        from_start_s,
-        100.0 * lost,
-        float(t[-1]),
-        plateau,
-        order,
-        order_ci95,
-        course,
-        says,
+        onset_s, tau_s, ci95_s, from_start_s, 100.0 * lost, float(t[-1]), plateau, order, order_ci95, course, says
     )
 
 
