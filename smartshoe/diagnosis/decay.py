@@ -201,8 +201,7 @@ def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list
 
 
 def _exponential(at: Array, t: Array) -> Array:
-    out: Array = at[0] * np.exp(-t / max(at[1], 1e-9))
-    return out
+    return np.asarray(at[0] * np.exp(-t / max(at[1], 1e-9)))
 
 
 def _to_plateau(at: Array, t: Array) -> Array:
@@ -215,8 +214,7 @@ def _of_order(at: Array, t: Array) -> Array:
     if abs(over) < 1e-6:
         return _exponential(at[:2], t)
     base = np.maximum(1.0 + over * t / max(at[1], 1e-9), 1e-12)
-    out: Array = at[0] * np.exp(-np.log(base) / over)
-    return out
+    return np.asarray(at[0] * np.exp(-np.log(base) / over))
 
 
 def _duration(time_s: float) -> str:

@@ -254,8 +254,7 @@ def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
     count = np.bincount(place, minlength=grid.size)
     total = np.bincount(place, weights=values, minlength=grid.size)
     filled = count > 0
-    out: Array = np.interp(grid, grid[filled], total[filled] / count[filled])
-    return out
+    return np.interp(grid, grid[filled], total[filled] / count[filled])
 
 
 def _window_lags(
@@ -307,8 +306,7 @@ def _correlation(load: Array, reading: Array, most: int) -> Array:
         return np.zeros(2 * most + 1)
     full = correlate(reading, load, mode="full", method="fft") / size
     middle = load.size - 1
-    out: Array = full[middle - most : middle + most + 1]
-    return out
+    return full[middle - most : middle + most + 1]
 
 
 def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tuple[float, float]]:

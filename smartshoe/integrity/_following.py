@@ -88,8 +88,7 @@ def _followed_share(view: View) -> tuple[float, float]:
 
 def _beyond(signal: Array, columns: Array) -> Array:
     """(n,) what ``columns`` (n, k) leave of a ``signal`` (n,)."""
-    out: Array = signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
-    return out
+    return signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
 
 
 def _moves_with(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
@@ -109,5 +108,4 @@ def of_load(load: Array, step_s: float, time_constants_s: Sequence[float] | Arra
     """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
     f = (load - load.min()) / np.ptp(load)
     lags = [lagged(f, step_s, float(tau_s)) for tau_s in time_constants_s]
-    out: Array = np.stack([f, f**2, f**3, *lags], axis=1)
-    return out
+    return np.stack([f, f**2, f**3, *lags], axis=1)

@@ -112,8 +112,7 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     many = np.maximum(beyond / (3.0 * np.maximum(motion, 1e-300)), 1.0)
     noise = np.maximum(reading.noise[starts], reading.noise[stops])
     width = np.hypot(noise, UNIFORM_SD * step)
-    out: Array = repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
-    return out
+    return repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
 
 
 def _at_either_end(y: Array, at: Index) -> Mask:
@@ -148,8 +147,7 @@ def _noise_beside(y: Array, starts: Index, stops: Index, beside: int) -> Array:
         side = np.sqrt((power[b] - power[a]) / np.maximum(b - a, 1)) / SECOND_DIFFERENCE
         side = np.where(moving[b] - moving[a] < beside // 4, np.inf, side)
         least = np.where(b - a < beside // 2, 0.0, np.minimum(least, side))
-    out: Array = np.where(np.isfinite(least), least, 0.0)
-    return out
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def _common(y: Array, starts: Index, stops: Index, beside: int) -> Array:
@@ -162,8 +160,7 @@ def _common(y: Array, starts: Index, stops: Index, beside: int) -> Array:
         inside = (place >= 0) & (place < y.size)
         equal += (inside & (y[np.clip(place, 0, y.size - 1)] == y[starts][:, None])).sum(axis=1)
         there += inside.sum(axis=1)
-    out: Array = equal / np.maximum(there, 1.0)
-    return out
+    return equal / np.maximum(there, 1.0)
 
 
 def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -> Mask:
@@ -175,14 +172,12 @@ def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -
         a, b = (np.clip(one, 0, counts[0].size - 1) for one in (low, high))
         turned += counts[0][b] - counts[0][a]
         stayed += counts[1][b] - counts[1][a]
-    out: Mask = _is_noise(turned, stayed, thresholds) & (turned > thresholds.few)
-    return out
+    return _is_noise(turned, stayed, thresholds) & (turned > thresholds.few)
 
 
 def _is_noise(turned: Index | int, stayed: Index | int, thresholds: Thresholds) -> Mask:
     """Whether second differences change sign so much oftener than not: 2.7 times as often in white noise."""
-    out: Mask = np.asarray(turned > np.sqrt(thresholds.clear) * stayed)
-    return out
+    return np.asarray(turned > np.sqrt(thresholds.clear) * stayed)
 
 
 def _motion(view: View, starts: Index, stops: Index, step: Array) -> Array:
@@ -223,8 +218,7 @@ def _motion(view: View, starts: Index, stops: Index, step: Array) -> Array:
     moved = np.maximum(np.where(repeats > 2 * view.near, steady, plain), 0.0)
     least = np.where(long, np.minimum(least, given.clear * view.gain * moved), least)
     # A slope between two grid values is uncertain by a step.
-    out: Array = np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
-    return out
+    return np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
 
 
 def _caught_up(view: View, starts: Index, stops: Index) -> Mask:

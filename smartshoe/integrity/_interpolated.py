@@ -90,8 +90,7 @@ class _Bends:
 
     @property
     def are_sharp(self) -> Mask:
-        out: Mask = self.beside > 1.0
-        return out
+        return self.beside > 1.0
 
 
 def _bends(t: Array, v: Array, neighbours: Index, written: tuple[float, float]) -> _Bends:
@@ -150,8 +149,7 @@ def _between_knots(t: Array, v: Array, bends: _Bends, thresholds: Thresholds) ->
 def _sums(values: Array | Mask, starts: Index, stops: Index) -> Array:
     """(k,) sums of ``values`` over runs."""
     ends = np.stack([starts, stops], axis=1).ravel()
-    out: Array = np.add.reduceat(np.append(values, 0.0), ends)[::2]
-    return out
+    return np.add.reduceat(np.append(values, 0.0), ends)[::2]
 
 
 def _last_digit(values: Array) -> float:
@@ -208,5 +206,4 @@ def _taken_at(recording: Recording, slow: str, moments: Array) -> Recording:
 
 
 def _slope(t: Array, v: Array, at: Index, to: int) -> Array:
-    out: Array = (v[at + to] - v[at]) / (t[at + to] - t[at])
-    return out
+    return (v[at + to] - v[at]) / (t[at + to] - t[at])

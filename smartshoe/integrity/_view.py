@@ -61,8 +61,7 @@ class Signal:
         gaps = np.diff(levels)
         beside = max(self.thresholds.local, round(self.thresholds.standing * gaps.size))
         least = minimum_filter1d(np.append(gaps, gaps[-1]), beside)
-        out: Array = least[np.searchsorted(levels, self.values)]
-        return out
+        return least[np.searchsorted(levels, self.values)]
 
     @cached_property
     def local_step(self) -> Array:
@@ -81,8 +80,7 @@ class Signal:
         place = np.minimum(np.searchsorted(levels, self.values), levels.size - 1)
         on = levels[place] == self.values
         # A peak may touch a level once: where most readings lie on a grid all do.
-        out: Array = np.where(on | (on.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[place], 0.0)
-        return out
+        return np.where(on | (on.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[place], 0.0)
 
     @cached_property
     def is_noisy(self) -> bool:
@@ -154,8 +152,7 @@ class View:
     @cached_property
     def gap(self) -> Mask:
         """(m - 1,) increments of time in which a sample is missing."""
-        out: Mask = np.diff(self.time_s) > 1.5 * self.step_s
-        return out
+        return np.diff(self.time_s) > 1.5 * self.step_s
 
     @cached_property
     def curve(self) -> tuple[Array, Array]:
@@ -190,15 +187,13 @@ class View:
             if cuts[i + 1] > cuts[i]:
                 part, rank = second[order[cuts[i] : cuts[i + 1]]], 3 * (cuts[i + 1] - cuts[i]) // 4
                 usual[i] = np.partition(part, rank)[rank]
-        out: Array = usual[place] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
-        return out
+        return usual[place] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
 
     @cached_property
     def expected(self) -> Array:
         """(m,) the static curve at each sample's load."""
         at, middle = self.curve
-        out: Array = np.interp(self.load.values, at, middle)
-        return out
+        return np.interp(self.load.values, at, middle)
 
     @cached_property
     def rest(self) -> float:
@@ -241,8 +236,7 @@ class View:
         """(m,) the load's mean over ``near`` samples."""
         from scipy.ndimage import uniform_filter1d
 
-        out: Array = uniform_filter1d(self.load.values, self.near, mode="nearest")
-        return out
+        return uniform_filter1d(self.load.values, self.near, mode="nearest")
 
     @cached_property
     def load_move(self) -> Array:
@@ -252,8 +246,7 @@ class View:
         step = np.abs(np.diff(self.steady_load))
         noise = np.sqrt(2.0) * self.load.largest * self.load.quiet_noise
         sharp = np.maximum(np.abs(np.diff(self.load.values)) - noise - self.load.step, 0.0)
-        out: Array = maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
-        return out
+        return maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
 
     @cached_property
     def reading_move(self) -> Array:
@@ -276,8 +269,7 @@ class View:
         )
         excess = np.where(np.abs(step) > allowed, step, 0.0)
         excess[self.gap] = 0.0
-        out: Array = excess
-        return out
+        return excess
 
     @cached_property
     def jitter_reach(self) -> Array:
@@ -300,14 +292,12 @@ class View:
         jitter_s = float(np.median(self.reading.noise[steep] / slope[steep]))
         size = 2 * int(np.ceil(self.reading.largest * jitter_s / self.step_s)) + 1
         high = maximum_filter1d(self.expected_steadily, size, mode="nearest")
-        out: Array = high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
-        return out
+        return high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
 
     @cached_property
     def expected_steadily(self) -> Array:
         """(m,) the static curve at each sample's load, the load's noise averaged."""
-        out: Array = np.interp(self.steady_load, *self.curve)
-        return out
+        return np.interp(self.steady_load, *self.curve)
 
     def turned(self) -> View:
         """The same with the reading turned over."""
