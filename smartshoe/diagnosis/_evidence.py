@@ -295,10 +295,6 @@ class Evidence:
         """The same where equations depart in all that their effects add."""
         return Evidence(self.given, self.noise_sd, of_all=True)
 
-    def exact(self, members: Members) -> Posterior:
-        """The evidence of a set whose equations are taken for exact."""
-        return self._described(members, *self._solved(members, None))
-
     def _solved(
         self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False
     ) -> tuple[Array, float]:

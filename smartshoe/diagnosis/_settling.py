@@ -103,15 +103,12 @@ def _is_simpler(other: Fit, state: State) -> bool:
     """
     thresholds, likelihood = state.thresholds, state.likelihood()
     odds = state.evidence.odds
-    new, old = ((score_of(one.model, likelihood, odds), effect_count(one.model)) for one in (other, state.fit))
+    new, old = (
+        (with_odds(likelihood.cost(one.model), one.model, odds), effect_count(one.model)) for one in (other, state.fit)
+    )
     if _read_alike(other.model, state.fit.model, likelihood, thresholds):
         return (new[1], new[0]) < (old[1], old[0])
     return new[0] < old[0]
-
-
-def score_of(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
-    """-2 log likelihood of a model, with the ``odds`` against each of its effects; the less, the better."""
-    return with_odds(likelihood.cost(model), model, odds)
 
 
 def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:

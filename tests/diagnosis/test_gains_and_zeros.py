@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from told_evidence import taken_for_exact
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
@@ -107,7 +108,7 @@ def test_evidence_with_and_without_gains_differs_as_the_explicit_densities_do(
     for member in (None, curve):
         members = () if member is None else (member,)
         # Of one equation that is taken for exact: departures are no matter of gains.
-        fast = [one.score_beside(members) - one.posterior(members).score + one.exact(members).score
+        fast = [one.score_beside(members) - one.posterior(members).score + taken_for_exact(one, members).score
                 for one in (plain, beside)]  # fmt: skip
         slow = [_density(given, some, member) for some in (sessions, gained)]
         assert fast[0] - fast[1] == pytest.approx(slow[0] - slow[1], abs=0.1 + 1e-4 * abs(slow[0] - slow[1]))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from deciding import STANDARD, decides
 from numpy.typing import NDArray
+from told_evidence import taken_for_exact
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
@@ -60,7 +61,7 @@ def _curve(given: Linearised) -> int:
 def test_strength_sd_is_how_large_an_effect_may_be(curved: Linearised) -> None:
     def strength(thresholds: Thresholds) -> float:
         evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
-        return float(np.abs(evidence.exact((_curve(curved),)).strengths[0]).max())
+        return float(np.abs(taken_for_exact(evidence, (_curve(curved),)).strengths[0]).max())
 
     small, usual = decides("strength_sd", 1e-5, 0.03, strength)
     assert small < 0.1 * usual
