@@ -98,17 +98,17 @@ def infer(
         beside = infer(start, gained, thresholds, progress)
         return _beside_own(beside, plain, gained, foretells(beside.fit.model, plain.model, state, sessions, gained))
     progress("weighing alternatives")
-    found = _judged(state, plain, sessions)
+    found = _validated(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
     if state is not with_blocks and (found.is_stepped_down or replaced & {*found.refused}):
         # A law that is not the same in each recording is not that law: the block stays.
-        other = _judged(with_blocks, plain, sessions)
+        other = _validated(with_blocks, plain, sessions)
         if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
     found, members = _likeliest(found, plain, sessions, progress)
     if found.is_stepped_down:
         first = _first_step(begun, state)
-        again = None if first is None else _judged(first, plain, sessions)
+        again = None if first is None else _validated(first, plain, sessions)
         if again is not None and not again.is_stepped_down:
             found, members = _likeliest(again, plain, sessions, progress)
         else:
@@ -151,7 +151,7 @@ def _sought(begun: State, progress: Progress) -> State:
 
 
 @dataclass(frozen=True, eq=False)
-class _Judged:
+class _Validated:
     """The effects of a state that survive cross-validation: their set and ``fit``; those ``refused`` do not.
 
     ``is_stepped_down``: the whole extension failed, and effects were dropped one by one until the rest stood. Such a
@@ -166,7 +166,7 @@ class _Judged:
     undone: tuple[str, ...]
     is_stepped_down: bool
 
-    def with_nothing_but(self, plain: Fit) -> _Judged:
+    def with_nothing_but(self, plain: Fit) -> _Validated:
         """What the plain model itself has, two clocks, which were told before any model."""
         candidates, own = self.evidence.given.candidates, plain.model.names
         best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
@@ -178,7 +178,7 @@ class _Judged:
         return members_of(self.evidence, self.best, self.fit)
 
 
-def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
+def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Validated:
     """What of a state's effects predicts what is left out, fitted at last."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
     likelihood, most = state.likelihood(), error_of(sessions, plain.model)
@@ -222,19 +222,19 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = len(extra) < following
-    return _Judged(evidence, best, extended, tuple(refused), left, is_stepped_down)
+    return _Validated(evidence, best, extended, tuple(refused), left, is_stepped_down)
 
 
 def _likeliest(
-    found: _Judged, plain: Fit, sessions: Sequence[Session], progress: Progress
-) -> tuple[_Judged, tuple[Member, ...]]:
+    found: _Validated, plain: Fit, sessions: Sequence[Session], progress: Progress
+) -> tuple[_Validated, tuple[Member, ...]]:
     """The likeliest set that changes of one member or law lead to from ``found``, and its members, weighed."""
     while True:
         found, members = _without_redundant(found, plain)
         told = [one for one in members if one.name not in plain.model.names]  # two clocks were told before any model
         for better in likelier(found.fit, found.evidence, told):
             progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
-            other = _judged(better, plain, sessions)
+            other = _validated(better, plain, sessions)
             if _is_likelier(other, found):
                 found = other
                 break
@@ -242,13 +242,13 @@ def _likeliest(
             return found, members
 
 
-def _is_likelier(other: _Judged, found: _Judged) -> bool:
+def _is_likelier(other: _Validated, found: _Validated) -> bool:
     """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``."""
     new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
 
 
-def _without_redundant(found: _Judged, plain: Fit) -> tuple[_Judged, tuple[Member, ...]]:
+def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple[Member, ...]]:
     """``found`` without effects that another of their family makes immaterial, and its members, weighed.
 
     A lag and a delay beside it, of which neither is needed where the other is, are each too small for a name.
@@ -284,7 +284,7 @@ def _first_step(begun: State, state: State) -> State | None:
     return State(evidence, best, fit(begun.likelihood(), path[0]), state.banned)
 
 
-def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Judged] | None:
+def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:
     """Of the few likeliest effects the one by which alone what is left out is foreseen best, where any stands.
 
     Where several stand in for one another none is sure; which of them does most by itself does not hang on the others.
@@ -301,10 +301,10 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
         if best.score >= nothing.score:
             continue
         one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
-        judged = _judged(State(begun.evidence, best, one), plain, sessions)
-        removed = before**2 - error_of(sessions, judged.fit.model) ** 2
-        if not judged.is_stepped_down and removed > thresholds.tolerable**2:
-            standing.append((begun.given.candidates[k].effect, judged))
+        validated = _validated(State(begun.evidence, best, one), plain, sessions)
+        removed = before**2 - error_of(sessions, validated.fit.model) ** 2
+        if not validated.is_stepped_down and removed > thresholds.tolerable**2:
+            standing.append((begun.given.candidates[k].effect, validated))
     return min(standing, key=lambda one: float(left_out.errors(one[1].fit.model).sum()), default=None)
 
 

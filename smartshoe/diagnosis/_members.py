@@ -14,7 +14,6 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, row
 from smartshoe.diagnosis._search import BREADTH, RIVALS, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
 from smartshoe.diagnosis._session import Session
-from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
@@ -85,6 +84,8 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
         is_there = sizes[k] > thresholds.imperfection
         is_ended = bool(extended.model.part(one.name).kind_ends_at)
+        shapes = _shapes_beside(best, member, evidence)
+        laws = _other_laws(one, less[k], extended, shapes, is_ended=is_ended) if is_there else ()
         made.append(
             Member(
                 one.effect,
@@ -92,11 +93,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 best.departed[k],
                 alternatives(evidence, best, member),
                 less[k],
-                _other_laws(
-                    one, less[k], extended, _shapes_beside(best, member, evidence), thresholds, is_ended=is_ended
-                )
-                if is_there
-                else (),
+                laws,
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
@@ -138,13 +135,12 @@ def _other_laws(
     less: Fit,
     extended: Fit,
     shapes: Mapping[str, Sequence[Mapping[str, float]]],
-    thresholds: Thresholds,
     *,
     is_ended: bool,
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
     likelihood, of_curves = less.likelihood, _is_any_curve(one.effect, is_ended)
-    channels = {e.name for e in available(likelihood.sessions, thresholds)}
+    channels = {e.name for e in available(likelihood.sessions, likelihood.thresholds)}
     found = []
     for law in catalogue().values():
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind

@@ -76,10 +76,10 @@ def diagnosed(
     causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
-    judged = _judged(found, given, left, off, named, causes, won)
-    verdict, rest = judged.verdict, unexplained_of(causes, left.before, left.after)
+    outcome = _outcome(found, given, left, off, named, causes, won)
+    verdict, rest = outcome.verdict, unexplained_of(causes, left.before, left.after)
     of_held_out = left_where_judged(fine, off, thresholds)
-    structure = of_held_out if judged.unproven else min(max(left.after.rms, judged.elsewhere), of_held_out)
+    structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
     noise_variance = max(best.rmse**2 - structure**2, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
@@ -94,7 +94,7 @@ def diagnosed(
         names_in(causes, len(minor)),
         baseline,
         best,
-        not_explained_of(rest, judged.elsewhere, judged.unproven, thresholds),
+        not_explained_of(rest, outcome.elsewhere, outcome.unproven, thresholds),
         thresholds,
         worse=won.is_loss,
         withheld=_is_silent(found, given) or bool(named.limits or found.zero_changes or found.own_gains),
@@ -117,7 +117,7 @@ def diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
         ),
-        limits=_limits(found, given, named, extended, force, judged, left),
+        limits=_limits(found, given, named, extended, force, outcome, left),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
@@ -178,7 +178,7 @@ class _Outcome:
     unproven: float
 
 
-def _judged(
+def _outcome(
     found: Inference,
     given: Prepared,
     left: _LeftOver,
@@ -187,7 +187,7 @@ def _judged(
     causes: Sequence[Cause],
     won: Gain,
 ) -> _Outcome:
-    """By what is ``left``, and ``off`` at the full rate, (n,) each, and what was ``won`` on what is held out."""
+    """The verdict, by what is ``left``, and ``off`` at the full rate, (n,) each, and ``won`` on what is held out."""
     fine, known, thresholds = given.fine, left.known, given.thresholds
     elsewhere = off_elsewhere(fine, off, max(left.within.size, beyond_noise(fine, off, thresholds)), thresholds)
     unproven = 0.0
@@ -199,7 +199,7 @@ def _judged(
         return _Outcome("unexplained", won, elsewhere, unproven)
     # An unsure companion of one that is sure does not say that laws are none.
     follows = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
-    # What is followed is there, though of no kind with a name, or where too little is left to test for more.
+    # What the model follows is there, even if it is of no kind with a name, or too little is left to be tested.
     least = max(thresholds.tolerable, thresholds.material, known)
     gained = 0.0 if causes else won.certain_fall(given.scale)
     besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
@@ -215,11 +215,11 @@ def _limits(
     named: Chosen,
     extended: ExtendedModel,
     force: Compensation,
-    judged: _Outcome,
+    outcome: _Outcome,
     left: _LeftOver,
 ) -> tuple[str, ...]:
     """All that limits the diagnosis, in sentences."""
-    won, elsewhere, thresholds = judged.won, judged.elsewhere, given.thresholds
+    won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_loss or elsewhere else None
     of_model = end_of_range_of(extended), wall_ratio_of(extended, given.sessions, thresholds)
     return (

@@ -12,7 +12,6 @@ from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, additions
 from smartshoe.diagnosis._sensitivity import Linearised
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
-from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import listed
 from smartshoe.models.extended import ExtendedModel
 
@@ -42,7 +41,7 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
             for one in _promising(state)
         ]
         found, given = _best_of(fits, state)
-        if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
+        if known is not None and any(_are_alike(found.model, one, likelihood) for one in known.path):
             return known
         path.append(found.model)
         state = state_at(found, state.banned, given)
@@ -101,23 +100,24 @@ def _is_simpler(other: Fit, state: State) -> bool:
     The number decides where the two hardly read differently: what is immaterial counts for nothing, however sure it is.
     An arm that imitates a lag of a millisecond needs another one in its own place.
     """
-    thresholds, likelihood = state.thresholds, state.likelihood()
-    odds = state.evidence.odds
+    likelihood, odds = state.likelihood(), state.evidence.odds
     new, old = (
         (with_odds(likelihood.cost(one.model), one.model, odds), effect_count(one.model)) for one in (other, state.fit)
     )
-    if _read_alike(other.model, state.fit.model, likelihood, thresholds):
+    if _read_alike(other.model, state.fit.model, likelihood):
         return (new[1], new[0]) < (old[1], old[0])
     return new[0] < old[0]
 
 
-def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood) -> bool:
+    """Whether two models' readings differ by less than counts for anything."""
+    thresholds = likelihood.thresholds
     return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.imperfection
 
 
-def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood) -> bool:
     """Whether two models have the same effects, and hardly read differently."""
-    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
+    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood)
 
 
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:

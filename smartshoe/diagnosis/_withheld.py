@@ -65,7 +65,10 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
 
 
 def _shown(found: Inference, given: Prepared, left: float) -> Chosen:
-    """The names of what was found that this data shows; what is of no kind with a name gives none to others, either."""
+    """The names of what was found, but for effects of no kind with a name, and those that this data cannot show.
+
+    Such an effect is taken out and all others are named anew, so that none is named for being beside it.
+    """
     thresholds = given.thresholds
     members = [one for one in found.members if one.name not in found.undone]
     limits: tuple[str, ...] = ()

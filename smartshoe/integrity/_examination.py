@@ -188,9 +188,9 @@ def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *
 
 
 def _as_others_follow(tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, ends: Ends) -> _Examined:
-    """A recording whose reading goes against the load, turned over where by the clock of the others it goes with it.
+    """A recording whose reading goes against the load, turned over if it then lags as the others do by their clocks.
 
-    Steps that are read late by half of one fall as the load rises; by the lag that all others have they rise.
+    A reading that is late by half a period of its load seems to fall as the load rises.
     """
     over = _examined(tame, thresholds, ends, turned=True)
     is_theirs = over.lags.are_of(theirs, thresholds) and over.lags.off_from_s(theirs) < mine.lags.off_from_s(theirs)

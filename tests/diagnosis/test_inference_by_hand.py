@@ -15,10 +15,10 @@ from smartshoe.diagnosis import _inference
 from smartshoe.diagnosis._inference import (
     _best_alone,
     _is_likelier,
-    _Judged,
-    _judged,
     _redundant,
     _screening,
+    _Validated,
+    _validated,
     _without_redundant,
     independent,
     infer,
@@ -130,7 +130,7 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "with_laws", lambda one, model: told.lawful or one)
     monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one: lawful if told.is_law else one)
     monkeypatch.setattr(_inference, "with_likelier_gains", lambda state, sessions: None)
-    monkeypatch.setattr(_inference, "_judged", judged)
+    monkeypatch.setattr(_inference, "_validated", judged)
     monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
     monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
@@ -229,7 +229,7 @@ def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(mon
     plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
     first: Any = SimpleNamespace(thresholds=STANDARD, of="whole")
     whole: Any = SimpleNamespace(model="whole", likelihood="likelihood")
-    begun = _Judged(first, "best", whole, ("refused",), ("undone",), True)  # type: ignore[arg-type]
+    begun = _Validated(first, "best", whole, ("refused",), ("undone",), True)  # type: ignore[arg-type]
 
     def without() -> tuple[Any, Any]:
         return _without_redundant(begun, plain)  # type: ignore[arg-type]
@@ -353,7 +353,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     monkeypatch.setattr(_inference, "State", lambda evidence, best, fit: fit)
     monkeypatch.setattr(
         _inference,
-        "_judged",
+        "_validated",
         lambda one, plain, sessions: SimpleNamespace(fit=one, is_stepped_down=one.model in stepped),
     )
 
@@ -404,7 +404,7 @@ def test_where_a_law_is_not_the_same_in_each_recording_its_block_stays(
 
 
 class _Judge:
-    """Fits and errors as they are told, for `_judged`."""
+    """Fits and errors as they are told, for `_validated`."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.errors: dict[tuple[str, ...], float] = {(): 1.0}
@@ -468,7 +468,7 @@ class _Judge:
             given=self.evidence.given, evidence=self.evidence, best=best, thresholds=STANDARD,
             fit=SimpleNamespace(model=self.start), likelihood=lambda: "likelihood",
         )  # fmt: skip
-        return _judged(state, self.plain, [])
+        return _validated(state, self.plain, [])
 
     def judged(self) -> tuple[Any, Any, Any]:
         found = self.inference()

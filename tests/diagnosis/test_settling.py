@@ -43,7 +43,7 @@ class _State:
         return tuple(SimpleNamespace(name=name) for name in self.found)
 
     def likelihood(self) -> Any:
-        return SimpleNamespace(sessions=())
+        return SimpleNamespace(sessions=(), thresholds=self.thresholds)
 
     @property
     def itself(self) -> tuple[str, str, float]:
@@ -171,7 +171,7 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
     monkeypatch: pytest.MonkeyPatch, new: Any, old: Any, near: bool, far: bool
 ) -> None:
     """Odds of ten against an effect; three times what is material apart."""
-    likelihood = SimpleNamespace(cost=lambda model: model.told, sessions=())
+    likelihood = SimpleNamespace(cost=lambda model: model.told, sessions=(), thresholds=STANDARD)
     state: Any = SimpleNamespace(
         thresholds=STANDARD, likelihood=lambda: likelihood, evidence=SimpleNamespace(odds=10.0), fit=old
     )

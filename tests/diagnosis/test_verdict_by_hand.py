@@ -16,7 +16,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.diagnosis._inference import _judged
+from smartshoe.diagnosis._inference import _validated
 from smartshoe.diagnosis._limits import (
     crept_of,
     elsewhere_of,
@@ -373,7 +373,7 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
         given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
         fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda: "likelihood",
     )  # fmt: skip
-    found: Any = _judged(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
+    found: Any = _validated(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
     assert found.fit.model.names == names
     gone = () if len(names) > 1 else ("b",)
     assert (found.members(), found.refused) == (tuple(range(len(names))), gone)
