@@ -162,9 +162,7 @@ def _followed(view: View) -> _Followed | None:
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
     for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
-        smooth_s = echoes * given.echo_s
-        places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s, given)
-        found = _Followed(grid, load, reading, smooth_s, places, smallest, best, weights) if places.size else None
+        found = _by_windows(grid, load, reading, width_s, echoes * given.echo_s, given)
         if _follows(found, given):
             break
     return found
@@ -257,10 +255,10 @@ def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
     return np.interp(grid, grid[filled], total[filled] / count[filled])
 
 
-def _window_lags(
+def _by_windows(
     grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float, thresholds: Thresholds
-) -> tuple[Array, Array, Array, Array]:
-    """Middle, smallest and best lag in s and correlation, (w,) each, of windows in which load and reading both move."""
+) -> _Followed | None:
+    """How late the reading follows in each window in which it and the load both move; None where there is none."""
     from scipy.ndimage import gaussian_filter1d
 
     smooth = max(smooth_s / width_s, 1.0)
@@ -293,7 +291,10 @@ def _window_lags(
         smallest.append(peak if lags_bins[chosen] != 0 else 0.0)
         peaks.append(peak)
         weights.append(float(correlation[best]))
-    return np.array(places), np.array(smallest), np.array(peaks), np.array(weights)
+    if not places:
+        return None
+    each = (np.array(one) for one in (places, smallest, peaks, weights))
+    return _Followed(grid, load, reading, smooth_s, *each)
 
 
 def _correlation(load: Array, reading: Array, most: int) -> Array:
