@@ -88,6 +88,11 @@ class Channel:
             return self.values
         return np.where(self.missing, np.nan, self.values)
 
+    def with_values(self, values: ArrayLike) -> Channel:
+        """The same channel with ``values`` (n,) instead, NaN where a sample is missing."""
+        made = Channel.from_values(self.name, values, self.unit)
+        return replace(self, values=made.values, missing=made.missing)
+
     def taken(self, index: slice | Index | Mask) -> Channel:
         """The channel at the samples ``index``."""
         values = self.values[index]
@@ -280,6 +285,11 @@ class Recording(Summarised):
     def of_role(self, role: Role) -> tuple[Channel, ...]:
         """The channels of one role, in the recording's order."""
         return tuple(channel for channel in self.channels.values() if channel.role == role)
+
+    @property
+    def loads_and_sensors(self) -> tuple[Channel, ...]:
+        """Every reference load, then every reading."""
+        return (*self.of_role("load"), *self.of_role("sensor"))
 
     @property
     def load(self) -> Channel:

@@ -91,7 +91,7 @@ def say_what_strikes(recordings: Sequence[Recording]) -> None:
     from smartshoe.files.logs.columns import is_negative
 
     for recording in recordings:
-        for channel in (*recording.of_role("load"), *recording.sensors):
+        for channel in recording.loads_and_sensors:
             share = 0.0 if channel.missing is None else float(channel.missing.mean())
             if share > MISSING_SHARE:
                 warn(f"{recording.label} lacks {100 * share:.0f} % of the samples of {channel.name}: they are left out")

@@ -5,13 +5,4 @@ from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Trace
 from smartshoe.integrity.thresholds import Thresholds, described
 
-__all__ = [
-    "Cause",
-    "Diagnosis",
-    "Thresholds",
-    "diagnose",
-    "GoodnessOfFit",
-    "Trace",
-    "Gain",
-    "described",
-]
+__all__ = ["Cause", "Diagnosis", "Thresholds", "diagnose", "GoodnessOfFit", "Trace", "Gain", "described"]

@@ -14,7 +14,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.integrity import Integrity, OneClock
 from smartshoe.models.effects import Effect, between_clocks
-from smartshoe.recording import Channel, Recording
+from smartshoe.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,5 @@ def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: flo
     before, after = (np.searchsorted(time_s, source_s, side) for side in ("right", "left"))
     before, after = np.maximum(before - 1, 0), np.minimum(after, time_s.size - 1)
     there, usable = (inside & mask[before] & mask[after] for mask in (sensor.present, usable))
-    moved = Channel.from_values(
-        sensor.name, np.where(there, np.interp(source_s, time_s, sensor.values), np.nan), sensor.unit
-    )
-    return recording.with_channel(replace(sensor, values=moved.values, missing=moved.missing)), usable
+    moved = sensor.with_values(np.where(there, np.interp(source_s, time_s, sensor.values), np.nan))
+    return recording.with_channel(moved), usable

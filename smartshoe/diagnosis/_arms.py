@@ -8,56 +8,48 @@ from dataclasses import replace
 from smartshoe.diagnosis._baseline import RATE, SHARE, USUAL, with_usual_arm
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, fit
 from smartshoe.diagnosis._members import begun_with
-from smartshoe.diagnosis._search import BREADTH, additions
+from smartshoe.diagnosis._search import BREADTH, SWAPS, additions
 from smartshoe.diagnosis._sensitivity import available
-from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, searched, state_at, with_members
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.effect import CoreEffect
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel
 
-PROMISING = 3  # of fits from far away, that go on to their end: a resolution
 
-
-def with_another_pole(state: State, sessions: Sequence[Session]) -> State:
+def with_another_pole(state: State) -> State:
     """The best of fits from several relaxation rates without the effects that add arms to the baseline's.
 
     An effect that bent the baseline's rate at first leaves the true rate to be found as a second arm.
     """
-    likelihood = state.likelihood(sessions)
+    likelihood = state.likelihood()
     bare = _without_core_effects(state.fit.model)
     share = USUAL.relaxing_share
     starts = [replace(bare, relaxation_rate_per_s=1.0 / tau, relaxing_share=share) for tau in state.thresholds.memory_s]
-    best = min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost)
-    return state_at(best, sessions, state.thresholds)
+    return state_at(min((fit(likelihood, one, FEW_STEPS) for one in starts), key=lambda one: one.cost))
 
 
-def with_a_latency(state: State, sessions: Sequence[Session]) -> State:
+def with_a_latency(state: State) -> State:
     """The best of fits of the effects that delay a reading, each beside an arm as units have.
 
     An arm that has come to its bounds is a lag's imitation, about which no lag is found.
     """
-    likelihood = state.likelihood(sessions)
+    likelihood = state.likelihood()
     bare = with_usual_arm(state.fit.model)
     effects = available(likelihood.sessions, state.thresholds)
     late = [one for one in effects if one.is_latency and one.name not in bare.names]
-    return state_at(
-        min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost),
-        sessions,
-        state.thresholds,
-    )
+    return state_at(min((fit(likelihood, begun_with(one, bare, likelihood)) for one in late), key=lambda one: one.cost))
 
 
-def with_a_usual_arm(state: State, sessions: Sequence[Session]) -> State:
+def with_a_usual_arm(state: State) -> State:
     """The best of fits of a few likely effects, each beside an arm as units have, where that of ``state`` follows one.
 
     About such an arm the effect that it follows is not found, but a second arm, which is the unit's own.
     """
     starts = [with_arm(state.fit.model, arm) for arm in _usual_arms(state.thresholds)]
-    found = _fits_from(starts, state, sessions, BREADTH)  # far from any fit, one linearisation does not decide
+    found = _fits_from(starts, state, BREADTH)  # far from any fit, one linearisation does not decide
     few = dict.fromkeys((*_likeliest(_usual(found, state), state), *_likeliest(found, state)))
-    return _at_best_of(_usual(_at_their_end(few), state), state, sessions)
+    return state_at(_likeliest(_usual(_at_their_end(few), state), state)[0])
 
 
 def is_beyond_memory(model: ExtendedModel, thresholds: Thresholds) -> bool:
@@ -72,7 +64,7 @@ def is_stretched(model: ExtendedModel) -> bool:
     return not (SHARE.lower < share < SHARE.upper and RATE.lower < rate < RATE.upper)
 
 
-def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
+def with_an_arm_that_creeps(state: State) -> State:
     """The best of fits from a baseline that creeps under load, where that of ``state`` falls.
 
     Which of two exponentials is the baseline's is a convention: of a wall it is the one that creeps under load, and
@@ -82,12 +74,12 @@ def with_an_arm_that_creeps(state: State, sessions: Sequence[Session]) -> State:
     model, bare = state.fit.model, _without_core_effects(state.fit.model)
     arms = [*_usual_arms(state.thresholds), *(arm for _, arm in arms_of(model))]
     starts = creeping = [with_arm(bare, arm) for arm in arms]
-    for effect in available(sessions, state.thresholds):
+    for effect in available(state.given.sessions, state.thresholds):
         values = effect.falling_at(model.pole_per_s, model.wall_ratio)
         if values is not None and effect.name not in bare.names:
             starts = [*starts, *(one.with_part(effect, values) for one in creeping)]
-    found = _fits_from(starts, state, sessions)
-    return _at_best_of(_at_their_end(_likeliest(found, state)), state, sessions)
+    found = _fits_from(starts, state)
+    return state_at(_likeliest(_at_their_end(_likeliest(found, state)), state)[0])
 
 
 def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
@@ -99,7 +91,7 @@ def arms_of(model: ExtendedModel) -> list[tuple[str, Arm]]:
 
 
 def with_arm(model: ExtendedModel, arm: Arm) -> ExtendedModel:
-    """``model`` with another arm, which reads as much of a fast load: what a held one reads is for the arm to say."""
+    """``model`` with another arm and the same gain for fast loads; the static gain follows from the arm's share."""
     fast = model.gain / (1.0 + model.relaxing_share)
     return replace(model, gain=fast * (1.0 + arm.share), relaxing_share=arm.share, relaxation_rate_per_s=arm.rate_per_s)
 
@@ -118,13 +110,11 @@ def _usual_arms(thresholds: Thresholds) -> list[Arm]:
     return [Arm(USUAL.relaxing_share, 1.0 / tau) for tau in thresholds.memory_s]
 
 
-def _fits_from(
-    starts: Sequence[ExtendedModel], state: State, sessions: Sequence[Session], breadth: int = 0
-) -> list[Fit]:
+def _fits_from(starts: Sequence[ExtendedModel], state: State, breadth: int = 0) -> list[Fit]:
     """Fits of what a linearisation about each start asks for, and of the ``breadth`` likeliest effects alone."""
-    likelihood, found = state.likelihood(sessions), []
+    likelihood, found = state.likelihood(), []
     for start in starts:
-        evidence, best = searched(start, sessions, state.thresholds)
+        evidence, best = searched(start, state.given.sessions, state.thresholds)
         alone = [evidence.posterior((k,)) for k in additions(evidence, (), breadth)] if breadth else []
         few = dict.fromkeys((best, *alone))  # what is asked for is often one of these
         found += [fit(likelihood, with_members(evidence.given, one, start, likelihood), FEW_STEPS) for one in few]
@@ -138,16 +128,12 @@ def _usual(found: Sequence[Fit], state: State) -> Sequence[Fit]:
 
 def _likeliest(found: Sequence[Fit], state: State) -> list[Fit]:
     """The few that promise most, the likeliest first, the odds against effects counted."""
-    return sorted(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))[:PROMISING]
+    return sorted(found, key=lambda one: with_odds(one.cost, one.model, state.evidence.odds))[:SWAPS]
 
 
 def _at_their_end(few: Iterable[Fit]) -> list[Fit]:
     """Fits that began far from any end, gone on with: half way the rest is taken for other effects."""
     return [fit(one.likelihood, one.model) for one in few]
-
-
-def _at_best_of(found: Sequence[Fit], state: State, sessions: Sequence[Session]) -> State:
-    return state_at(_likeliest(found, state)[0], sessions, state.thresholds)
 
 
 def _without_core_effects(model: ExtendedModel) -> ExtendedModel:

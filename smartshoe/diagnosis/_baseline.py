@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import marginal
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.extended import BASELINE, ExtendedModel
 from smartshoe.signals.lags import lagged
@@ -26,7 +27,7 @@ def baseline_of(sessions: Sequence[Session], scale: Scale) -> ExtendedModel:
     Either sign of what relaxes is allowed: a baseline that may not follow the data leaves structure that no
     effect made.
     """
-    fitted = [session for session in sessions if session.fitted.any()]
+    fitted = fitted_of(sessions)
     best: tuple[float, float, float, float] | None = None
     for pole in POLES_PER_S:
         gram = np.zeros((3, 3))

@@ -12,10 +12,11 @@ from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import Name, confidence_of
 from smartshoe.diagnosis._parameters import in_unit, parameters_of
 from smartshoe.diagnosis._result import OF_A_DOUBTED_CAUSE, OF_A_KIND, Cause, Rival, Statement
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
-from smartshoe.models.effects import catalogue
+from smartshoe.models.effects import catalogue, in_words
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.signals.noise import NORMAL_95
 
@@ -75,7 +76,7 @@ def _against(rivals: Sequence[Rival]) -> list[Statement]:
     measure = "-2 log likelihood, by its fit" if nearest.by == "fit" else "-2 log evidence"
     way = "less likely" if nearest.margin > 0.0 else "likelier"
     how = f"{way} by {abs(nearest.margin):,.0f} of {measure}" if abs(nearest.margin) >= 0.5 else "as likely"
-    says = f"{nearest.effect.replace('_', ' ')}, the nearest other, is {how}"
+    says = f"{in_words(nearest.effect)}, the nearest other, is {how}"
     return [Statement("margin to the nearest rival", nearest.margin, 0.0, says)]
 
 

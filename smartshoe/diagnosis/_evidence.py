@@ -17,11 +17,11 @@ With C0 the covariance of y for no effect, and U the columns x_e and Phi_e of S,
 R = U' C0^-1 U and q = U' C0^-1 y. Both are taken once for all columns, so that a set costs a factorisation of its own
 few.
 
-Once a set is chosen, each of its effects is weighed against nothing in its place, also with wider equations: they may
-depart towards any other of their family, its columns among Phi_e; or Phi_e is made of the whole effect, not of what the
-baseline leaves of it: a gain that settles more at high loads leaves a curve, of which the rest has nothing. A companion
-may be no more than either. The search goes without: there the other equations are tried themselves, and what they took
-up would hide an effect of another family.
+Once a set is chosen, each of its effects is weighed against nothing in its place, also under a wider model error, since
+a small companion may be no more than another effect's error of shape: Phi_e with the columns of all other equations of
+the family (``of_any_law``), or made of the whole effect instead of what the baseline cannot follow of it (``of_all``),
+as of a gain that settles more at high loads, which leaves a curve. The search uses neither: there the other equations
+compete themselves, and a wide model error would hide effects of other families.
 """
 
 from __future__ import annotations
@@ -65,6 +65,10 @@ class Posterior:
     sizes: tuple[float, ...]
     departed: tuple[float, ...]
     together: float = 0.0
+
+    def without(self, member: int) -> Members:
+        """The set but for one of its members."""
+        return tuple(m for m in self.members if m != member)
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,10 +294,6 @@ class Evidence:
     def of_whole_effects(self) -> Evidence:
         """The same where equations depart in all that their effects add."""
         return Evidence(self.given, self.noise_sd, of_all=True)
-
-    def exact(self, members: Members) -> Posterior:
-        """The evidence of a set whose equations are taken for exact."""
-        return self._described(members, *self._solved(members, None))
 
     def _solved(
         self, members: Members, strengths: Sequence[Array] | None, *, of_any_law: bool = False

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import ExtendedCompensator
 from smartshoe.diagnosis._held_out import own_of
-from smartshoe.diagnosis._session import Session
-from smartshoe.diagnosis._settling import listed
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import listed
 from smartshoe.models.extended import ExtendedModel
 
 
@@ -55,7 +55,7 @@ def compensation(
     without. Where the plain model's is nearer all the same, it is the one.
     """
     before, whole = force_error(fine, plain), force_error(fine, extended)
-    fitted, alike = [one for one in fine if one.fitted.any()], 1.0 + thresholds.same
+    fitted, alike = fitted_of(fine), 1.0 + thresholds.same
     model, least = extended, whole.fitted_n
     made_of_it = extended.noise / extended.gain * extended.full_scale_load_n
     while model.parts and least > alike * made_of_it:

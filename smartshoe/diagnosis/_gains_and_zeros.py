@@ -1,8 +1,8 @@
 """Whether each recording has a gain of its own, as where a unit is taken out and put back between recordings.
 
-Or other ones in its course, or other zeros, as where it slips. What goes with the time or the cycles of a recording
-would be taken for it: two drifts together make of two recordings what either has throughout, and one drift makes half
-of what changes at a moment. So such gains, and zeros, are weighed against what was found, as one more hypothesis.
+Or whether gain or zero change at moments within a recording, as where a unit slips. Effects that go with time or cycles
+can imitate both: two drifts make two recordings differ throughout, one drift follows half of a step. So gains and zeros
+of the recordings' own are one more hypothesis, weighed against the effects that were found.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Likelihood, fit
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._residual_structure import beyond_noise
 from smartshoe.diagnosis._search import needed, search
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._state import State, with_members
 from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, error_of, fitted_rms
@@ -68,7 +68,7 @@ class _Gained:
 
     @classmethod
     def of(cls, state: State, sessions: Sequence[Session], noise_sd: float) -> _Gained:
-        evidence = Evidence(replace(state.given, sessions=_fitted(sessions)), noise_sd)
+        evidence = Evidence(replace(state.given, sessions=fitted_of(sessions)), noise_sd)
         return cls(sessions, evidence, needed(evidence, state.start))
 
     @property
@@ -105,7 +105,7 @@ def with_likelier_gains(state: State, sessions: Sequence[Session]) -> Sequence[S
         return None
     rivals: list[_Gained] = []
     by_gain = None
-    if len(_fitted(sessions)) > 1:
+    if len(fitted_of(sessions)) > 1:
         found = _Gained(sessions, state.evidence, state.start)
         own_gain_sd = state.thresholds.strength_sd
         gained = _Gained.of(state, [replace(one, own_gain_sd=own_gain_sd) for one in sessions], found.evidence.noise_sd)
@@ -143,7 +143,7 @@ def _moments_of(session: Session) -> Index:
 def _between_moments_sd(state: State, sessions: Sequence[Session]) -> float:
     """Standard deviation of the noise, as `correlated_sd` has it, whatever the zero is between two moments."""
     left, kept, free = [], [], 0  # degrees of freedom
-    for one in _fitted(sessions):
+    for one in fitted_of(sessions):
         residual = residual_of(one, state.fit.model)
         part = np.searchsorted(_moments_of(one), np.arange(residual.size), side="right")
         sums, counts = (np.bincount(part[one.fitted], of, MOMENTS + 1) for of in (residual[one.fitted], None))
@@ -159,7 +159,7 @@ def may_differ(state: State, sessions: Sequence[Session]) -> bool:
 
     More is left than small imperfections of a good unit add up to, or something was found that goes with cycles.
     """
-    fitted = _fitted(sessions)
+    fitted = fitted_of(sessions)
     if any("continues" in one.recording.metadata for one in fitted):
         return False
     goes_with_cycles = any(part.effect.needs_cycles for part in state.fit.model.parts)
@@ -171,7 +171,7 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
 
     Of many recordings each is short, and gains of their own are all that is asked.
     """
-    fitted = _fitted(gained.sessions)
+    fitted = fitted_of(gained.sessions)
     if len(fitted) > MOST_FOLDS:
         return gained
     model, zero_sd = state.given.model, state.thresholds.strength_sd if of_zero else 0.0
@@ -184,12 +184,12 @@ def with_changes(state: State, gained: _Gained, *, of_zero: bool = False) -> _Ga
     none = [replace(one, starts=one.starts[:0]) for one in steps]
     for _ in range(MOST_CHANGES * len(fitted)):
         falls = gained.evidence.falls_beside(gained.kept, steps)
-        each = zip(_fitted(gained.sessions), moments, strict=True)
+        each = zip(fitted_of(gained.sessions), moments, strict=True)
         falls[~np.concatenate([_may_change(*one) for one in each])] = -math.inf
         if falls.max() < gained.odds_of_a_change:
             break
         k, j = divmod(int(np.argmax(falls)), MOMENTS)
-        one = _fitted(gained.sessions)[k]
+        one = fitted_of(gained.sessions)[k]
         # Between the moments beside it, so that what changes once is not told as two changes around it.
         around = np.arange(*(one.reading.size * beside // (MOMENTS + 1) for beside in (j, j + 2)))[1:]
         around = around[_may_change(one, around)]
@@ -246,11 +246,11 @@ def are_told(state: State, found: _Gained, gained: _Gained) -> bool:
 def foretells(
     model: ExtendedModel, plain: ExtendedModel, state: State, sessions: Sequence[Session], gained: Sequence[Session]
 ) -> bool:
-    """Whether ``model``, found beside what ``gained`` have of their own, is worth more than ``plain`` without that.
+    """Whether ``model``, found beside the gains or zeros of ``gained``, predicts ``sessions`` better than ``plain``.
 
-    What stands for another recording is the gain of all, and no zero that changed. Gains of whole recordings bend what
-    is fitted to few of them, so that there it must but follow ``sessions`` as they are; what changes within each is
-    seen by what each tells of the others.
+    By the gain that all share, and zeros that do not change: what is a recording's own says nothing of another one.
+    What changes within recordings is tested by leaving these out in turn. Gains of whole recordings are not, since they
+    bend what is fitted to fewer of them: there the model must but follow what was fitted.
     """
     if not any(one.gain_changes or one.zero_changes for one in gained):
         return error_of(sessions, model) < error_of(sessions, plain)
@@ -278,7 +278,7 @@ def zero_changes_of(sessions: Sequence[Session], model: ExtendedModel) -> tuple[
 
 def _own_of_each(sessions: Sequence[Session], model: ExtendedModel) -> Iterator[tuple[Session, Array, Array]]:
     """Each fitted recording with its own gains (k,) and the changes of its zero (l,)."""
-    for one in _fitted(sessions):
+    for one in fitted_of(sessions):
         own, _ = own_of(one, model, one.reading - model.simulate(one.conditions))
         first, last = 2 + len(one.gain_parts), 2 + len(one.gain_parts) + len(one.zero_changes)
         gains, steps = own[2:first], own[first:last]
@@ -299,7 +299,3 @@ def changes_of(gains: Sequence[OwnGain]) -> tuple[OwnGain, ...]:
 def _left_by(model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds) -> float:
     """Rms of what a model leaves of what is fitted, beyond white noise."""
     return beyond_noise(sessions, [residual_of(one, model) for one in sessions], thresholds)
-
-
-def _fitted(sessions: Sequence[Session]) -> tuple[Session, ...]:
-    return tuple(one for one in sessions if one.fitted.any())

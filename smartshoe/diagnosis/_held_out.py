@@ -15,8 +15,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import finite_or_none
@@ -132,13 +133,12 @@ class Gain:
         }
 
 
-def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | None = None) -> Gain:
+def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds) -> Gain:
     """What ``after`` gains over ``before``: the interval by Student's t and the jackknife over load cycles.
 
     The jackknife is of the logarithm of the errors' ratio (Efron and Tibshirani 1993), since of few cycles resampling
     knows too little: of two that are alike by chance it finds a loss beyond chance in one case of four.
     """
-    decided = thresholds or Thresholds()
     unit, span = scale.unit.symbol, abs(scale.reading)
     if before.is_empty:
         return Gain(math.nan, math.nan, unit, math.nan, (math.nan, math.nan))
@@ -151,8 +151,8 @@ def gain(before: Errors, after: Errors, scale: Scale, thresholds: Thresholds | N
         reach = -float(stdtrit(n - 1, 0.025)) * sd
         low, high = total - reach, total + reach
     ci95 = float(_percent(high)), float(_percent(low))
-    grows = after.rmse - before.rmse > decided.material
-    is_certain = n >= decided.few and ci95[0] * ci95[1] > 0.0
+    grows = after.rmse - before.rmse > thresholds.material
+    is_certain = n >= thresholds.few and ci95[0] * ci95[1] > 0.0
     is_loss = bool(grows and ci95[1] < 0.0 and is_certain)
     return Gain(before.rmse * span, after.rmse * span, unit, float(_percent(total)), ci95, is_loss, is_certain)
 

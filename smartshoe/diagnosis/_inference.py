@@ -34,19 +34,12 @@ from smartshoe.diagnosis._members import Member, begun_with, members_of
 from smartshoe.diagnosis._naming import probability_of_kind
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._search import BREADTH, additions
-from smartshoe.diagnosis._session import Session, load_cycles
-from smartshoe.diagnosis._settling import (
-    Progress,
-    better_from,
-    better_from_one,
-    law_or_block,
-    listed,
-    settled,
-    simpler,
-)
+from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
+from smartshoe.diagnosis._settling import Progress, better_from, better_from_one, law_or_block, settled, simpler
 from smartshoe.diagnosis._state import State, evidence_about, searched, with_members
 from smartshoe.diagnosis._validation import LeftOut, cancelling, error_of, extrapolating, folds_of
 from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import listed
 from smartshoe.models.effects.effect import CoreEffect, Effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -93,34 +86,29 @@ def infer(
         return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), can_validate)
     begun = State(evidence, best, plain)
     if is_stretched(plain.model):
-        begun = simpler(with_a_latency(begun, sessions), begun, sessions)
-    state = _sought(begun, sessions, progress)
+        begun = simpler(with_a_latency(begun), begun)
+    state = _sought(begun, progress)
     if flexible := [one.name for one in state.chosen if one.effect.is_flexible]:
         progress(f"trying laws in the place of {listed(flexible)}")
-    with_blocks, lawful = state, with_laws(state, plain.model, sessions)
+    with_blocks, lawful = state, with_laws(state, plain.model)
     if lawful is not state:
-        state = law_or_block(settled(lawful, sessions, progress), state, sessions)
+        state = law_or_block(settled(lawful, progress), state)
     if (gained := with_likelier_gains(state, sessions)) is not None:
         progress("going through it again beside what recordings have of their own")
         beside = infer(start, gained, thresholds, progress)
-        if not (beside.own_gains or beside.zero_changes):
-            about = gained, beside.fit.model
-            beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
-        if foretells(beside.fit.model, plain.model, state, sessions, gained):
-            return replace(beside, baseline=plain)
-        return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)
+        return _beside_own(beside, plain, gained, foretells(beside.fit.model, plain.model, state, sessions, gained))
     progress("weighing alternatives")
-    found = _judged(state, plain, sessions)
+    found = _validated(state, plain, sessions)
     replaced = {*lawful.fit.model.names} - {*with_blocks.fit.model.names}
     if state is not with_blocks and (found.is_stepped_down or replaced & {*found.refused}):
         # A law that is not the same in each recording is not that law: the block stays.
-        other = _judged(with_blocks, plain, sessions)
+        other = _validated(with_blocks, plain, sessions)
         if not other.is_stepped_down and error_of(sessions, other.fit.model) < error_of(sessions, found.fit.model):
             state, found = with_blocks, other
     found, members = _likeliest(found, plain, sessions, progress)
     if found.is_stepped_down:
-        first = _first_step(begun, state, sessions)
-        again = None if first is None else _judged(first, plain, sessions)
+        first = _first_step(begun, state)
+        again = None if first is None else _validated(first, plain, sessions)
         if again is not None and not again.is_stepped_down:
             found, members = _likeliest(again, plain, sessions, progress)
         else:
@@ -135,39 +123,40 @@ def infer(
         if best_alone is not None and len(found.fit.model.parts) == len(plain.model.parts):
             found = best_alone[1]
             members, refused = found.members(), tuple(name for name in refused if name not in found.fit.model.names)
-    return Inference(
-        plain,
-        found.fit,
-        members,
-        screening,
-        likeness,
-        refused,
-        undone=found.undone,
-        alone=alone,
-    )
+    return Inference(plain, found.fit, members, screening, likeness, refused, undone=found.undone, alone=alone)
 
 
-def _sought(begun: State, sessions: Sequence[Session], progress: Progress) -> State:
+def _beside_own(beside: Inference, plain: Fit, gained: Sequence[Session], is_foretold: bool) -> Inference:
+    """What was found ``beside`` gains or zeros of the recordings' own, with these; no effect where none foretells."""
+    if not (beside.own_gains or beside.zero_changes):
+        about = gained, beside.fit.model
+        beside = replace(beside, own_gains=gains_of(*about), zero_changes=zero_changes_of(*about))
+    if is_foretold:
+        return replace(beside, baseline=plain)
+    return replace(beside, baseline=plain, fit=weighed(beside.fit.likelihood, plain.model), members=(), alone=None)
+
+
+def _sought(begun: State, progress: Progress) -> State:
     """What settles from ``begun``, also with other arms of the baseline where it came to one that effects had bent."""
-    state = settled(begun, sessions, progress)
+    state = settled(begun, progress)
     if is_beyond_memory(state.fit.model, begun.thresholds):
         progress("beginning anew from arms as units have")
-        state = better_from(with_a_usual_arm(begun, sessions), state, sessions, progress)
+        state = better_from(with_a_usual_arm(begun), state, progress)
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
-        state = better_from(with_another_pole(state, sessions), state, sessions, progress)
+        state = better_from(with_another_pole(state), state, progress)
     if state.fit.model.relaxing_share < 0.0:
-        state = better_from(with_an_arm_that_creeps(state, sessions), state, sessions, progress)
-    return better_from_one(begun, state, sessions, progress)
+        state = better_from(with_an_arm_that_creeps(state), state, progress)
+    return better_from_one(begun, state, progress)
 
 
 @dataclass(frozen=True, eq=False)
-class _Judged:
-    """What of a state's effects predicts what is left out: the set and its ``fit``, and what was taken out of it.
+class _Validated:
+    """The effects of a state that survive cross-validation: their set and ``fit``; those ``refused`` do not.
 
-    ``is_stepped_down``: effects were taken out for no other reason than that what is left out is foreseen better. That
-    shows which laws may be likelier in the place of those that are left. As an answer it is none: what was chosen for
-    what is left out says nothing of whether it is there, nor of any other recording.
+    ``is_stepped_down``: the whole extension failed, and effects were dropped one by one until the rest stood. Such a
+    set was selected on what is left out, so that this validates it no longer: it shows where to look for likelier
+    laws, and is no answer.
     """
 
     evidence: Evidence
@@ -177,7 +166,7 @@ class _Judged:
     undone: tuple[str, ...]
     is_stepped_down: bool
 
-    def with_nothing_but(self, plain: Fit) -> _Judged:
+    def with_nothing_but(self, plain: Fit) -> _Validated:
         """What the plain model itself has, two clocks, which were told before any model."""
         candidates, own = self.evidence.given.candidates, plain.model.names
         best = self.evidence.posterior(tuple(m for m in self.best.members if candidates[m].name in own))
@@ -189,10 +178,10 @@ class _Judged:
         return members_of(self.evidence, self.best, self.fit)
 
 
-def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
+def _validated(state: State, plain: Fit, sessions: Sequence[Session]) -> _Validated:
     """What of a state's effects predicts what is left out, fitted at last."""
     given, evidence, best, extended = state.given, state.evidence, state.best, state.fit
-    likelihood, most = state.likelihood(sessions), error_of(sessions, plain.model)
+    likelihood, most = state.likelihood(), error_of(sessions, plain.model)
     left_out = LeftOut(sessions, evidence.noise_sd, extended.model, state.thresholds)
     whole = fit(likelihood, with_members(given, best, extended.model, likelihood))
     extended = left_out.following(whole)
@@ -228,38 +217,38 @@ def _judged(state: State, plain: Fit, sessions: Sequence[Session]) -> _Judged:
     extended = extended if extra else weighed(likelihood, plain.model)  # the plain fit knows another noise
     kept = extended.model.names
     if refused and kept:
-        evidence, best = evidence_about(extended.model, sessions, evidence)
+        evidence, best = evidence_about(extended.model, evidence)
     else:
         best = evidence.posterior(tuple(m for m in best.members if given.candidates[m].name in kept))
     left = tuple(name for name in undone if name in kept)
     is_stepped_down = len(extra) < following
-    return _Judged(evidence, best, extended, tuple(refused), left, is_stepped_down)
+    return _Validated(evidence, best, extended, tuple(refused), left, is_stepped_down)
 
 
 def _likeliest(
-    found: _Judged, plain: Fit, sessions: Sequence[Session], progress: Progress
-) -> tuple[_Judged, tuple[Member, ...]]:
+    found: _Validated, plain: Fit, sessions: Sequence[Session], progress: Progress
+) -> tuple[_Validated, tuple[Member, ...]]:
     """The likeliest set that changes of one member or law lead to from ``found``, and its members, weighed."""
     while True:
-        found, members = _without_redundant(found, plain, sessions)
+        found, members = _without_redundant(found, plain)
         told = [one for one in members if one.name not in plain.model.names]  # two clocks were told before any model
-        for better in likelier(found.fit, found.evidence, told, sessions):
+        for better in likelier(found.fit, found.evidence, told):
             progress(f"trying {listed(better.fit.model.names) or 'the baseline'}")
-            other = _judged(better, plain, sessions)
-            if _is_likelier(other, found, sessions):
+            other = _validated(better, plain, sessions)
+            if _is_likelier(other, found):
                 found = other
                 break
         else:  # no change is likelier, or leads to a set that is
             return found, members
 
 
-def _is_likelier(other: _Judged, found: _Judged, sessions: Sequence[Session]) -> bool:
+def _is_likelier(other: _Validated, found: _Validated) -> bool:
     """Whether there is more evidence for ``other``, each about its own fit, under the noise of ``found``."""
-    new, old = (evidence_about(one.fit.model, sessions, found.evidence)[1].score for one in (other, found))
+    new, old = (evidence_about(one.fit.model, found.evidence)[1].score for one in (other, found))
     return new < old
 
 
-def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) -> tuple[_Judged, tuple[Member, ...]]:
+def _without_redundant(found: _Validated, plain: Fit) -> tuple[_Validated, tuple[Member, ...]]:
     """``found`` without effects that another of their family makes immaterial, and its members, weighed.
 
     A lag and a delay beside it, of which neither is needed where the other is, are each too small for a name.
@@ -267,7 +256,7 @@ def _without_redundant(found: _Judged, plain: Fit, sessions: Sequence[Session]) 
     members = found.members()
     while (less := _redundant(members, plain, found.evidence.thresholds)) is not None:
         refitted = fit(found.fit.likelihood, less.without.model)
-        evidence, best = evidence_about(refitted.model, sessions, found.evidence)
+        evidence, best = evidence_about(refitted.model, found.evidence)
         found = replace(found, fit=refitted, evidence=evidence, best=best)
         members = found.members()
     return found, members
@@ -286,17 +275,16 @@ def _redundant(members: Sequence[Member], plain: Fit, thresholds: Thresholds) ->
     return min(twice, key=lambda one: one.size, default=None)
 
 
-def _first_step(begun: State, state: State, sessions: Sequence[Session]) -> State | None:
+def _first_step(begun: State, state: State) -> State | None:
     """The first set of the last search, before other effects bent it: it may stand where what it led to does not."""
     path = [model for model in state.path if len(model.parts) > len(begun.fit.model.parts)]
     if not path or {*path[0].names} == {*state.fit.model.names}:
         return None
-    likelihood = begun.likelihood(sessions)
-    evidence, best = evidence_about(path[0], sessions, begun.evidence)
-    return State(evidence, best, fit(likelihood, path[0]), state.banned)
+    evidence, best = evidence_about(path[0], begun.evidence)
+    return State(evidence, best, fit(begun.likelihood(), path[0]), state.banned)
 
 
-def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Judged] | None:
+def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[Effect, _Validated] | None:
     """Of the few likeliest effects the one by which alone what is left out is foreseen best, where any stands.
 
     Where several stand in for one another none is sure; which of them does most by itself does not hang on the others.
@@ -306,17 +294,17 @@ def _best_alone(begun: State, plain: Fit, sessions: Sequence[Session]) -> tuple[
     if before <= thresholds.tolerable:
         return None
     left_out = LeftOut(sessions, begun.evidence.noise_sd, plain.model, thresholds)
-    likelihood, standing = begun.likelihood(sessions), []
+    likelihood, standing = begun.likelihood(), []
     nothing = begun.evidence.posterior(begun.start)
     for k in additions(begun.evidence, begun.start, BREADTH):
         best = begun.evidence.posterior((*begun.start, k))
         if best.score >= nothing.score:
             continue
         one = fit(likelihood, with_members(begun.given, best, begun.fit.model, likelihood))
-        judged = _judged(State(begun.evidence, best, one), plain, sessions)
-        removed = before**2 - error_of(sessions, judged.fit.model) ** 2
-        if not judged.is_stepped_down and removed > thresholds.tolerable**2:
-            standing.append((begun.given.candidates[k].effect, judged))
+        validated = _validated(State(begun.evidence, best, one), plain, sessions)
+        removed = before**2 - error_of(sessions, validated.fit.model) ** 2
+        if not validated.is_stepped_down and removed > thresholds.tolerable**2:
+            standing.append((begun.given.candidates[k].effect, validated))
     return min(standing, key=lambda one: float(left_out.errors(one[1].fit.model).sum()), default=None)
 
 
@@ -328,7 +316,7 @@ def least_squares(start: ExtendedModel, sessions: Sequence[Session], thresholds:
 
 def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
-    fitted = [session for session in sessions if session.fitted.any()]
+    fitted = fitted_of(sessions)
     return len(fitted) if len(fitted) > 1 else load_cycles(fitted, thresholds)
 
 

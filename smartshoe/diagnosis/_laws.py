@@ -9,32 +9,31 @@ from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, wei
 from smartshoe.diagnosis._members import Alternative, Member, fit_with
 from smartshoe.diagnosis._search import SWAPS
 from smartshoe.diagnosis._sensitivity import Candidate, available
-from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.models.effects import Effect, blocks, catalogue
 from smartshoe.models.extended import ExtendedModel
 
 
-def with_laws(given: State, plain: ExtendedModel, sessions: Sequence[Session]) -> State:
+def with_laws(given: State, plain: ExtendedModel) -> State:
     """``given`` with a law in the place of a flexible block, where one follows nearly as well.
 
-    No law is exact: one that leaves less than the square of the usual departure, of what the flexible block explains,
-    is the law; of the mean departure, where a shape lies at a bound, beyond which the equation means something else.
-    One that leaves less than the mean departure's stays: what it misses is no other curve. A block is bent before a law
-    is, so that only fits of the whole model compare them fairly. Nothing in its place leaves no more than the ``plain``
-    model does.
+    No law is exact: the nearest is taken that leaves less than ``law_departure``² of what the block explains, or less
+    than ``departure``² where one of its shapes lies at a bound, beyond which the equation means something else. Below
+    ``departure``² the block is banned from then on: what the law misses is no other curve. Both are fitted as whole
+    models, since a linearisation bends a block earlier than a law. What the block explains is counted from no effect in
+    its place, which leaves no more than the ``plain`` model does.
     """
     state, about = given, given.fit.model
     flexible = [one for one in given.chosen if one.effect.is_flexible]
     if not {one.name for one in flexible} <= {*about.names}:  # the last search asked for one that is not fitted yet
-        likelihood = given.likelihood(sessions)
+        likelihood = given.likelihood()
         about = fit(likelihood, with_members(given.given, given.best, about, likelihood), FEW_STEPS).model
     for block in flexible:
-        found = _law_of(block, state, about, plain, state.likelihood(sessions))
+        found = _law_of(block, state, about, plain, state.likelihood())
         if found is not None:
             missed, law = found
             banned = _replaced_with(block.effect) if missed < state.thresholds.departure**2 else ()
-            state, about = state_at(law, sessions, state.thresholds, (*state.banned, *banned)), law.model
+            state, about = state_at(law, (*state.banned, *banned)), law.model
     return state
 
 
@@ -44,7 +43,7 @@ def _replaced_with(block: Effect) -> tuple[str, ...]:
     return tuple(curves) if block.is_memoryless else (block.name,)
 
 
-def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions: Sequence[Session]) -> Iterator[State]:
+def likelier(found: Fit, evidence: Evidence, members: Sequence[Member]) -> Iterator[State]:
     """What one change makes of a fit, the likeliest first: a member left out, another law or effect in its place.
 
     The linearised search weighs all changes about one fit; here each is fitted as a whole model and linearised anew.
@@ -67,12 +66,12 @@ def likelier(found: Fit, evidence: Evidence, members: Sequence[Member], sessions
             tried.append(fit_with(law, one.without.model, found.likelihood, (other.shape or {},)))
     if not tried:
         return
-    about, own = evidence_about(found.model, sessions, evidence)
+    about, own = evidence_about(found.model, evidence)
     changed = []
     for fitted in tried:
-        if evidence_about(fitted.model, sessions, evidence, about.given)[1].score >= own.score:
+        if evidence_about(fitted.model, evidence, about.given)[1].score >= own.score:
             continue  # roughly, and most are far from it
-        anew, best = evidence_about(fitted.model, sessions, evidence)
+        anew, best = evidence_about(fitted.model, evidence)
         if own.score - best.score >= evidence.odds:
             changed.append(State(anew, best, fitted))
     yield from sorted(changed, key=lambda state: state.best.score)[:SWAPS]

@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dposv
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._sensitivity import nuisance_precision, nuisances, ridged, where
-from smartshoe.diagnosis._session import Session
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel, Trace
 
@@ -34,13 +34,13 @@ def rows_of(model: ExtendedModel, session: Session, trace: Trace | None = None) 
 
 
 class Likelihood:
-    """What a model's parameters are judged by: ``sessions``, the noise, and nuisances that belong to a session."""
+    """What a model's parameters are judged by: ``sessions`` of which anything is fitted, the noise, their nuisances."""
 
     def __init__(
         self, sessions: Sequence[Session], noise_sd: float, like: ExtendedModel, thresholds: Thresholds
     ) -> None:
-        self.sessions = tuple(session for session in sessions if session.fitted.any())
-        self.noise_sd = noise_sd
+        self.sessions = fitted_of(sessions)
+        self.noise_sd, self.thresholds = noise_sd, thresholds
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._rows: list[Array] = []  # `rows_of` where they were last asked for, with room for one column more
         self._scales = np.zeros(0)
@@ -139,10 +139,9 @@ class Fit:
     @cached_property
     def covariance(self) -> Array:
         """(p, p) of theta; most fits are only compared, and never asked for it."""
-        logarithmic = _are_logarithmic(self.model)
-        scale = np.where(logarithmic, self.model.theta, 1.0)
-        precision = _precision(self.model, logarithmic)
-        inner = self.likelihood.normal(self.model)[2] * np.outer(scale, scale) + np.diag(precision)
+        prior = _Prior.about(self.model)
+        scale = np.where(prior.logarithmic, self.model.theta, 1.0)
+        inner = self.likelihood.normal(self.model)[2] * np.outer(scale, scale) + np.diag(prior.precision)
         return np.asarray(_inverse(inner) * np.outer(scale, scale))
 
 

@@ -15,14 +15,14 @@ from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._held_out import Gain
 from smartshoe.diagnosis._inference import Inference
 from smartshoe.diagnosis._naming import Name
-from smartshoe.diagnosis._session import Scale, Session
-from smartshoe.diagnosis._settling import listed
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import apart
 from smartshoe.diagnosis._zero import Zero
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
-from smartshoe.models.effects import Effect
+from smartshoe.models.effects import Effect, in_words, listed
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
@@ -38,7 +38,7 @@ def parted_clocks(
     """
     if not {one.name for one, _ in told} & {*model.names}:
         return None
-    middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in sessions if one.fitted.any()]))
+    middle_s = 0.5 * float(np.mean([one.conditions.time_s[-1] for one in fitted_of(sessions)]))
     lag_s = sum(one.late_s(values, middle_s) for one, values in told)
     fitted_s = sum(part.effect.late_s(part.values, middle_s) for part in model.parts)
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
@@ -49,31 +49,37 @@ def parted_clocks(
     )
 
 
+def _unnamed(name: Name, but: str) -> str:
+    """What is said of a name that is no cause."""
+    return f"{in_words(name.effect.name)} fits, but {but}, so that it is not named"
+
+
 def other_kind_of(name: Name, model: ExtendedModel, thresholds: Thresholds) -> str | None:
     """What is said of an effect that follows best where it is of another kind, or is the wall's own arm.
 
     A block of what no law does is one where it differs from a law by more than laws do.
     """
-    told = name.effect.name.replace("_", " ")
     part = model.part(name.member.name)
     if part.effect.why_unnamed and name.by is None and part.effect.departs_by(part.values) > thresholds.law_departure:
         return f"the reading {part.effect.why_unnamed}, which no effect of the catalogue does, so that it is not named"
     if name.effect is part.effect and part.kind_ends_at:
         parameter, value = part.kind_ends_at[0]
-        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+        at = f"{in_words(parameter.name)} at {value:g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
         return (
-            f"{told} fits best with its {parameter.name.replace('_', ' ')} at {value:g}{unit}, where it turns into an"
-            " effect of another kind, so that it is not named"
+            f"{in_words(name.effect.name)} fits best with its {at}, where it turns into an effect of another kind, so"
+            " that it is not named"
         )
     if model.relaxing_share < 0.0 and part.name in dict(arms_of(model)):
-        return (
-            f"{told} fits, but only beside a baseline that falls in holds, as air that cools or leaves does: it may be"
-            " the wall's own relaxation, so that it is not named"
+        return _unnamed(
+            name,
+            "only beside a baseline that falls in holds, as air that cools or leaves does: it may be the wall's own"
+            " relaxation",
         )
     if is_stretched(model) and (part.name in dict(arms_of(model)) or part.effect.delay_s(part.values) < 0.0):
-        return (
-            f"{told} fits, but only with the wall's relaxation at the end of its range, where no wall's is: one"
-            " may imitate the other, or undo it, so that it is not named"
+        return _unnamed(
+            name,
+            "only with the wall's relaxation at the end of its range, where no wall's is: one may imitate the other, or"
+            " undo it",
         )
     return None
 
@@ -86,27 +92,21 @@ def not_shown_of(name: Name, excitation: Excitation) -> str | None:
     if excitation.shows(name.effect):
         return None
     ways = "; or ".join(SAYS[word] for word in sorted(name.effect.exposed_by - LATER_CYCLES - CHANNELS))
-    ways = ways or "more load cycles"
-    return (
-        f"{name.effect.name.replace('_', ' ')} fits, but recordings of one load cycle cannot show it, so that it is"
-        f" not named; it needs {ways}"
-    )
+    said = _unnamed(name, "recordings of one load cycle cannot show it")
+    return f"{said}; it needs {ways or 'more load cycles'}"
 
 
 def moved_of(name: Name) -> str:
     """What is said of a latency that is left where readings were moved to the load's clock before."""
-    return (
-        f"{name.effect.name.replace('_', ' ')} fits, but readings were moved to the load's clock before, each by its"
-        " own lag, of which it may be a rest, so that it is not named"
+    return _unnamed(
+        name, "readings were moved to the load's clock before, each by its own lag, of which it may be a rest"
     )
 
 
 def few_cycles_of(name: Name, cycles: int) -> str:
     """What is said of an effect beside as many surer ones as there are load cycles to tell them by."""
-    return (
-        f"{name.effect.name.replace('_', ' ')} fits, but so few load cycles ({cycles}) show no more than as many"
-        " causes, so that it is not named (repeat the cycles)"
-    )
+    said = _unnamed(name, f"so few load cycles ({cycles}) show no more than as many causes")
+    return f"{said} (repeat the cycles)"
 
 
 def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> str | None:
@@ -121,10 +121,10 @@ def departure_of(name: Name, names: Sequence[Name], thresholds: Thresholds) -> s
     surest = max(alike, key=lambda one: one.kind_probability, default=name)
     if surest is name or name.member.size > thresholds.law_departure * surest.member.size:
         return None
-    said, other = (one.effect.name.replace("_", " ") for one in (name, surest))
-    return (
-        f"{said} fits, but it may be no more than the error of the equation of {other} (both are"
-        f" {name.effect.mechanism or 'curves of the load'}), so that it is not named"
+    return _unnamed(
+        name,
+        f"it may be no more than the error of the equation of {in_words(surest.effect.name)} (both are"
+        f" {name.effect.mechanism or 'curves of the load'})",
     )
 
 
@@ -185,10 +185,12 @@ def past_of(zero: Zero, scale: Scale) -> str:
     )
 
 
-def crept_of(drift: Name, tare: Zero) -> str:
-    """What is said of a drift of the zero that a tare may make by creeping."""
+def crept_of(drift: Name, tare: Zero | None) -> str | None:
+    """What is said of a drift of the zero that a tare may make by creeping, where there is one."""
+    if tare is None:
+        return None
     return (
-        f"{drift.effect.name.replace('_', ' ')} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
+        f"{in_words(drift.effect.name)} moves the reading by {100 * drift.member.size:.2g} % of full scale,"
         f" which a tare of {100 * tare.size:.2g} % may do by creeping, so that it is not named (zero the load cell, and"
         " log a rest)"
     )

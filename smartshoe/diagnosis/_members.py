@@ -11,15 +11,13 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
-from smartshoe.diagnosis._search import BREADTH, additions, allowed
+from smartshoe.diagnosis._search import BREADTH, RIVALS, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
 from smartshoe.diagnosis._session import Session
-from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, catalogue
 from smartshoe.models.extended import ExtendedModel
 
 SIZES = (0.5, 5.0, 20.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
-FEW_SHAPES = 2  # of a law, the likeliest by a linearisation, from which its fit begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +84,8 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
         is_there = sizes[k] > thresholds.imperfection
         is_ended = bool(extended.model.part(one.name).kind_ends_at)
+        shapes = _shapes_beside(best, member, evidence)
+        laws = _other_laws(one, less[k], extended, shapes, is_ended=is_ended) if is_there else ()
         made.append(
             Member(
                 one.effect,
@@ -93,11 +93,7 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
                 best.departed[k],
                 alternatives(evidence, best, member),
                 less[k],
-                _other_laws(
-                    one, less[k], extended, _shapes_beside(best, member, evidence), thresholds, is_ended=is_ended
-                )
-                if is_there
-                else (),
+                laws,
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
@@ -126,7 +122,7 @@ def _without(name: str, model: ExtendedModel) -> ExtendedModel:
 
 def _shapes_beside(best: Posterior, member: int, evidence: Evidence) -> dict[str, list[Mapping[str, float]]]:
     """The shapes of each effect in a member's place, the likeliest first."""
-    less = tuple(m for m in best.members if m != member)
+    less = best.without(member)
     shapes: dict[str, list[Mapping[str, float]]] = {}
     for _, k, _ in sorted(evidence.extensions(less), key=lambda extension: extension[0]):
         one = evidence.given.candidates[k]
@@ -139,19 +135,18 @@ def _other_laws(
     less: Fit,
     extended: Fit,
     shapes: Mapping[str, Sequence[Mapping[str, float]]],
-    thresholds: Thresholds,
     *,
     is_ended: bool,
 ) -> tuple[Alternative, ...]:
     """The other laws of a member's family, each fitted in its place, nearest first; of any curve all curves."""
     likelihood, of_curves = less.likelihood, _is_any_curve(one.effect, is_ended)
-    channels = {e.name for e in available(likelihood.sessions, thresholds)}
+    channels = {e.name for e in available(likelihood.sessions, likelihood.thresholds)}
     found = []
     for law in catalogue().values():
         is_other = law.is_memoryless if of_curves else law.kind == one.effect.kind
         if not is_other or law.name in (one.name, *less.model.names) or law.name not in channels:
             continue
-        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:FEW_SHAPES])
+        fitted = fit_with(law, less.model, likelihood, shapes.get(law.name, ())[:RIVALS])
         if of_curves and fitted.model.part(law.name).kind_ends_at:
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
@@ -166,14 +161,12 @@ def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> Ext
 
 
 def alternatives(evidence: Evidence, best: Posterior, member: int) -> tuple[Alternative, ...]:
-    """What could stand in a member's place: every other effect at its best shape, and nothing.
+    """What could stand in a member's place: every other effect at its best shape, also what was refused; or nothing.
 
-    Also one that was taken out beside it: there each did what the other does.
-
-    Nothing, whether the others' equations depart as their own do, towards any of their families, or in all that their
-    effects add.
+    The margin to nothing is the least of three: the other members' equations depart as in the search, towards all laws
+    of their families, or in all that their effects add.
     """
-    less = tuple(m for m in best.members if m != member)
+    less = best.without(member)
     margins = [
         weighed.posterior(less, of_any_law=wider).score - weighed.posterior(best.members, of_any_law=wider).score
         for weighed, wider in ((evidence, False), (evidence, True), (evidence.of_whole_effects, False))

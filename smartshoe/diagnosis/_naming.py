@@ -45,18 +45,16 @@ def names_of(
 ) -> tuple[Name, ...]:
     """The causes among ``members``, largest first; ``left``: rms of the structure that no member explains.
 
-    Beside one that is sure, and has a law, those are named, too, that move the reading by more than all small
-    imperfections of a good unit together, and are likelier there than not: a shadow of another effect is seldom so
-    large. Also those that cannot be ruled out and are larger than what the laws of the sure ones usually depart by.
+    * Where some are sure: these. Beside them, where one of the sure has a law, others above ``tolerable`` that are
+      likelier there than not (another effect's shadow is seldom so large), or that cannot be ruled out and are larger
+      than what the laws of the sure ones usually depart by.
+    * Where none is sure: those that cannot be ruled out and are larger than all that is left; else the one of the kind
+      that does most ``alone``. Each is half sure at most.
 
-    Where none is sure, those that cannot be ruled out and are larger than all that is left, as half sure at most; else
-    the one of the kind that does most ``alone``, likewise.
-    ``is_clocked``: loads go with the clock, so that what goes with it too may do what another of its kind does, or a
-    curve: none of these is more than half sure, and nothing is named for its size beside another.
-    ``is_unsteady``: zeros change at moments, of which not all are seen, and others may do what any effect does: none is
-    more than half sure.
-
-    A flexible block, and a curve that lies where its kind ends, is named by the law that comes nearest.
+    ``is_clocked``: peak loads grow or fall with time, so that effects that go with it imitate each other, and curves:
+    these are half sure at most, and nothing is named beside another. ``is_unsteady``: zeros change at moments, of which
+    some may not be seen and may imitate any effect: all are half sure at most. A flexible block, and a curve that lies
+    where its kind ends, is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     likely = [

@@ -17,7 +17,8 @@ from smartshoe.diagnosis._result import Cause, NextExperiment
 from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.display import moment
-from smartshoe.models.effects import Conditions, effect, told_apart_by
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.effects import Conditions, effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
 from smartshoe.protocol import Protocol
 
@@ -30,10 +31,6 @@ SHOWN_BY: dict[Exposure, str] = {
     "pauses": "pauses",
     "steps": "steps",
 }
-ONE_CYCLE = (
-    "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be held"
-    " against another, so that no cause can be told"
-)
 
 
 def next_experiment(
@@ -57,17 +54,28 @@ def next_experiment(
         held = ", ".join(dict.fromkeys(one.recording.name for one in sessions if one.judged.any()))
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(pair, "repeat", None, says)
-    doubtful = [(cause, cause.part) for cause in causes if cause.equivalents and cause.part is not None]
-    if not doubtful and (found.own_gains or found.zero_changes):
+    doubtful = [cause for cause in causes if cause.equivalents and cause.part is not None]
+    if doubtful:
+        return _told_apart(found, max(doubtful, key=lambda one: one.size), sessions, excitation.thresholds)
+    if found.own_gains or found.zero_changes:
         return NextExperiment(pair, "repeat", None, _again(found))
-    if not doubtful and not found.can_validate:
-        return NextExperiment(pair, "repeat", None, ONE_CYCLE)
-    if not doubtful:
-        least = excitation.thresholds.least_confidence
-        is_open = open_ or any(cause.equivalents or cause.confidence < least for cause in causes)
-        return _unseen(found, pair, excitation) if is_open else None
-    cause, part = max(doubtful, key=lambda one: one[0].size)
-    rival = cause.equivalents[0]
+    if not found.can_validate:
+        says = (
+            "repeat the load cycle, several times in one recording or in a second one: of a single one nothing can be"
+            " held against another, so that no cause can be told"
+        )
+        return NextExperiment(pair, "repeat", None, says)
+    least = excitation.thresholds.least_confidence
+    is_open = open_ or any(cause.equivalents or cause.confidence < least for cause in causes)
+    return _unseen(found, pair, excitation) if is_open else None
+
+
+def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
+    """The shortest protocol that tells a cause from its nearest equivalent clearly better than this data, or a channel.
+
+    Each protocol is simulated with the fitted model, and with the equivalent in the cause's place.
+    """
+    rival, part = cause.equivalents[0], str(cause.part)
     truth = found.fit if part == cause.name else _in_place_of(found, part, cause.name)
     other = _in_place_of(found, part, rival)
     margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
@@ -77,37 +85,35 @@ def next_experiment(
     expected = {
         name: expected_margin(truth, other, made(peak_n), noise_sd, finest) for name, made in EXPERIMENTS.items()
     }
-    best = max(expected, key=lambda name: expected[name])
+    most = max(expected.values())
     names = (cause.name, *cause.equivalents)
-    both = f"{cause.name} and {rival}".replace("_", " ")
+    both = listed((cause.name, rival), "and")
     channel = _channel(cause.name, rival, sessions)
-    no_name = -2.0 * math.log(excitation.thresholds.false_name)  # less tells nothing apart
-    if expected[best] < no_name:
+    no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
+    if most < no_name:
         instead = f"log the {channel} too" if channel else "use either, both predict the same reading"
         says = f"no load history that a machine can run tells {both} apart: {instead}"
-        return NextExperiment(names, None, channel, says, expected[best])
+        return NextExperiment(names, None, channel, says, most)
     telling = {
-        name: EXPERIMENTS[name](peak_n)
-        for name, by in expected.items()
-        if by > max(margin, expected[best] / excitation.thresholds.clear)
+        name: EXPERIMENTS[name](peak_n) for name, by in expected.items() if by > max(margin, most / thresholds.clear)
     }
     if not telling:
-        instead = f"log the {channel} too" if channel else f"{cause.name.replace('_', ' ')} follows better"
+        instead = f"log the {channel} too" if channel else f"{in_words(cause.name)} follows better"
         says = (
             f"none of the {len(expected)} protocols is expected to tell {both} apart better than this data already"
             f" does: {instead}"
         )
-        return NextExperiment(names, None, channel, says, expected[best])
+        return NextExperiment(names, None, channel, says, most)
     chosen = min(telling, key=lambda name: telling[name].duration_s)
-    better = ", which this data does not"
+    better = "which this data does not"
     if margin > no_name:
         times = expected[chosen] / margin
-        better = f", {times:.2g} times as well as this data does"
-        if times < 1.0 + excitation.thresholds.same:
-            better = ", little better than this data does"
-        elif times > excitation.thresholds.extrapolates:
-            better = ", far better than this data does"
-    says = f"run the protocol {chosen.replace('_', ' ')}: it should tell {both} apart{better}"
+        better = f"{times:.2g} times as well as this data does"
+        if times < 1.0 + thresholds.same:
+            better = "little better than this data does"
+        elif times > thresholds.extrapolates:
+            better = "far better than this data does"
+    says = f"run the protocol {in_words(chosen)}: it should tell {both} apart, {better}"
     return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
 
 
@@ -143,7 +149,7 @@ def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) ->
     peak_n = found.fit.model.full_scale_load_n
     for word, protocol in SHOWN_BY.items():
         if word not in excitation.present:
-            says = f"run the protocol {protocol.replace('_', ' ')}: this data lacks {SAYS[word]}, by which kinds differ"
+            says = f"run the protocol {in_words(protocol)}: this data lacks {SAYS[word]}, by which kinds differ"
             return NextExperiment(names, protocol, None, says, None, EXPERIMENTS[protocol](peak_n))
     says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"
     return NextExperiment(names, "repeat", None, says)
@@ -178,4 +184,4 @@ def _channel(name: str, rival: str, sessions: Sequence[Session]) -> str | None:
     """The channel that the catalogue says would tell them apart, if it was not logged already."""
     columns = set.intersection(*({*one.recording.channels} for one in sessions))
     lacking = (told_apart_by(effect(name), effect(rival)) & CHANNELS) - logged_channels(sessions) - columns
-    return min(lacking).replace("_", " ") if lacking else None
+    return in_words(min(lacking)) if lacking else None

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from smartshoe.diagnosis._likelihood import Fit
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import logged_channels
-from smartshoe.diagnosis._session import Scale
 from smartshoe.models.effects.effect import EffectParameter
 from smartshoe.models.parameter import Parameter
 from smartshoe.signals.noise import NORMAL_95

@@ -11,7 +11,8 @@ from smartshoe.diagnosis._baseline import baseline_of, with_usual_arm
 from smartshoe.diagnosis._characteristic import conductance_of, friction_of
 from smartshoe.diagnosis._excitation import Excitation, excitation_of
 from smartshoe.diagnosis._ranges import ranges_of
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate, full_scale, prepare, thinning
+from smartshoe.diagnosis._scale import Scale, full_scale, thinning
+from smartshoe.diagnosis._session import Session, at_full_rate, prepare
 from smartshoe.integrity import Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect
@@ -37,6 +38,7 @@ class Prepared:
     is_no_unit: bool
     clocks: Sequence[tuple[Effect, Array]]
     is_moved: bool
+    thresholds: Thresholds
 
 
 def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, thresholds: Thresholds) -> Prepared:
@@ -64,4 +66,4 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     fine = at_full_rate(sessions, clocks.usable, scale, thresholds)
     is_no_unit = ranges.is_trap or all(said is not None for said in friction)
     is_moved = not clocks.moved.isdisjoint(clocks.places[:count])
-    return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved)
+    return Prepared(sessions, fine, scale, limits, start, excitation, is_no_unit, clocks.parts, is_moved, thresholds)

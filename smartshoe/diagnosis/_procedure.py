@@ -31,7 +31,8 @@ from smartshoe.diagnosis._prepared import Prepared, prepared
 from smartshoe.diagnosis._ranges import beyond
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, residual_structure
 from smartshoe.diagnosis._result import Cause, Diagnosis, GoodnessOfFit, Rival, Trace, Verdict
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis._validation import fitted_rms
 from smartshoe.diagnosis._verdict import (
@@ -66,28 +67,23 @@ def diagnosed(
     found = infer(given.start, sessions, thresholds, progress, not given.is_no_unit)
     progress("judging on held-out data")
     plain = found.baseline.model
-    left = _left_by(found, given, integrity.faults, thresholds)
+    left = _left_by(found, given, integrity.faults)
     off = [residual_of(one, found.fit.model) for one in fine]  # thinning makes noise of neighbours alike
     extended = replace(found.fit.model, noise=fitted_rms(fine, off))
     baseline, best = errors(fine, plain), errors(fine, extended)
-    named = _named(found, given, left, thresholds)
+    named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
     causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
-    judged = _judged(found, given, left, off, named, causes, won, thresholds)
-    verdict, rest = judged.verdict, unexplained_of(causes, left.before, left.after)
+    outcome = _outcome(found, given, left, off, named, causes, won)
+    verdict, rest = outcome.verdict, unexplained_of(causes, left.before, left.after)
     of_held_out = left_where_judged(fine, off, thresholds)
-    structure = of_held_out if judged.unproven else min(max(left.after.rms, judged.elsewhere), of_held_out)
+    structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
     noise_variance = max(best.rmse**2 - structure**2, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
-        fine,
-        extended,
-        integrity.faults,
-        explained or left.after.is_noise,
-        thresholds.material,
-        left.within.memory,
+        fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
     )
     parts = {cause.name for cause in causes} | {name.member.name for name in named.names}
     minor = tuple(part.name for part in extended.parts if part.name not in parts)
@@ -98,7 +94,7 @@ def diagnosed(
         names_in(causes, len(minor)),
         baseline,
         best,
-        not_explained_of(rest, judged.elsewhere, judged.unproven, thresholds),
+        not_explained_of(rest, outcome.elsewhere, outcome.unproven, thresholds),
         thresholds,
         worse=won.is_loss,
         withheld=_is_silent(found, given) or bool(named.limits or found.zero_changes or found.own_gains),
@@ -121,7 +117,7 @@ def diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
         ),
-        limits=_limits(found, given, named, extended, force, judged, left, thresholds),
+        limits=_limits(found, given, named, extended, force, outcome, left),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
@@ -148,8 +144,8 @@ class _LeftOver:
     known: float
 
 
-def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault], thresholds: Thresholds) -> _LeftOver:
-    sessions = given.sessions
+def _left_by(found: Inference, given: Prepared, faults: Sequence[DataFault]) -> _LeftOver:
+    sessions, thresholds = given.sessions, given.thresholds
     models = found.baseline.model, found.fit.model
     plain, residuals = ([residual_of(one, model) for one in sessions] for model in models)
     before, after = (residual_structure(sessions, one, thresholds) for one in (plain, residuals))
@@ -162,11 +158,11 @@ def _is_silent(found: Inference, given: Prepared) -> bool:
     return given.is_no_unit or not found.can_validate
 
 
-def _named(found: Inference, given: Prepared, left: _LeftOver, thresholds: Thresholds) -> Chosen:
+def _named(found: Inference, given: Prepared, left: _LeftOver) -> Chosen:
     """The causes in what was ``found``."""
     most = max(left.within.rms, left.within.size)
-    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, thresholds, left.within.memory)
-    return causes_among(found, given, zeros, most, thresholds)
+    zeros = [] if _is_silent(found, given) else _zeros(found, given, most, left.within.memory)
+    return causes_among(found, given, zeros, most)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +178,7 @@ class _Outcome:
     unproven: float
 
 
-def _judged(
+def _outcome(
     found: Inference,
     given: Prepared,
     left: _LeftOver,
@@ -190,10 +186,9 @@ def _judged(
     named: Chosen,
     causes: Sequence[Cause],
     won: Gain,
-    thresholds: Thresholds,
 ) -> _Outcome:
-    """By what is ``left``, and ``off`` at the full rate, (n,) each, and what was ``won`` on what is held out."""
-    fine, known = given.fine, left.known
+    """The verdict, by what is ``left``, and ``off`` at the full rate, (n,) each, and ``won`` on what is held out."""
+    fine, known, thresholds = given.fine, left.known, given.thresholds
     elsewhere = off_elsewhere(fine, off, max(left.within.size, beyond_noise(fine, off, thresholds)), thresholds)
     unproven = 0.0
     if not (found.can_validate and left.after.is_tested):
@@ -204,7 +199,7 @@ def _judged(
         return _Outcome("unexplained", won, elsewhere, unproven)
     # An unsure companion of one that is sure does not say that laws are none.
     follows = any(name.is_sure for name in named.names) and not any(name.kind_only for name in named.names)
-    # What is followed is there, though of no kind with a name, or where too little is left to test for more.
+    # What the model follows is there, even if it is of no kind with a name, or too little is left to be tested.
     least = max(thresholds.tolerable, thresholds.material, known)
     gained = 0.0 if causes else won.certain_fall(given.scale)
     besides = max(elsewhere, unproven, *(one for one in (named.nameless, gained) if one > least))
@@ -220,12 +215,11 @@ def _limits(
     named: Chosen,
     extended: ExtendedModel,
     force: Compensation,
-    judged: _Outcome,
+    outcome: _Outcome,
     left: _LeftOver,
-    thresholds: Thresholds,
 ) -> tuple[str, ...]:
     """All that limits the diagnosis, in sentences."""
-    won, elsewhere = judged.won, judged.elsewhere
+    won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
     ways = beyond(given.sessions, given.scale, thresholds) if won.is_loss or elsewhere else None
     of_model = end_of_range_of(extended), wall_ratio_of(extended, given.sessions, thresholds)
     return (
@@ -256,13 +250,11 @@ def _nearest(found: Inference) -> tuple[Rival, ...]:
     return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:SAID])
 
 
-def _zeros(
-    found: Inference, given: Prepared, left: float, thresholds: Thresholds, noise: GaussMarkov | None
-) -> list[Zero]:
+def _zeros(found: Inference, given: Prepared, left: float, noise: GaussMarkov | None) -> list[Zero]:
     """The offsets and tares that are seen beside what was ``found``, and are material."""
     remembered = sum(one.size for one in found.members if isinstance(one.effect, CoreEffect))
-    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, thresholds, noise)
-    return [one for one in zeros if one.size >= thresholds.material]
+    zeros = zeros_of(given.sessions, found.fit.model, given.scale, left, remembered, given.thresholds, noise)
+    return [one for one in zeros if one.size >= given.thresholds.material]
 
 
 def _percent_less(after: float, before: float) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects.exposure import LATER_CYCLES, SAYS
 

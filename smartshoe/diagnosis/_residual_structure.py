@@ -69,7 +69,7 @@ def residual_structure(
 ) -> ResidualStructure:
     """Both tests of the residuals, and the place of the largest part."""
     memory = gauss_markov_of(sessions, residuals, thresholds)
-    says = where(sessions, residuals, thresholds)
+    says = worst_place(sessions, residuals, thresholds)
     if memory is not None and memory.switches:
         says = f"it switches between two levels and stays at each for about {2.0 * memory.tau_s:.2g} s; {says}"
     return ResidualStructure(
@@ -93,7 +93,7 @@ def beyond_noise(sessions: Sequence[Session], residuals: Sequence[Array], thresh
     return float(np.sqrt(max(square - white, 0.0) / max(count, 1)))
 
 
-def where(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> str:
+def worst_place(sessions: Sequence[Session], residuals: Sequence[Array], thresholds: Thresholds) -> str:
     """The bin of load and direction, and the stretch of the file's time, that hold most of the residual's slow part."""
     load, rate, error, names = [], [], [], []
     for index, (session, residual) in enumerate(zip(sessions, residuals, strict=True)):

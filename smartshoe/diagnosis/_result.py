@@ -14,7 +14,7 @@ from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, described
-from smartshoe.models.effects import Effect
+from smartshoe.models.effects import Effect, in_words
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
@@ -265,7 +265,7 @@ class Diagnosis(Summarised):
     def _summary_table(self) -> SummaryTable:
         rows = [
             [
-                cause.name.replace("_", " "),
+                in_words(cause.name),
                 significant(cause.confidence, 2),
                 significant(100.0 * cause.size, 3),
                 significant(cause.held_out.gain_percent, 3),

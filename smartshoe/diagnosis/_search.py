@@ -8,8 +8,9 @@ from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 
 # Resolutions of the search: half and twice of each changed no name in two cases.
 MOST_MEMBERS = 7
-BREADTH = 5  # candidates that are tried beside a set
-SWAPS = 3  # and in the place of each member
+BREADTH = 5  # of the likeliest, that are weighed beside a set
+SWAPS = 3  # that are weighed in the place of each member; and fits of whole models that are gone on with
+RIVALS = 2  # that are fitted as whole models beside the best, or shapes from which one is
 
 
 def allowed(evidence: Evidence, found: Posterior) -> bool:
@@ -48,7 +49,7 @@ def step(evidence: Evidence, start: Members = (), banned: Collection[str] = ()) 
     if len(best.members) < MOST_MEMBERS:
         sets += [(*best.members, k) for k in additions(evidence, best.members, BREADTH, banned)]
     for member in best.members:
-        less = tuple(m for m in best.members if m != member)
+        less = best.without(member)
         sets += [less, *((*less, k) for k in additions(evidence, less, SWAPS, banned))]
     evidence.make_ready({member for members in sets for member in members})
     trials = (evidence.posterior(members) for members in sets)
@@ -69,7 +70,7 @@ def needed(evidence: Evidence, members: Members) -> Members:
     """``members`` without those of which one after the other has less evidence for it than against it."""
     best = evidence.posterior(members)
     while best.members:
-        fewer = (evidence.posterior(tuple(m for m in best.members if m != gone)) for gone in best.members)
+        fewer = (evidence.posterior(best.without(gone)) for gone in best.members)
         less = min(fewer, key=lambda one: one.score)
         if less.score >= best.score:
             break

@@ -19,7 +19,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._noise import FLOOR, correlated_sd
-from smartshoe.diagnosis._session import Session, have_later_cycles
+from smartshoe.diagnosis._session import Session, fitted_of, have_later_cycles
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Effect, blocks, catalogue, is_told_from_its_family
@@ -262,7 +262,7 @@ def linearised(
     model: ExtendedModel, sessions: Sequence[Session], thresholds: Thresholds, beside: Linearised | None = None
 ) -> Linearised:
     """The columns about ``model``; ``beside``: those about a model nearby, which serve for what is in neither."""
-    fitted = tuple(session for session in sessions if session.fitted.any())
+    fitted = fitted_of(sessions)
     inside = {part.name: part for part in model.parts}
     outside = [e for e in available(fitted, thresholds) if e.name not in inside]
     channels = logged_channels(fitted)
@@ -312,15 +312,7 @@ def linearised(
     scales[scales < FLOOR] = 1.0  # what is less than any noise is rounding, and is not made as large as the others
     for columns in rows:
         columns /= scales
-    return Linearised(
-        model,
-        fitted,
-        tuple(rows),
-        scales,
-        3,
-        tuple(candidates),
-        thresholds,
-    )
+    return Linearised(model, fitted, tuple(rows), scales, 3, tuple(candidates), thresholds)
 
 
 def _place(one: Candidate) -> tuple[str, tuple[float, ...]]:

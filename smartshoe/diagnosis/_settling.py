@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
 from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis._search import MOST_MEMBERS, additions
+from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, additions
 from smartshoe.diagnosis._sensitivity import Linearised
-from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._state import State, evidence_about, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
-from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import in_words
+from smartshoe.models.effects import listed
 from smartshoe.models.extended import ExtendedModel
 
 Progress = Callable[[str], None]
@@ -23,10 +21,9 @@ Progress = Callable[[str], None]
 # equation fits, is left unnamed.
 ROUNDS = 6
 ROUND_STEPS = 6  # of a fit that is linearised anew anyway
-RIVALS = 2  # that are fitted beside a set that bends
 
 
-def settled(state: State, sessions: Sequence[Session], progress: Progress, known: State | None = None) -> State:
+def settled(state: State, progress: Progress, known: State | None = None) -> State:
     """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
 
     In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one. Where a fit comes
@@ -38,95 +35,89 @@ def settled(state: State, sessions: Sequence[Session], progress: Progress, known
     while state.improved >= state.evidence.odds and (here := _names(state)) not in seen and len(path) <= ROUNDS:
         seen.add(here)
         progress(f"fitting {listed(here[1]) or 'the baseline'}")
-        likelihood = state.likelihood(sessions)
+        likelihood = state.likelihood()
         fits = [
             fit(likelihood, with_members(state.given, one, state.fit.model, likelihood), ROUND_STEPS)
             for one in _promising(state)
         ]
-        found, given = _best_of(fits, state, sessions)
-        if known is not None and any(_are_alike(found.model, one, likelihood, state.thresholds) for one in known.path):
+        found, given = _best_of(fits, state)
+        if known is not None and any(_are_alike(found.model, one, likelihood) for one in known.path):
             return known
         path.append(found.model)
-        state = state_at(found, sessions, state.thresholds, state.banned, given)
+        state = state_at(found, state.banned, given)
     for name, arm in arms_of(state.fit.model):
-        likelihood = state.likelihood(sessions)
+        likelihood = state.likelihood()
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
-        if _is_simpler(found, state, sessions):
-            state = state_at(found, sessions, state.thresholds, state.banned)
+        if _is_simpler(found, state):
+            state = state_at(found, state.banned)
     return replace(state, path=tuple(path))
 
 
-def better_from(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
+def better_from(begun: State, state: State, progress: Progress) -> State:
     """What settles from ``begun``, where that is simpler than ``state``."""
-    other = settled(begun, sessions, progress, state)
-    return state if other is state else replace(simpler(other, state, sessions), path=(*state.path, *other.path))
+    other = settled(begun, progress, state)
+    return state if other is state else replace(simpler(other, state), path=(*state.path, *other.path))
 
 
-def better_from_one(begun: State, state: State, sessions: Sequence[Session], progress: Progress) -> State:
+def better_from_one(begun: State, state: State, progress: Progress) -> State:
     """What settles from one of the likeliest effects alone, where that follows better than the several of ``state``.
 
     Several that are each fitted a little may promise more in one linearisation than one that is large.
     """
     if effect_count(state.fit.model) - effect_count(begun.fit.model) < 2:
         return state
-    likelihood = state.likelihood(sessions)
+    likelihood = state.likelihood()
     few = [begun.evidence.posterior((*begun.start, k)) for k in additions(begun.evidence, begun.start, RIVALS)]
     fits = [fit(likelihood, with_members(begun.given, one, begun.fit.model, likelihood)) for one in few]
     one = min(fits, key=lambda one: one.cost, default=begun.fit)
-    if not _is_simpler(one, state, sessions):
+    if not _is_simpler(one, state):
         return state
     progress(f"beginning anew from {listed(one.model.names)}")
-    return better_from(state_at(one, sessions, state.thresholds), state, sessions, progress)
+    return better_from(state_at(one), state, progress)
 
 
-def simpler(other: State, state: State, sessions: Sequence[Session]) -> State:
-    return other if _is_simpler(other.fit, state, sessions) else state
+def simpler(other: State, state: State) -> State:
+    return other if _is_simpler(other.fit, state) else state
 
 
-def law_or_block(lawful: State, state: State, sessions: Sequence[Session]) -> State:
+def law_or_block(lawful: State, state: State) -> State:
     """A law in the place of a flexible block, unless there is more evidence for the block and what goes with it.
 
     What a law misses beyond what laws depart by would be taken for other effects. Where it leaves no more than a good
     unit's imperfections do beside what the block leaves, and needs no more effects, it is the law all the same.
     """
+    sessions = state.given.sessions
     missed = error_of(sessions, lawful.fit.model) ** 2 - error_of(sessions, state.fit.model) ** 2
     if missed <= state.thresholds.tolerable**2 and effect_count(lawful.fit.model) <= effect_count(state.fit.model):
         return lawful
-    by_law = evidence_about(lawful.fit.model, sessions, state.evidence)[1]
+    by_law = evidence_about(lawful.fit.model, state.evidence)[1]
     return lawful if by_law.score <= state.evidence.posterior(state.start).score else state
 
 
-def _is_simpler(other: Fit, state: State, sessions: Sequence[Session]) -> bool:
+def _is_simpler(other: Fit, state: State) -> bool:
     """Whether ``other`` is likelier than the fit of ``state``, odds against effects counted; or has fewer of them.
 
     The number decides where the two hardly read differently: what is immaterial counts for nothing, however sure it is.
     An arm that imitates a lag of a millisecond needs another one in its own place.
     """
-    thresholds, likelihood = state.thresholds, state.likelihood(sessions)
-    odds = state.evidence.odds
-    new, old = ((score_of(one.model, likelihood, odds), effect_count(one.model)) for one in (other, state.fit))
-    if _read_alike(other.model, state.fit.model, likelihood, thresholds):
+    likelihood, odds = state.likelihood(), state.evidence.odds
+    new, old = (
+        (with_odds(likelihood.cost(one.model), one.model, odds), effect_count(one.model)) for one in (other, state.fit)
+    )
+    if _read_alike(other.model, state.fit.model, likelihood):
         return (new[1], new[0]) < (old[1], old[0])
     return new[0] < old[0]
 
 
-def score_of(model: ExtendedModel, likelihood: Likelihood, odds: float) -> float:
-    """-2 log likelihood of a model, with the ``odds`` against each of its effects; the less, the better."""
-    return with_odds(likelihood.cost(model), model, odds)
-
-
-def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+def _read_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood) -> bool:
+    """Whether two models' readings differ by less than counts for anything."""
+    thresholds = likelihood.thresholds
     return apart(likelihood.sessions, one, other) < thresholds.alike * thresholds.imperfection
 
 
-def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood, thresholds: Thresholds) -> bool:
+def _are_alike(one: ExtendedModel, other: ExtendedModel, likelihood: Likelihood) -> bool:
     """Whether two models have the same effects, and hardly read differently."""
-    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood, thresholds)
-
-
-def listed(names: Iterable[str]) -> str:
-    """Identifiers as words, one after the other."""
-    return ", ".join(map(in_words, names))
+    return {*one.names} == {*other.names} and _read_alike(one, other, likelihood)
 
 
 def _names(state: State) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -155,7 +146,7 @@ def _promising(state: State) -> list[Posterior]:
     return [state.best, *(state.evidence.posterior((*start, k)) for k in sorted(tried))]
 
 
-def _best_of(fits: Sequence[Fit], state: State, sessions: Sequence[Session]) -> tuple[Fit, Linearised | None]:
+def _best_of(fits: Sequence[Fit], state: State) -> tuple[Fit, Linearised | None]:
     """Of fits with equally many strengths the likeliest; of these, for each number one, that with most evidence.
 
     One strength more always fits better. Whether it is worth it where no equation is exact is for the evidence to say.
@@ -167,7 +158,7 @@ def _best_of(fits: Sequence[Fit], state: State, sessions: Sequence[Session]) -> 
     few = list(likeliest.values())
     if len(few) == 1:
         return few[0], None
-    weighed = [(one, *evidence_about(one.model, sessions, state.evidence)) for one in few]
+    weighed = [(one, *evidence_about(one.model, state.evidence)) for one in few]
     found, evidence, _ = min(weighed, key=lambda one: one[2].score)
     return found, evidence.given
 

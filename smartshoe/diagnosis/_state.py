@@ -59,20 +59,15 @@ class State:
         """The candidates of the best set."""
         return tuple(self.given.candidates[m] for m in self.best.members)
 
-    def likelihood(self, sessions: Sequence[Session]) -> Likelihood:
+    def likelihood(self) -> Likelihood:
         """That of models near the fit."""
-        return Likelihood(sessions, self.evidence.noise_sd, self.fit.model, self.thresholds)
+        return Likelihood(self.given.sessions, self.evidence.noise_sd, self.fit.model, self.thresholds)
 
 
-def state_at(
-    found: Fit,
-    sessions: Sequence[Session],
-    thresholds: Thresholds,
-    banned: tuple[str, ...] = (),
-    given: Linearised | None = None,
-) -> State:
+def state_at(found: Fit, banned: tuple[str, ...] = (), given: Linearised | None = None) -> State:
     """The linearisation about a fit, ``given`` where it is known, and the best set in it without what is ``banned``."""
-    return State(*searched(found.model, sessions, thresholds, banned, given), found, banned)
+    of = found.likelihood
+    return State(*searched(found.model, of.sessions, of.thresholds, banned, given), found, banned)
 
 
 def searched(
@@ -93,14 +88,14 @@ def searched(
 
 
 def evidence_about(
-    model: ExtendedModel, sessions: Sequence[Session], other: Evidence, beside: Linearised | None = None
+    model: ExtendedModel, other: Evidence, beside: Linearised | None = None
 ) -> tuple[Evidence, Posterior]:
-    """The evidence about a model, under the noise that the ``other`` one has, and the model's own set in it.
+    """The evidence about a model, of the sessions and under the noise of the ``other``, and the model's own set in it.
 
-    ``beside``: columns about a model nearby. What is in neither counts as no more than an imperfection, for which they
-    serve.
+    ``beside``: the linearisation about a model nearby, whose columns serve for effects that are in neither model: these
+    count as imperfections only.
     """
-    evidence = Evidence(linearised(model, sessions, other.thresholds, beside), other.noise_sd)
+    evidence = Evidence(linearised(model, other.given.sessions, other.thresholds, beside), other.noise_sd)
     return evidence, evidence.posterior(_set_of(model, evidence.given))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, within_bounds
-from smartshoe.diagnosis._session import Session, load_cycles
+from smartshoe.diagnosis._session import Session, fitted_of, load_cycles
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 
@@ -84,7 +84,7 @@ class LeftOut:
 
     def _rows_of(self, start: ExtendedModel) -> Callable[[Likelihood], list[Array]]:
         """What all fits begin with, of those recordings that one of them is fitted to."""
-        rows = {id(one.conditions): rows_of(start, one) for one in self.sessions if one.fitted.any()}
+        rows = {id(one.conditions): rows_of(start, one) for one in fitted_of(self.sessions)}
         return lambda rest: [rows[id(one.conditions)] for one in rest.sessions]
 
     def stands(self, model: ExtendedModel, plain: ExtendedModel) -> bool:
@@ -128,7 +128,7 @@ def _squares(folds: Sequence[_Fold], models: Sequence[ExtendedModel]) -> Array:
 
 def thirds_of(sessions: Sequence[Session], thresholds: Thresholds) -> list[_Fold]:
     """Of two recordings, each of several load cycles, the same third of both in turn; nothing of any others."""
-    fitted = [session for session in sessions if session.fitted.any()]
+    fitted = fitted_of(sessions)
     several = thresholds.held_out_every
     if len(fitted) == 2 and all(load_cycles([one], thresholds) >= several for one in fitted):
         return _blocks_of(fitted, several)
@@ -142,7 +142,7 @@ def folds_of(sessions: Sequence[Session]) -> list[_Fold]:
     common, come into different groups, and so do those of a protocol that comes round with every sixth: no group takes
     all of a kind away.
     """
-    fitted = [session for session in sessions if session.fitted.any()]
+    fitted = fitted_of(sessions)
     if len(fitted) > 1:
         turns = [*range(MOST_FOLDS), *reversed(range(MOST_FOLDS))]
         groups = [k if len(fitted) <= MOST_ALONE else turns[k % len(turns)] for k in range(len(fitted))]

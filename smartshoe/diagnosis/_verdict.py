@@ -12,17 +12,16 @@ from smartshoe.arrays import Array
 from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise
 from smartshoe.diagnosis._result import Cause, Verdict
-from smartshoe.diagnosis._session import Scale, Session
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
-from smartshoe.models.effects import in_words
-
-NO_CAUSE = "no cause can be named from this data (see its limits)"
+from smartshoe.models.effects import listed
 
 
 def known_error(faults: Sequence[DataFault], sessions: Sequence[Session], scale: Scale) -> float:
     """Rms, shares of full scale, that faults of all samples add to a recording that is fitted, the most of all."""
-    units = {one.index: one.recording.sensor.unit for one in sessions if one.fitted.any()}
+    units = {one.index: one.recording.sensor.unit for one in fitted_of(sessions)}
     errors = (fault.error * units[fault.recording].scale for fault in faults if fault.recording in units)
     return max(errors, default=0.0) / (abs(scale.reading) * scale.unit.scale)
 
@@ -80,10 +79,10 @@ def off_elsewhere(
 
 def names_in(causes: Sequence[Cause], unnamed: int) -> str:
     """The causes as "a, b and perhaps c", and how many effects of the extended model are none."""
-    names = [in_words(cause.name) for cause in causes if cause.confidence >= 0.5]
-    names += [f"perhaps {in_words(cause.name)}" for cause in causes if cause.confidence < 0.5]
+    names = [cause.name for cause in causes if cause.confidence >= 0.5]
+    names += [f"perhaps {cause.name}" for cause in causes if cause.confidence < 0.5]
     names += [f"{unnamed} {'effects' if unnamed > 1 else 'effect'} without a name"] if unnamed else []
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return listed(names, "and")
 
 
 def not_shown_to_be_noise(
@@ -155,7 +154,8 @@ def sentence_of(
     if verdict == "unexplained" and best.rmse**2 < (1.0 - thresholds.foreseen) * baseline.rmse**2:
         return f"{good}{left}: the extended model is good to {by_all}, by effects of which none is sure"
     if verdict == "unexplained":
-        return f"{good}{left}, and {NO_CAUSE if withheld else 'no effect of the catalogue accounts for it'}"
+        why = "no cause can be named from this data (see its limits)" if withheld else None
+        return f"{good}{left}, and {why or 'no effect of the catalogue accounts for it'}"
     if baseline.is_empty:
         said = f"{good}; what is fitted is explained by {named}"
     elif best.rmse == baseline.rmse:  # what is named is nothing that the baseline gets wrong

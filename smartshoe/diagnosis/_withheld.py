@@ -20,7 +20,6 @@ from smartshoe.diagnosis._naming import Name, names_of
 from smartshoe.diagnosis._prepared import Prepared
 from smartshoe.diagnosis._session import load_cycles
 from smartshoe.diagnosis._zero import Zero, creeping
-from smartshoe.integrity.thresholds import Thresholds
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +41,10 @@ class Chosen:
         return replace(self, names=kept, limits=(*self.limits, *(said for said in reasons if said is not None)))
 
 
-def causes_among(
-    found: Inference,
-    given: Prepared,
-    zeros: Sequence[Zero],
-    left: float,
-    thresholds: Thresholds,
-) -> Chosen:
+def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left: float) -> Chosen:
     """Of what was ``found``, and of ``zeros`` that were seen; ``left``: rms of structure that no effect explains."""
-    seen = _shown(found, given, left, thresholds)
+    thresholds = given.thresholds
+    seen = _shown(found, given, left)
     seen = seen.without(lambda one: moved_of(one) if given.is_moved and one.effect.is_latency else None)
     rivals = seen.names
     seen = seen.without(lambda one: departure_of(one, rivals, thresholds))
@@ -67,11 +61,15 @@ def causes_among(
         one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
     )
     seen = Chosen(names, kept, (*before, *seen.limits, *past), seen.nameless)
-    return seen.without(lambda one: _crept(one, kept, thresholds))
+    return seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
 
 
-def _shown(found: Inference, given: Prepared, left: float, thresholds: Thresholds) -> Chosen:
-    """The names of what was found that this data shows; what is of no kind with a name gives none to others, either."""
+def _shown(found: Inference, given: Prepared, left: float) -> Chosen:
+    """The names of what was found, but for effects of no kind with a name, and those that this data cannot show.
+
+    Such an effect is taken out and all others are named anew, so that none is named for being beside it.
+    """
+    thresholds = given.thresholds
     members = [one for one in found.members if one.name not in found.undone]
     limits: tuple[str, ...] = ()
     nameless = 0.0
@@ -96,9 +94,3 @@ def _shown(found: Inference, given: Prepared, left: float, thresholds: Threshold
         if not any(one in members for one in withheld):
             return replace(shown, nameless=nameless)
         members = [one for one in members if one not in withheld]
-
-
-def _crept(name: Name, zeros: Sequence[Zero], thresholds: Thresholds) -> str | None:
-    """Why a drift of the zero may be how a tare among ``zeros`` creeps."""
-    tare = creeping(zeros, name.effect, name.member.size, thresholds)
-    return None if tare is None else crept_of(name, tare)

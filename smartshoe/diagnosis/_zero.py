@@ -15,7 +15,8 @@ import numpy as np
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import own_of
-from smartshoe.diagnosis._session import Scale, Session, begins_unloaded
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.models.effects import Effect, shift_of
 from smartshoe.models.extended import ExtendedModel
@@ -41,7 +42,7 @@ class Zero:
 def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
     """(fitted sessions,) each recording's own offset under ``model``, shares of full scale."""
     return np.array(
-        [own_of(one, model, one.reading - model.simulate(one.conditions))[0][0] for one in sessions if one.fitted.any()]
+        [own_of(one, model, one.reading - model.simulate(one.conditions))[0][0] for one in fitted_of(sessions)]
     )
 
 
@@ -99,7 +100,7 @@ def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, th
     It drifts the same way, and what it drifts by in a recording is of the offset's order of magnitude: what settles
     may have been under way for a few of its time constants.
     """
-    moves = [_drifted(one, model) for one in sessions if one.fitted.any()]
+    moves = [_drifted(one, model) for one in fitted_of(sessions)]
     moved = sum(float(one[-1] - one[0]) for one in moves) / max(len(moves), 1)
     return value * moved > 0.0 and abs(value) <= thresholds.extrapolates * abs(moved)
 
@@ -123,7 +124,7 @@ def zeros_of(
     rests = first_rests(sessions, model, thresholds)
     sensor, machine = shift_of("reading"), shift_of("load")
     if not rests.size:
-        return _unseen(sessions, model, left, remembered, sensor, machine, thresholds)
+        return _unseen(sessions, model, left, remembered, thresholds)
     loads, readings, drifted = rests.T
     sds = [float(np.std(one, ddof=1) / np.sqrt(one.size)) if one.size > 1 else 0.0 for one in (loads, readings)]
     load_sd, reading_sd = (float(np.hypot(sd, thresholds.zero_sd)) for sd in sds)
@@ -135,7 +136,7 @@ def zeros_of(
     is_clear = np.abs([load, reading]) >= many * np.array([load_sd, reading_sd])
     if abs(reading - load) < many * float(np.hypot(load_sd, reading_sd)):
         return ()  # the reading agrees with the load, and the unit bears it
-    commanded = any(one.recording.command_n is not None for one in sessions if one.fitted.any())
+    commanded = any(one.recording.command_n is not None for one in fitted_of(sessions))
     if is_clear.all() and not commanded and abs(reading - load) < thresholds.same * load:
         return ()  # a tare and an offset of one size would be a coincidence: it bears the load, by a curve of its own
     is_clear[1] &= abs(reading) <= thresholds.foreign_zero  # beyond it, it is a convention of the sensor's
@@ -165,18 +166,12 @@ def creeping(zeros: Sequence[Zero], drift: Effect, size: float, thresholds: Thre
 
 
 def _unseen(
-    sessions: Sequence[Session],
-    model: ExtendedModel,
-    left: float,
-    remembered: float,
-    sensor: Effect,
-    machine: Effect,
-    thresholds: Thresholds,
+    sessions: Sequence[Session], model: ExtendedModel, left: float, remembered: float, thresholds: Thresholds
 ) -> tuple[Zero, ...]:
-    """The zero of a unit that is never seen unloaded at first: by its model, and either of the two may be it."""
+    """The zero of a unit that is never seen unloaded at first: by its model, and an offset or a tare may be it."""
     found = offsets(sessions, model)
     mean = float(np.mean(found))
-    fitted = [one for one in sessions if one.fitted.any()]
+    fitted = fitted_of(sessions)
     begun = float(np.mean([abs(one.conditions.load[0]) for one in fitted]))
     lowest = min(float(np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01)) for one in fitted)
     scatter = float(np.std(found, ddof=1) / np.sqrt(found.size)) if found.size > 1 else 0.0
@@ -187,4 +182,5 @@ def _unseen(
     sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
     if abs(mean) > thresholds.foreign_zero or abs(mean) < largest_of_noise(1, thresholds) * sd:
         return ()
-    return (Zero(sensor, mean, sd, abs(mean), (machine.name,), _is_past(mean, sessions, model, thresholds)),)
+    is_past = _is_past(mean, sessions, model, thresholds)
+    return (Zero(shift_of("reading"), mean, sd, abs(mean), (shift_of("load").name,), is_past),)

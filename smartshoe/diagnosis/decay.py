@@ -107,17 +107,7 @@ def decay_of(recording: Recording, thresholds: Thresholds | None = None) -> Deca
         f" {'only a logged load tells apart' if standing == 'absent' else 'a load that stands still cannot tell apart'}"
     )
     return Decay(
-        onset_s,
-        tau_s,
-        ci95_s,
-        from_start_s,
-        100.0 * lost,
-        float(t[-1]),
-        plateau,
-        order,
-        order_ci95,
-        course,
-        says,
+        onset_s, tau_s, ci95_s, from_start_s, 100.0 * lost, float(t[-1]), plateau, order, order_ci95, course, says
     )
 
 
@@ -211,8 +201,7 @@ def _fit(model: Callable[[Array, Array], Array], t: Array, v: Array, start: list
 
 
 def _exponential(at: Array, t: Array) -> Array:
-    out: Array = at[0] * np.exp(-t / max(at[1], 1e-9))
-    return out
+    return np.asarray(at[0] * np.exp(-t / max(at[1], 1e-9)))
 
 
 def _to_plateau(at: Array, t: Array) -> Array:
@@ -225,8 +214,7 @@ def _of_order(at: Array, t: Array) -> Array:
     if abs(over) < 1e-6:
         return _exponential(at[:2], t)
     base = np.maximum(1.0 + over * t / max(at[1], 1e-9), 1e-12)
-    out: Array = at[0] * np.exp(-np.log(base) / over)
-    return out
+    return np.asarray(at[0] * np.exp(-np.log(base) / over))
 
 
 def _duration(time_s: float) -> str:

@@ -12,8 +12,9 @@ import numpy as np
 from smartshoe.arrays import Array, require_positive
 from smartshoe.diagnosis._baseline import USUAL
 from smartshoe.diagnosis._naming import odds_of_law
+from smartshoe.diagnosis._scale import Scale, thinning
 from smartshoe.diagnosis._sensitivity import Linearised, linearised
-from smartshoe.diagnosis._session import Scale, prepare, thinning
+from smartshoe.diagnosis._session import prepare
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread

@@ -61,9 +61,9 @@ UNSEEN = Lags(np.zeros(0), np.zeros(0))
 def align(view: View) -> tuple[View, Lags]:
     """The view with its load on the reading's clock, where the clocks differ; else as it was, with all it has found.
 
-    And by how much the reading follows. One that is late by a quarter of a step, or by half of one, falls as the load
-    rises: where it follows turned over, and else hardly, or far less closely, that is the view. Of loads that rise as
-    they fall either way is as close.
+    And the lags that were seen. A reading that is late by a quarter or half of a period seems to fall as the load
+    rises: it is turned over where it follows the load only so, or far more closely so. Of loads that rise as they fall
+    both ways are as close, and it is left as it is.
     """
     followed = _followed(view)
     is_open = not _follows(followed, view.thresholds)
@@ -162,9 +162,7 @@ def _followed(view: View) -> _Followed | None:
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
     for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
-        smooth_s = echoes * given.echo_s
-        places, smallest, best, weights = _window_lags(grid, load, reading, width_s, smooth_s, given)
-        found = _Followed(grid, load, reading, smooth_s, places, smallest, best, weights) if places.size else None
+        found = _by_windows(grid, load, reading, width_s, echoes * given.echo_s, given)
         if _follows(found, given):
             break
     return found
@@ -184,22 +182,22 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
     """Lag in s in the middle and its growth in s per s, or None where the clocks agree."""
     duration_s = float(view.time_s[-1] - view.time_s[0])
     given = view.thresholds
-    grid, load, reading, smooth_s, places, weights = of.grid, of.load, of.reading, of.smooth_s, of.places, of.weights
+    grid, places = of.grid, of.places
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
-    before, repeating = None, _repeats_itself(load, given)
+    before, repeating = None, _repeats_itself(of.load, given)
     # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
     for lags, earned in ((of.smallest, 1.0 - given.same), (of.best, 1.0 / given.clear)):
         if np.max(np.abs(lags)) <= least:
             continue
         offered = []
-        for offset_s, rate in _lines(places - middle, lags, weights, 0.5 * duration_s):
+        for offset_s, rate in _lines(places - middle, lags, of.weights, 0.5 * duration_s):
             ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
             if np.max(np.abs(ends)) <= least or not _describes(offset_s + rate * (places - middle), lags, given):
                 continue
-            shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, load)
-            before = _unexplained(grid, load, reading, smooth_s, given) if before is None else before
-            after = _unexplained(grid, shifted, reading, smooth_s, given)
+            shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, of.load)
+            before = _unexplained(of, of.load, given) if before is None else before
+            after = _unexplained(of, shifted, given)
             agreed = lags is of.smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
             # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
             # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
@@ -254,14 +252,13 @@ def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
     count = np.bincount(place, minlength=grid.size)
     total = np.bincount(place, weights=values, minlength=grid.size)
     filled = count > 0
-    out: Array = np.interp(grid, grid[filled], total[filled] / count[filled])
-    return out
+    return np.interp(grid, grid[filled], total[filled] / count[filled])
 
 
-def _window_lags(
+def _by_windows(
     grid: Array, load: Array, reading: Array, width_s: float, smooth_s: float, thresholds: Thresholds
-) -> tuple[Array, Array, Array, Array]:
-    """Middle, smallest and best lag in s and correlation, (w,) each, of windows in which load and reading both move."""
+) -> _Followed | None:
+    """How late the reading follows in each window in which it and the load both move; None where there is none."""
     from scipy.ndimage import gaussian_filter1d
 
     smooth = max(smooth_s / width_s, 1.0)
@@ -294,7 +291,10 @@ def _window_lags(
         smallest.append(peak if lags_bins[chosen] != 0 else 0.0)
         peaks.append(peak)
         weights.append(float(correlation[best]))
-    return np.array(places), np.array(smallest), np.array(peaks), np.array(weights)
+    if not places:
+        return None
+    each = (np.array(one) for one in (places, smallest, peaks, weights))
+    return _Followed(grid, load, reading, smooth_s, *each)
 
 
 def _correlation(load: Array, reading: Array, most: int) -> Array:
@@ -307,8 +307,7 @@ def _correlation(load: Array, reading: Array, most: int) -> Array:
         return np.zeros(2 * most + 1)
     full = correlate(reading, load, mode="full", method="fft") / size
     middle = load.size - 1
-    out: Array = full[middle - most : middle + most + 1]
-    return out
+    return full[middle - most : middle + most + 1]
 
 
 def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tuple[float, float]]:
@@ -341,22 +340,22 @@ def _middle(values: Array, weights: Array) -> float:
 
 
 @on_one_thread
-def _unexplained(grid: Array, load: Array, reading: Array, smooth_s: float, thresholds: Thresholds) -> Array:
-    """(2,) sums over rising and over falling load: squared increments of the reading beyond what a unit may do to it.
+def _unexplained(of: _Followed, load: Array, thresholds: Thresholds) -> Array:
+    """(2,) sums over rising and over falling ``load`` (b,): squared increments of the reading that no unit makes of it.
 
     Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
     """
     from scipy.ndimage import gaussian_filter1d
 
-    step_s = float(grid[1] - grid[0])
+    step_s = float(of.grid[1] - of.grid[0])
     shortest_s, longest_s = thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1]
     viscous = of_load(load, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
     rubbed = _play(viscous[:, 0], thresholds.standing * OCTAVES)
-    smooth = max(smooth_s / step_s, 1.0)
+    smooth = max(of.smooth_s / step_s, 1.0)
     matrix = gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1)
-    target = gaussian_filter1d(reading, smooth, order=1)
+    target = gaussian_filter1d(of.reading, smooth, order=1)
     moving = np.abs(matrix[:, 0]) > thresholds.faulty_share * np.max(np.abs(matrix[:, 0]))
-    limit = largest_of_noise(grid.size, thresholds) * float(np.median(np.abs(target[moving])))
+    limit = largest_of_noise(target.size, thresholds) * float(np.median(np.abs(target[moving])))
     target = np.clip(target, -limit, limit)
     matrix /= np.linalg.norm(matrix, axis=0) + 1e-300
     normal = matrix.T @ matrix

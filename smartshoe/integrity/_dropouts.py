@@ -23,11 +23,11 @@ from smartshoe.signals.masks import runs_of
 def dropouts(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``dropouts``; masked. To nothing or to rest, and to the upper end, where a wire that breaks reads as well.
 
-    A value that another recording of the unit dropped to (``view.dropped_to``) needs no fall from a large load here.
+    A value that another recording of the unit dropped to (``view.ends``) needs no fall from a large load here.
     """
     if view.span == 0.0:
         return
-    known = view.sign * view.dropped_to
+    known = view.sign * view.ends.dropouts
     is_upper = known > float(view.curve[1].max())
     at = dropped(view)
     if at.any() and not _one_level(view, at):
@@ -132,8 +132,7 @@ def _also_gone(view: View, at: Mask, known: Array) -> Mask:
         return near
     repeated = held(view, at)
     repeated[:-1] |= repeated[1:] & (y[1:] == y[:-1])
-    out: Mask = (near & isolated_beside(view, at)) | (exact & repeated) | _fallen(view, exact)
-    return out
+    return (near & isolated_beside(view, at)) | (exact & repeated) | _fallen(view, exact)
 
 
 def _fallen(view: View, exact: Mask) -> Mask:
@@ -150,14 +149,12 @@ def _fallen(view: View, exact: Mask) -> Mask:
 def common_values(y: Array, thresholds: Thresholds) -> Array:
     """The values that dropouts take exactly, where they do: a rail, a zero, an error code."""
     values, count = np.unique(y, return_counts=True)
-    out: Array = values[count > max(thresholds.faulty_share * y.size, 2)]
-    return out
+    return values[count > max(thresholds.faulty_share * y.size, 2)]
 
 
 def _near(view: View, level: float) -> Mask:
     within = view.reading.largest * view.reading.quiet_noise + view.thresholds.standing * view.span
-    out: Mask = np.abs(view.reading.values - level) <= within
-    return out
+    return np.abs(view.reading.values - level) <= within
 
 
 def _one_level(view: View, at: Mask) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Mask
 from smartshoe.display import first_names
 from smartshoe.errors import InputError
 from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
@@ -15,14 +15,14 @@ from smartshoe.integrity._dropouts import dropouts, load_dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity, OneClock
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
 from smartshoe.integrity._held import held_samples
-from smartshoe.integrity._held_rate import at_their_rates
-from smartshoe.integrity._interpolated import where_measured
-from smartshoe.integrity._lattice import quantisation
-from smartshoe.integrity._lines import hum
+from smartshoe.integrity._held_rate import without_held
+from smartshoe.integrity._hum import hum
+from smartshoe.integrity._interpolated import without_interpolated
+from smartshoe.integrity._quantisation import quantisation
 from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
-from smartshoe.integrity._view import Signal, View
+from smartshoe.integrity._view import UNKNOWN_ENDS, Ends, Signal, View
 from smartshoe.integrity._wild import with_missing, without_wild
 from smartshoe.integrity._wrapped import unwrapped
 from smartshoe.integrity.thresholds import Thresholds, decided_by
@@ -48,7 +48,6 @@ OF_VIEW: tuple[Callable[[View, Mask], Iterator[Finding]], ...] = (
     quantisation,
     hum,
 )
-NONE: Array = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,53 +86,63 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     """
     if not recordings:
         raise InputError("there is no recording to examine: give at least one file")
-    faults: list[DataFault] = []
-    usable: list[Mask] = []
-    refusals: list[str] = []
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
-    examined = [_examined(one, decided) for one in tamed]
-    told = [finding for one in examined for finding in one.findings]
-    dropped_to = np.unique(np.concatenate([one.values for one in told] or [NONE]))
-    rails = np.unique([one.rail for one in told if one.rail is not None])
-    if dropped_to.size + rails.size and len(recordings) > 1:
-        # What one recording teaches about the unit holds for the others.
-        examined = [_examined(one, decided, dropped_to, rails) for one in tamed]
-    with_load = [one.lags for one in examined if not one.is_against]
-    if len(with_load) < len(examined) and (theirs := one_clock(with_load, decided)) is not None:
-        examined = [
-            _as_others_follow(tame, one, theirs, decided, dropped_to, rails) if one.is_against else one
-            for tame, one in zip(tamed, examined, strict=True)
-        ]
-    kept: list[Recording] = []
-    for number, (tame, one) in enumerate(zip(tamed, examined, strict=True)):
-        recording, findings, mask = tame.recording, one.findings, one.usable
-        kept.append(_with_known_load(recording, findings))
-        faults += [_fault(number, recording, finding) for finding in findings]
-        refused = [f"{recording.label}: {finding.refuses}" for finding in findings if finding.refuses]
-        faulty = _at_fault(findings, mask.size)
-        if not refused and (decided.clear * (1.0 - faulty.mean()) < 1.0 or not mask.any()):
-            refused = [
-                f"{recording.label}: {100 * float(faulty.mean()):.0f} % of the samples are faulty"
-                f" ({', '.join(sorted({f.kind for f in findings if f.masks}))}): record it again"
-            ]
-        usable.append(np.zeros_like(mask) if refused else mask)
-        refusals += refused[:1]
+    examined = _examined_together(tamed, decided)
+    each = list(zip(tamed, examined, strict=True))
+    refused = [_refusal(tame.recording, one, decided) for tame, one in each]
+    usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
     shared = one_clock([one.lags for one, mask in zip(examined, usable, strict=True) if mask.any()], decided)
-    offset_s, rate = tuple(one.offset_s for one in examined), tuple(one.rate for one in examined)
-    return Integrity(tuple(kept), tuple(faults), tuple(usable), offset_s, rate, shared, tuple(refusals))
+    return Integrity(
+        tuple(_with_known_load(tame.recording, one.findings) for tame, one in each),
+        tuple(
+            _fault(number, tame.recording, finding)
+            for number, (tame, one) in enumerate(each)
+            for finding in one.findings
+        ),
+        tuple(usable),
+        tuple(one.offset_s for one in examined),
+        tuple(one.rate for one in examined),
+        shared,
+        tuple(why for why in refused if why is not None),
+    )
 
 
-def _at_fault(findings: Sequence[Finding], size: int) -> Mask:
-    """(n,) samples of a recording of ``size`` that a fault masks."""
-    masks = [finding.at for finding in findings if finding.masks]
-    return np.any(masks, axis=0) if masks else np.zeros(size, dtype=bool)
+def _examined_together(tamed: Sequence[_Tamed], thresholds: Thresholds) -> list[_Examined]:
+    """What was found in each recording, by all that the others tell of the sensor's ends and of the clocks."""
+    examined = [_examined(one, thresholds) for one in tamed]
+    ends = _ends_told_by([finding for one in examined for finding in one.findings])
+    if ends.dropouts.size + ends.rails.size and len(tamed) > 1:
+        examined = [_examined(one, thresholds, ends) for one in tamed]
+    with_load = [one.lags for one in examined if not one.is_against]
+    if len(with_load) == len(examined) or (theirs := one_clock(with_load, thresholds)) is None:
+        return examined
+    return [
+        _as_others_follow(tame, one, theirs, thresholds, ends) if one.is_against else one
+        for tame, one in zip(tamed, examined, strict=True)
+    ]
+
+
+def _refusal(recording: Recording, found: _Examined, thresholds: Thresholds) -> str | None:
+    """Why a recording is of no use, or None: a fatal fault, or hardly any sample that is not at fault."""
+    says = next((one.says for one in found.findings if one.severity == "fatal"), None)
+    masking = [one for one in found.findings if one.masks]
+    faulty = float(np.any([one.at for one in masking], axis=0).mean()) if masking else 0.0
+    if says is None and (thresholds.clear * (1.0 - faulty) < 1.0 or not found.usable.any()):
+        kinds = ", ".join(sorted({one.kind for one in masking}))
+        says = f"{100 * faulty:.0f} % of the samples are faulty ({kinds}): record it again"
+    return None if says is None else f"{recording.label}: {says}"
+
+
+def _ends_told_by(findings: Sequence[Finding]) -> Ends:
+    rails = [one.rail for one in findings if one.rail is not None]
+    return Ends(np.unique(np.concatenate([np.zeros(0), *(one.values for one in findings)])), np.unique(rails))
 
 
 def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tamed]:
     made = []
-    for read, held in at_their_rates(recordings, thresholds):
-        measured, between = where_measured(read, thresholds)
+    for read, held in without_held(recordings, thresholds):
+        measured, between = without_interpolated(read, thresholds)
         logged, wrapped = unwrapped(measured, thresholds)
         recording, wild = without_wild(logged, thresholds)
         made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild)))
@@ -146,13 +155,8 @@ def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recor
     return with_missing(recording, recording.load, np.any(none, axis=0)) if none else recording
 
 
-def _examined(
-    tame: _Tamed, thresholds: Thresholds, dropped_to: Array = NONE, rails: Array = NONE, *, turned: bool = False
-) -> _Examined:
-    """What was found in one recording; ``dropped_to`` and ``rails`` as in `View`.
-
-    ``turned``: its reading rises where it seems to fall.
-    """
+def _examined(tame: _Tamed, thresholds: Thresholds, ends: Ends = UNKNOWN_ENDS, *, turned: bool = False) -> _Examined:
+    """What was found in one recording; ``turned``: its reading rises where it seems to fall."""
     recording = tame.logged
     usable = np.ones(len(recording), dtype=bool)
     findings = list(short_recording(recording, thresholds))
@@ -162,17 +166,13 @@ def _examined(
     for finding in findings:
         if finding.masks:
             usable &= ~finding.at
-    view = None
-    lacking = _lacking(recording)
-    if lacking is not None:
-        findings.append(Finding("no_reference", np.ones(len(recording), dtype=bool), lacking, "fatal", True, lacking))
-    else:
-        view = _view(tame.recording, thresholds, dropped_to, rails)
-        if view is None:
-            says = "load and reading are hardly ever there at the same time: record them together"
-            findings.append(Finding("missing_samples", ~usable, says, "fatal", True, says))
+    if (lacking := _lacking(recording)) is not None:
+        fatal = Finding.fatal("no_reference", np.ones(len(recording), dtype=bool), lacking)
+        return _Examined([*findings, fatal], usable)
+    view = _view(tame.recording, thresholds, ends)
     if view is None:
-        return _Examined(findings, usable)
+        says = "load and reading are hardly ever there at the same time: record them together"
+        return _Examined([*findings, Finding.fatal("missing_samples", ~usable, says)], usable)
     view, seen = align(view.turned() if turned else view)
     for detect in OF_VIEW:
         bad = ~usable[view.index]
@@ -187,14 +187,12 @@ def _examined(
     return _Examined(findings, usable, view.offset_s, view.rate, seen)
 
 
-def _as_others_follow(
-    tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, dropped_to: Array, rails: Array
-) -> _Examined:
-    """A recording whose reading goes against the load, turned over where by the clock of the others it goes with it.
+def _as_others_follow(tame: _Tamed, mine: _Examined, theirs: OneClock, thresholds: Thresholds, ends: Ends) -> _Examined:
+    """A recording whose reading goes against the load, turned over if it then lags as the others do by their clocks.
 
-    Steps that are read late by half of one fall as the load rises; by the lag that all others have they rise.
+    A reading that is late by half a period of its load seems to fall as the load rises.
     """
-    over = _examined(tame, thresholds, dropped_to, rails, turned=True)
+    over = _examined(tame, thresholds, ends, turned=True)
     is_theirs = over.lags.are_of(theirs, thresholds) and over.lags.off_from_s(theirs) < mine.lags.off_from_s(theirs)
     return over if is_theirs and not over.is_against else mine
 
@@ -216,16 +214,15 @@ def _lacking(recording: Recording) -> str | None:
     return None if readings else f"there is no reading: name its column with --sensor{among}"
 
 
-def _view(recording: Recording, thresholds: Thresholds, dropped_to: Array, rails: Array = NONE) -> View | None:
+def _view(recording: Recording, thresholds: Thresholds, ends: Ends) -> View | None:
     """The recording where load and reading are both present, the reading rising with load; None where hardly ever."""
     load, sensor = recording.load, recording.sensor
     index = np.flatnonzero(load.present & sensor.present)
     if index.size < thresholds.least_samples:
         return None
     time_s, load_n, reading = recording.time_s[index], load.si[index], sensor.values[index]
-    force = Signal(load_n, thresholds)
-    read = Signal(reading, thresholds)
-    view = View(recording, index, time_s, force, read, 1, thresholds, dropped_to=dropped_to, rails=rails)
+    signals = Signal(load_n, thresholds), Signal(reading, thresholds)
+    view = View(recording, index, time_s, *signals, 1, thresholds, ends=ends)
     at, middle = view.curve
     falls = at.size > 1 and float(np.dot(at - at.mean(), middle - middle.mean())) < 0.0
     return view.turned() if falls else view

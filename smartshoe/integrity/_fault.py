@@ -46,7 +46,7 @@ class DataFault:
 class Finding:
     """What a detector hands back: ``at`` (n,) marks the samples at fault, over all samples of the recording.
 
-    Where ``masks`` is set no fit may use those samples. ``refuses`` is a sentence where the recording cannot be used.
+    Where ``masks`` is set no fit may use those samples.
     ``values`` (v,) are those that the reading takes exactly by this fault, as they were recorded; ``error`` that of
     `DataFault`. ``no_load`` (n,) marks samples of the load that are none. ``cut_off`` (n,) marks others than ``at``
     that no fit may use either, and that are as they must be: at rest beyond the end of the sensor. ``rail`` is the
@@ -58,12 +58,16 @@ class Finding:
     says: str
     severity: Severity = "material"
     masks: bool = False
-    refuses: str | None = None
     values: Array = field(default_factory=lambda: np.zeros(0))
     error: float = 0.0
     no_load: Mask | None = None
     cut_off: Mask | None = None
     rail: float | None = None
+
+    @classmethod
+    def fatal(cls, kind: str, at: Mask, says: str) -> Finding:
+        """One for which no sample of the recording can be used; it is refused by what ``says``."""
+        return cls(kind, at, says, "fatal", masks=True)
 
 
 @dataclass(frozen=True)

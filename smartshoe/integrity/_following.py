@@ -39,7 +39,7 @@ def does_not_follow_load(view: View, bad: Mask) -> Iterator[Finding]:
         )
         if view.load_span <= 2.0 * load.largest * load.quiet_noise:
             says = f"the load covers {view.load_span:.3g} N only, no more than its noise: load the unit over its range"
-    yield Finding("does_not_follow_load", whole, says, "fatal", True, says)
+    yield Finding.fatal("does_not_follow_load", whole, says)
 
 
 def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
@@ -53,7 +53,7 @@ def wrong_sign(view: View, bad: Mask) -> Iterator[Finding]:
             f"the load is negative in compression (it runs from {at[0]:.4g} to {at[-1]:.4g} N): turn its sign,"
             " compression is positive (a minus before the column does so: --force '-COLUMN')"
         )
-        yield Finding("wrong_sign", whole, says, "fatal", True, says)
+        yield Finding.fatal("wrong_sign", whole, says)
     elif view.sign < 0 and view.recording.sensor.unit.quantity in RISES_WITH_LOAD:
         name = view.recording.sensor.name
         says = f"the {name} falls as the load rises: turn the sign of one of the two (load is positive in compression)"
@@ -88,8 +88,7 @@ def _followed_share(view: View) -> tuple[float, float]:
 
 def _beyond(signal: Array, columns: Array) -> Array:
     """(n,) what ``columns`` (n, k) leave of a ``signal`` (n,)."""
-    out: Array = signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
-    return out
+    return signal - columns @ np.linalg.lstsq(columns, signal, rcond=None)[0]
 
 
 def _moves_with(load: Array, reading: Array, stride: float, thresholds: Thresholds) -> float:
@@ -109,5 +108,4 @@ def of_load(load: Array, step_s: float, time_constants_s: Sequence[float] | Arra
     """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
     f = (load - load.min()) / np.ptp(load)
     lags = [lagged(f, step_s, float(tau_s)) for tau_s in time_constants_s]
-    out: Array = np.stack([f, f**2, f**3, *lags], axis=1)
-    return out
+    return np.stack([f, f**2, f**3, *lags], axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._scales import ROUNDING, SECOND_DIFFERENCE
+from smartshoe.integrity._scales import ROUNDING, SECOND_DIFFERENCE, turns
 from smartshoe.integrity._view import View, toggling
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.signals.masks import runs_of
@@ -33,7 +33,7 @@ def held_samples(view: View, bad: Mask) -> Iterator[Finding]:
 def frozen(view: View) -> Finding | None:
     """Kind ``held_samples``: fatal; one value lasts longer than all else, while the load goes through most of its span.
 
-    What little is left may follow as it likes: the load explains hardly any of the whole, and the unit is not why.
+    Asked where the load explains hardly any of the reading: that is why, and not the unit.
     """
     starts, stops = runs_of(np.diff(view.reading.values) == 0.0)
     if starts.size == 0:
@@ -49,7 +49,7 @@ def frozen(view: View) -> Finding | None:
         f"the reading stands still from {view.time_s[first]:.4g} to {view.time_s[last]:.4g} s,"
         f" {100 * float(at.mean()):.0f} % of the samples, while the load moves: find what froze, and record it again"
     )
-    return Finding("held_samples", view.whole(at), says, "fatal", True, says)
+    return Finding.fatal("held_samples", view.whole(at), says)
 
 
 def held(view: View, bad: Mask) -> Mask:
@@ -103,8 +103,7 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     least = np.minimum(_noise_beside(y, starts, stops, given.local // 4), view.noise_at_load[starts])
     # A rail repeats without being held. Between two levels an undithered signal toggles, which looks like half a step
     # of noise and says nothing.
-    rail = (y[starts] == y.min()) | (y[starts] == y.max())
-    noisy = (least > toggling(given) * step) & ~rail & _alternates(y, starts, stops, given)
+    noisy = (least > toggling(given) * step) & ~_at_either_end(y, starts) & _alternates(y, starts, stops, given)
     within = np.ones(starts.size)
     within[noisy] = erf(np.maximum(step[noisy], _coincident_step(view, bad)) / (np.sqrt(8.0) * least[noisy]))
     within[noisy] = np.maximum(within[noisy], _common(y, starts[noisy], stops[noisy], given.local // 2))
@@ -113,8 +112,12 @@ def _log_chance(view: View, bad: Mask, starts: Index, stops: Index) -> Array:
     many = np.maximum(beyond / (3.0 * np.maximum(motion, 1e-300)), 1.0)
     noise = np.maximum(reading.noise[starts], reading.noise[stops])
     width = np.hypot(noise, UNIFORM_SD * step)
-    out: Array = repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
-    return out
+    return repeats * np.log(np.maximum(within, 1e-300)) - many * (beyond / width) ** 2
+
+
+def _at_either_end(y: Array, at: Index) -> Mask:
+    """(runs,) whether readings are the least or the largest of all."""
+    return np.asarray((y[at] == y.min()) | (y[at] == y.max()))
 
 
 def _coincident_step(view: View, bad: Mask) -> float:
@@ -144,8 +147,7 @@ def _noise_beside(y: Array, starts: Index, stops: Index, beside: int) -> Array:
         side = np.sqrt((power[b] - power[a]) / np.maximum(b - a, 1)) / SECOND_DIFFERENCE
         side = np.where(moving[b] - moving[a] < beside // 4, np.inf, side)
         least = np.where(b - a < beside // 2, 0.0, np.minimum(least, side))
-    out: Array = np.where(np.isfinite(least), least, 0.0)
-    return out
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def _common(y: Array, starts: Index, stops: Index, beside: int) -> Array:
@@ -158,30 +160,24 @@ def _common(y: Array, starts: Index, stops: Index, beside: int) -> Array:
         inside = (place >= 0) & (place < y.size)
         equal += (inside & (y[np.clip(place, 0, y.size - 1)] == y[starts][:, None])).sum(axis=1)
         there += inside.sum(axis=1)
-    out: Array = equal / np.maximum(there, 1.0)
-    return out
+    return equal / np.maximum(there, 1.0)
 
 
 def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -> Mask:
     """(runs,) whether second differences change sign more often than not before and after: noise, not curvature."""
     beside = thresholds.local // 2
-    second = np.diff(y, 2)
-    product = second[1:] * second[:-1]
-    turns = np.concatenate([[0], np.cumsum((product < 0.0).astype(np.int64))])
-    stays = np.concatenate([[0], np.cumsum((product > 0.0).astype(np.int64))])
+    counts = [np.concatenate([[0], np.cumsum(one)]) for one in turns(y)]
     turned, stayed = np.zeros(starts.size, dtype=np.int64), np.zeros(starts.size, dtype=np.int64)
     for low, high in ((starts - beside, starts - 2), (stops, stops + beside - 2)):
-        a, b = np.clip(low, 0, product.size), np.clip(high, 0, product.size)
-        turned += turns[b] - turns[a]
-        stayed += stays[b] - stays[a]
-    out: Mask = _is_noise(turned, stayed, thresholds) & (turned > thresholds.few)
-    return out
+        a, b = (np.clip(one, 0, counts[0].size - 1) for one in (low, high))
+        turned += counts[0][b] - counts[0][a]
+        stayed += counts[1][b] - counts[1][a]
+    return _is_noise(turned, stayed, thresholds) & (turned > thresholds.few)
 
 
-def _is_noise(turned: Index | np.integer, stayed: Index | np.integer, thresholds: Thresholds) -> Mask:
+def _is_noise(turned: Index | int, stayed: Index | int, thresholds: Thresholds) -> Mask:
     """Whether second differences change sign so much oftener than not: 2.7 times as often in white noise."""
-    out: Mask = np.asarray(turned > np.sqrt(thresholds.clear) * stayed)
-    return out
+    return np.asarray(turned > np.sqrt(thresholds.clear) * stayed)
 
 
 def _motion(view: View, starts: Index, stops: Index, step: Array) -> Array:
@@ -222,8 +218,7 @@ def _motion(view: View, starts: Index, stops: Index, step: Array) -> Array:
     moved = np.maximum(np.where(repeats > 2 * view.near, steady, plain), 0.0)
     least = np.where(long, np.minimum(least, given.clear * view.gain * moved), least)
     # A slope between two grid values is uncertain by a step.
-    out: Array = np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
-    return out
+    return np.where(agree & ~kept, np.maximum(least - step / reach, 0.0), 0.0)
 
 
 def _caught_up(view: View, starts: Index, stops: Index) -> Mask:
@@ -234,8 +229,8 @@ def _caught_up(view: View, starts: Index, stops: Index) -> Mask:
     out = np.zeros(starts.size, dtype=bool)
     y, load, jump = view.reading.values, view.load.values, view.jump
     noise = view.load.largest * view.load.quiet_noise
-    rail = (y[starts] == y.min()) | (y[starts] == y.max())  # there a dead band or saturation stands still
-    for i in np.flatnonzero((stops - starts >= 3) & (stops < y.size - 1) & ~rail):
+    inside = ~_at_either_end(y, starts)  # there a dead band or saturation stands still
+    for i in np.flatnonzero((stops - starts >= 3) & (stops < y.size - 1) & inside):
         first, last = int(starts[i]), int(stops[i])
         if jump[last] == 0.0:
             continue
@@ -272,11 +267,8 @@ def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
         near = max(y[max(first - beside, 0) : first + 1], y[last : last + beside + 1], key=len)
         if near.size <= given.local:
             continue
-        bends = np.diff(near, 2)
-        product = bends[1:] * bends[:-1]
-        alternates = bool(
-            _is_noise(np.count_nonzero(product < 0.0), np.count_nonzero(product > 0.0), given)
-        )  # and no curvature
+        turned, stayed = (int(one.sum()) for one in turns(near))
+        alternates = bool(_is_noise(turned, stayed, given))
         least = toggling(given) * view.reading.local_step[first]
-        out[i] = alternates and float(np.std(bends)) / SECOND_DIFFERENCE > least
+        out[i] = alternates and float(np.std(np.diff(near, 2))) / SECOND_DIFFERENCE > least
     return out

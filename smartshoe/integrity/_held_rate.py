@@ -12,7 +12,7 @@ from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
 
-def at_their_rates(recordings: Sequence[Recording], thresholds: Thresholds) -> list[tuple[Recording, list[Finding]]]:
+def without_held(recordings: Sequence[Recording], thresholds: Thresholds) -> list[tuple[Recording, list[Finding]]]:
     """Each recording at the moments at which the slowest of load and reading was read, and what is said of it.
 
     Between them that channel says nothing: taken for a load, its steps would be the reading's delay. What one recording
@@ -34,7 +34,7 @@ def _held_for(recording: Recording, thresholds: Thresholds) -> dict[str, tuple[i
     A coarse grid repeats values as well, but goes on by single steps of it, each as soon as it is due.
     """
     found = {}
-    for channel in (*recording.of_role("load"), *recording.of_role("sensor")):
+    for channel in recording.loads_and_sensors:
         change = np.abs(np.diff(channel.values[channel.present]))
         at = np.flatnonzero(change)
         if at.size < thresholds.few**2:

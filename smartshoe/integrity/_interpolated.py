@@ -25,21 +25,20 @@ SINGLE = float(np.finfo(np.float32).eps)
 
 
 @dataclass(frozen=True, eq=False)
-class _Lines:
-    """Knots (k,) at ``time_s`` between straight lines, usually ``apart_s``."""
+class _Knots:
+    """Where an interpolated channel bends: ``time_s`` (k,) of the knots, usually ``apart_s`` one from the next."""
 
     time_s: Array
     apart_s: float
 
 
-def where_measured(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
+def without_interpolated(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
     """The recording at the moments at which the slowest of load and reading was measured, and what is said of it.
 
     Between them that channel is no measurement: taken for one, the chords of its course would be the unit's dynamics.
     """
-    channels = (*recording.of_role("load"), *recording.of_role("sensor"))
-    found = {one.name: _lines(recording.time_s, one, thresholds) for one in channels}
-    told = {name: lines for name, lines in found.items() if lines is not None}
+    found = {one.name: _knots_of(recording.time_s, one, thresholds) for one in recording.loads_and_sensors}
+    told = {name: knots for name, knots in found.items() if knots is not None}
     if not told:
         return recording, []
     slowest = max(told, key=lambda name: told[name].apart_s)
@@ -51,8 +50,8 @@ def where_measured(recording: Recording, thresholds: Thresholds) -> tuple[Record
     return measured, [Finding("interpolated", np.ones(len(measured), dtype=bool), says)]
 
 
-def _lines(time_s: Array, channel: Channel, thresholds: Thresholds) -> _Lines | None:
-    """The pieces of lines, else of cubics, on which a channel lies wherever it moves; None where they are none."""
+def _knots_of(time_s: Array, channel: Channel, thresholds: Thresholds) -> _Knots | None:
+    """The knots of the lines, else cubics, on which a channel lies wherever it moves; None where it lies on none."""
     there = np.flatnonzero(channel.present)
     if there.size < thresholds.least_samples:
         return None
@@ -91,8 +90,7 @@ class _Bends:
 
     @property
     def are_sharp(self) -> Mask:
-        out: Mask = self.beside > 1.0
-        return out
+        return self.beside > 1.0
 
 
 def _bends(t: Array, v: Array, neighbours: Index, written: tuple[float, float]) -> _Bends:
@@ -112,7 +110,7 @@ def _bends(t: Array, v: Array, neighbours: Index, written: tuple[float, float]) 
     return _Bends(reach, beyond, off, np.abs(off) / np.maximum(rounding, 1e-300), rate != 0.0)
 
 
-def _between_knots(t: Array, v: Array, bends: _Bends, thresholds: Thresholds) -> _Lines | None:
+def _between_knots(t: Array, v: Array, bends: _Bends, thresholds: Thresholds) -> _Knots | None:
     """What lies between knots; None where that is not most of what moves, or no more than a machine's ramps.
 
     A measured channel bends at every sample, by its noise; a load without noise where the machine turns, starts or
@@ -145,14 +143,13 @@ def _between_knots(t: Array, v: Array, bends: _Bends, thresholds: Thresholds) ->
         return None
     if not _goes_on(np.interp(knots, np.arange(v.size), v), at_s, is_line, thresholds):
         return None
-    return _Lines(at_s[is_knot], apart_s)
+    return _Knots(at_s[is_knot], apart_s)
 
 
 def _sums(values: Array | Mask, starts: Index, stops: Index) -> Array:
     """(k,) sums of ``values`` over runs."""
     ends = np.stack([starts, stops], axis=1).ravel()
-    out: Array = np.add.reduceat(np.append(values, 0.0), ends)[::2]
-    return out
+    return np.add.reduceat(np.append(values, 0.0), ends)[::2]
 
 
 def _last_digit(values: Array) -> float:
@@ -175,9 +172,9 @@ def _goes_on(v: Array, at_s: Array, is_line: Mask, thresholds: Thresholds) -> bo
     return bool(on[both].sum() > thresholds.same * both.sum())
 
 
-def _moments(time_s: Array, lines: _Lines) -> Array:
+def _moments(time_s: Array, told: _Knots) -> Array:
     """(m,) the knots, and as many between and beside them as are missing where nothing bends."""
-    knots, apart_s = lines.time_s, lines.apart_s
+    knots, apart_s = told.time_s, told.apart_s
     first = knots[0] - apart_s * np.floor((knots[0] - time_s[0]) / apart_s)
     last = knots[-1] + apart_s * np.floor((time_s[-1] - knots[-1]) / apart_s)
     ends = np.concatenate([[first], knots, [last]])
@@ -204,11 +201,9 @@ def _taken_at(recording: Recording, slow: str, moments: Array) -> Recording:
             at = np.clip(np.searchsorted(t, moments), 2, t.size - 2)
             lines = [one.values[i] + (moments - t[i]) * _slope(t, one.values, i, k) for i, k in ((at - 1, -1), (at, 1))]
             values = 0.5 * (lines[0] + lines[1])
-        made = Channel.from_values(name, values, one.unit, one.role)
-        channels[name] = replace(made, range_=one.range_, resolution=one.resolution)
+        channels[name] = one.with_values(values)
     return replace(recording, time_s=moments, channels=channels)
 
 
 def _slope(t: Array, v: Array, at: Index, to: int) -> Array:
-    out: Array = (v[at + to] - v[at]) / (t[at + to] - t[at])
-    return out
+    return (v[at + to] - v[at]) / (t[at + to] - t[at])

@@ -63,7 +63,7 @@ def low_rail(view: View, bad: Mask) -> Iterator[Finding]:
 
 def _is_known(view: View, rail: float) -> bool:
     """Whether another recording of the unit shows that its sensor ends there."""
-    return bool(np.isin(view.sign * rail, view.rails))
+    return bool(np.isin(view.sign * rail, view.ends.rails))
 
 
 def _without_leaps(view: View, tied: Mask) -> Mask:

@@ -27,7 +27,7 @@ def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
     else:
         return
     says = f"the recording holds {held}: {mend}"
-    yield Finding("short_recording", np.ones(len(recording), dtype=bool), says, "fatal", True, says)
+    yield Finding.fatal("short_recording", np.ones(len(recording), dtype=bool), says)
 
 
 def missing_samples(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:

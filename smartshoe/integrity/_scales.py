@@ -22,8 +22,7 @@ def five_point_median(values: Array) -> Array:
     low_ab, high_ab = np.minimum(a, b), np.maximum(a, b)
     low_de, high_de = np.minimum(d, e), np.maximum(d, e)
     low, high = np.maximum(low_ab, low_de), np.minimum(high_ab, high_de)
-    out: Array = np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c))
-    return out
+    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
 
 
 def local_scale(deviation: Array, thresholds: Thresholds, step: float = 0.0) -> Array:
@@ -43,8 +42,7 @@ def local_scale(deviation: Array, thresholds: Thresholds, step: float = 0.0) -> 
     wide = body.copy()
     wide[1:] = np.maximum(wide[1:], body[:-1])
     wide[:-1] = np.maximum(wide[:-1], body[1:])
-    out: Array = wide[np.minimum(np.arange(n) // block, blocks - 1)]
-    return out
+    return np.asarray(wide[np.minimum(np.arange(n) // block, blocks - 1)])
 
 
 def _cut_short(deviations: float) -> float:
@@ -62,6 +60,13 @@ def white_noise(values: Array, thresholds: Thresholds, step: float) -> Array:
     return local_scale(second, thresholds, step)
 
 
+def turns(values: Array) -> tuple[Mask, Mask]:
+    """(n - 3,) each: where second differences change sign, as white noise's mostly do; and where they keep it."""
+    second = np.diff(values, 2)
+    product = second[1:] * second[:-1]
+    return product < 0.0, product > 0.0
+
+
 def slope_change(values: Array, noise: Array, near: int, largest: float) -> Array:
     """(n,) the largest change of increment (per sample) within ``near`` samples, less ``largest`` times the noise.
 
@@ -76,8 +81,7 @@ def slope_change(values: Array, noise: Array, near: int, largest: float) -> Arra
     sharp = np.zeros(n)
     sharp[1:-1] = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
     sharp = np.maximum(sharp - largest * SECOND_DIFFERENCE * noise, 0.0)
-    out: Array = maximum_filter1d(np.maximum(wide, sharp), 2 * near + 1, mode="nearest")
-    return out
+    return maximum_filter1d(np.maximum(wide, sharp), 2 * near + 1, mode="nearest")
 
 
 def own_corner(values: Array, near: int) -> Array:
@@ -90,11 +94,10 @@ def own_corner(values: Array, near: int) -> Array:
     padded = np.concatenate([np.full(reach, values[0]), values, np.full(reach, values[-1])])
     after = padded[2 * reach : 2 * reach + n] - padded[reach + 2 : reach + 2 + n]
     before = padded[reach - 2 : reach - 2 + n] - padded[:n]
-    out: Array = np.abs(after - before) / (reach - 2)
-    return out
+    return np.asarray(np.abs(after - before) / (reach - 2))
 
 
-def lattice_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
+def grid_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
     """The step of the grid on which values lie; 0 where there is none that can be found.
 
     ``levels`` (l,) are the values that occur, increasing, ``count`` (l,) how often. Values that occur once are left
@@ -133,8 +136,7 @@ def lattice_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
 def _fits(gaps: Array, step: float, within: float) -> Mask:
     """(g,) which gaps are multiples of ``step``, one at least, ``within`` a share of it."""
     multiple = np.rint(gaps / step)
-    out: Mask = (multiple >= 1.0) & (np.abs(gaps / step - multiple) < within)
-    return out
+    return (multiple >= 1.0) & (np.abs(gaps / step - multiple) < within)
 
 
 def _refined(gaps: Array, step: float, within: float) -> float:

@@ -67,8 +67,7 @@ def _line(values: Array, found: Mask, index: Index, at: Array | Index) -> Array:
     x0, y0 = (weight * away).sum(axis=1) / total, (weight * values[place]).sum(axis=1) / total
     x, y = away - x0[:, None], values[place] - y0[:, None]
     slope = (weight * x * y).sum(axis=1) / np.maximum((weight * x * x).sum(axis=1), 1e-300)
-    out: Array = np.where(count > 0.5 * index.shape[1], y0 - slope * x0, np.nan)
-    return out
+    return np.where(count > 0.5 * index.shape[1], y0 - slope * x0, np.nan)
 
 
 def lasting_jumps(view: View, found: Mask) -> Array:
@@ -85,8 +84,7 @@ def lasting_jumps(view: View, found: Mask) -> Array:
     after = _line(values, nothing, left[:, None] + 1 + np.arange(given.few), middle)
     size = after - before
     step = values[left + 1] - values[left]
-    out: Array = np.abs(size[(size * step > 0.0) & (given.clear * np.abs(size) > np.abs(step))])
-    return out
+    return np.abs(size[(size * step > 0.0) & (given.clear * np.abs(size) > np.abs(step))])
 
 
 def isolated_beside(view: View, bad: Mask) -> Mask:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,9 +12,10 @@ from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._scales import (
     SECOND_DIFFERENCE,
     five_point_median,
-    lattice_step,
+    grid_step,
     local_scale,
     slope_change,
+    turns,
     white_noise,
 )
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -47,7 +48,7 @@ class Signal:
     @cached_property
     def step(self) -> float:
         """The grid's step, 0 where there is none."""
-        return lattice_step(*self.levels, self.thresholds)
+        return grid_step(*self.levels, self.thresholds)
 
     @cached_property
     def least_gap(self) -> Array:
@@ -60,8 +61,7 @@ class Signal:
         gaps = np.diff(levels)
         beside = max(self.thresholds.local, round(self.thresholds.standing * gaps.size))
         least = minimum_filter1d(np.append(gaps, gaps[-1]), beside)
-        out: Array = least[np.searchsorted(levels, self.values)]
-        return out
+        return least[np.searchsorted(levels, self.values)]
 
     @cached_property
     def local_step(self) -> Array:
@@ -80,16 +80,14 @@ class Signal:
         place = np.minimum(np.searchsorted(levels, self.values), levels.size - 1)
         on = levels[place] == self.values
         # A peak may touch a level once: where most readings lie on a grid all do.
-        out: Array = np.where(on | (on.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[place], 0.0)
-        return out
+        return np.where(on | (on.mean() > 1.0 - self.thresholds.same), np.gradient(levels)[place], 0.0)
 
     @cached_property
     def is_noisy(self) -> bool:
         """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
-        second = np.diff(self.values, 2)
-        product = second[1:] * second[:-1]
+        turned, stayed = turns(self.values)
         least = max(toggling(self.thresholds) * self.step, self.thresholds.material * float(np.ptp(self.values)))
-        return bool((product < 0.0).sum() > (product > 0.0).sum()) and self.quiet_noise > least
+        return bool(turned.sum() > stayed.sum()) and self.quiet_noise > least
 
     @cached_property
     def outlying(self) -> Array:
@@ -110,13 +108,23 @@ class Signal:
 
 
 @dataclass(frozen=True, eq=False)
+class Ends:
+    """Readings, as recorded, to which a unit's sensor drops out, ``dropouts`` (v,), and where it ends, ``rails``."""
+
+    dropouts: Array
+    rails: Array
+
+
+UNKNOWN_ENDS = Ends(np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """A recording with both signals.
 
     ``index`` (m,) are the samples where both are present. ``reading`` is turned so that it rises with load (``sign``
     is -1 where it was turned), ``load`` is set on the reading's clock by the lag ``offset_s`` + ``rate`` (t - middle).
-    ``dropped_to`` (v,) are the values, as recorded, to which this unit is known to drop out, ``rails`` (r,) those at
-    which its sensor is known to end. ``is_swapped``: load and reading have changed places.
+    ``ends``: what all recordings tell of the unit's sensor. ``is_swapped``: load and reading have changed places.
     """
 
     recording: Recording
@@ -128,8 +136,7 @@ class View:
     thresholds: Thresholds
     offset_s: float = 0.0
     rate: float = 0.0
-    dropped_to: Array = field(default_factory=lambda: np.zeros(0))
-    rails: Array = field(default_factory=lambda: np.zeros(0))
+    ends: Ends = UNKNOWN_ENDS
     is_swapped: bool = False
 
     @cached_property
@@ -145,8 +152,7 @@ class View:
     @cached_property
     def gap(self) -> Mask:
         """(m - 1,) increments of time in which a sample is missing."""
-        out: Mask = np.diff(self.time_s) > 1.5 * self.step_s
-        return out
+        return np.diff(self.time_s) > 1.5 * self.step_s
 
     @cached_property
     def curve(self) -> tuple[Array, Array]:
@@ -181,15 +187,13 @@ class View:
             if cuts[i + 1] > cuts[i]:
                 part, rank = second[order[cuts[i] : cuts[i + 1]]], 3 * (cuts[i + 1] - cuts[i]) // 4
                 usual[i] = np.partition(part, rank)[rank]
-        out: Array = usual[place] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
-        return out
+        return usual[place] / (float(ndtri(0.875)) * SECOND_DIFFERENCE)
 
     @cached_property
     def expected(self) -> Array:
         """(m,) the static curve at each sample's load."""
         at, middle = self.curve
-        out: Array = np.interp(self.load.values, at, middle)
-        return out
+        return np.interp(self.load.values, at, middle)
 
     @cached_property
     def rest(self) -> float:
@@ -232,8 +236,7 @@ class View:
         """(m,) the load's mean over ``near`` samples."""
         from scipy.ndimage import uniform_filter1d
 
-        out: Array = uniform_filter1d(self.load.values, self.near, mode="nearest")
-        return out
+        return uniform_filter1d(self.load.values, self.near, mode="nearest")
 
     @cached_property
     def load_move(self) -> Array:
@@ -243,8 +246,7 @@ class View:
         step = np.abs(np.diff(self.steady_load))
         noise = np.sqrt(2.0) * self.load.largest * self.load.quiet_noise
         sharp = np.maximum(np.abs(np.diff(self.load.values)) - noise - self.load.step, 0.0)
-        out: Array = maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
-        return out
+        return maximum_filter1d(np.maximum(step, sharp), 2 * self.near + 1, mode="nearest")
 
     @cached_property
     def reading_move(self) -> Array:
@@ -267,8 +269,7 @@ class View:
         )
         excess = np.where(np.abs(step) > allowed, step, 0.0)
         excess[self.gap] = 0.0
-        out: Array = excess
-        return out
+        return excess
 
     @cached_property
     def jitter_reach(self) -> Array:
@@ -291,14 +292,12 @@ class View:
         jitter_s = float(np.median(self.reading.noise[steep] / slope[steep]))
         size = 2 * int(np.ceil(self.reading.largest * jitter_s / self.step_s)) + 1
         high = maximum_filter1d(self.expected_steadily, size, mode="nearest")
-        out: Array = high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
-        return out
+        return high - minimum_filter1d(self.expected_steadily, size, mode="nearest")
 
     @cached_property
     def expected_steadily(self) -> Array:
         """(m,) the static curve at each sample's load, the load's noise averaged."""
-        out: Array = np.interp(self.steady_load, *self.curve)
-        return out
+        return np.interp(self.steady_load, *self.curve)
 
     def turned(self) -> View:
         """The same with the reading turned over."""
@@ -310,8 +309,8 @@ class View:
         return replace(self, load=load, reading=reading, sign=-self.sign)
 
     def swapped(self) -> View:
-        """The reading for the load and the load for the reading; no value that this dropped to is known."""
-        return replace(self, load=self.reading, reading=self.load, sign=1, dropped_to=np.zeros(0), is_swapped=True)
+        """The reading for the load and the load for the reading, of which no ends are known."""
+        return replace(self, load=self.reading, reading=self.load, sign=1, ends=UNKNOWN_ENDS, is_swapped=True)
 
     def whole(self, at: Mask) -> Mask:
         """A mask (m,) over this view as one over all of the recording's samples."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Mask
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Channel, Recording
@@ -20,7 +19,7 @@ def without_wild(recording: Recording, thresholds: Thresholds) -> tuple[Recordin
     A few of them would make up the span of the signal, and what follows from it: its sign, its full scale, its noise.
     What load and reading do together was a press; but where both are one number, it is a logger's for nothing.
     """
-    channels = (*recording.of_role("load"), *recording.of_role("sensor"))
+    channels = recording.loads_and_sensors
     wild = {channel.name: _wild(channel, thresholds) for channel in channels}
     pressed = _together(channels, wild)
     findings = []
@@ -77,10 +76,4 @@ def with_missing(recording: Recording, channel: Channel, at: Mask) -> Recording:
     """``recording`` whose ``channel`` lacks the samples ``at`` (n,)."""
     values = channel.with_nan().copy()
     values[at] = np.nan
-    return with_values(recording, channel, values)
-
-
-def with_values(recording: Recording, channel: Channel, values: Array) -> Recording:
-    """``recording`` whose ``channel`` has ``values`` (n,) instead, NaN where there is none."""
-    other = Channel.from_values(channel.name, values, channel.unit, channel.role)
-    return recording.with_channel(replace(other, range_=channel.range_, resolution=channel.resolution))
+    return recording.with_channel(channel.with_values(values))

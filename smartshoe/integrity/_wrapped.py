@@ -6,7 +6,6 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.integrity._fault import Finding
-from smartshoe.integrity._wild import with_values
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
 
@@ -16,11 +15,11 @@ WORDS = (8, 10, 12, 14, 16, 18, 20, 24, 32)  # bits of counters and converters
 def unwrapped(recording: Recording, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
     """``recording`` with load and reading as they were before a counter ran over, and what is said of it.
 
-    Only whole numbers come from a counter. Its word is the shortest that holds them all. Its least value is the one
-    nearest to zero that this leaves open.
+    Only whole numbers come from a counter. Its word is the shortest that holds them all. What is counted on is shifted
+    by whole words, until its least value is nearest to zero.
     """
     findings = []
-    for channel in (*recording.of_role("load"), *recording.of_role("sensor")):
+    for channel in recording.loads_and_sensors:
         values = channel.values[channel.present]
         told = _bits(values)
         if values.size < thresholds.least_samples or told is None:
@@ -34,7 +33,7 @@ def unwrapped(recording: Recording, thresholds: Thresholds) -> tuple[Recording, 
         at[channel.present] = whole != values
         moved = channel.with_nan().copy()
         moved[channel.present] = whole
-        recording = with_values(recording, channel, moved)
+        recording = recording.with_channel(channel.with_values(moved))
         says = (
             f"{channel.name} is a counter of {told} bits that runs over: it is counted on, from {whole.min():.0f} to"
             f" {whole.max():.0f}; let the logger keep more bits"

@@ -118,10 +118,7 @@ class Thresholds:
         "effects depart by 5 to 40 %",
     )
     equivalent_odds: float = threshold(
-        0.3,
-        "odds",
-        "odds above which another law, or a kind, cannot be ruled out",
-        "about 1 in 4",
+        0.3, "odds", "odds above which another law, or a kind, cannot be ruled out", "about 1 in 4"
     )
     kind_odds: tuple[float, ...] = threshold(
         (2.77, -1.12, -0.99, -2.22),

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
+from smartshoe.diagnosis._scale import Scale, full_scale
+from smartshoe.diagnosis._session import Session, prepare
 
 Array = NDArray[np.float64]
 
@@ -40,4 +41,4 @@ def triangles(count: int = 8, period_s: float = 5.0, rest_s: float = 2.0, height
 def prepared(*runs: Recording, factor: int = 1, held: list[bool] | None = None) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in runs]
     scale = full_scale(runs, usable, STANDARD)
-    return prepare(runs, usable, held, scale, factor, STANDARD), scale
+    return prepare(runs, usable, held, scale, [factor], STANDARD), scale

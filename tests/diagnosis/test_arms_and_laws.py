@@ -18,6 +18,7 @@ from smartshoe.models.effects import blocks, catalogue, effect
 from smartshoe.models.extended import ExtendedModel
 
 MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
+NOTHING_FITTED = SimpleNamespace(sessions=())
 
 
 # -- arms -------------------------------------------------------------------------------------------------------------
@@ -78,7 +79,7 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
     monkeypatch.setattr(_arms, "state_at", lambda found, *given: found)
     state: Any = SimpleNamespace(
         fit=SimpleNamespace(model=replace(MODEL, relaxing_share=4.0, relaxation_rate_per_s=0.01)),
-        likelihood=lambda sessions: None, thresholds=STANDARD, evidence=SimpleNamespace(odds=10.0),
+        likelihood=lambda: None, thresholds=STANDARD, evidence=SimpleNamespace(odds=10.0), given=NOTHING_FITTED,
     )  # fmt: skip
     # The fastest and the slowest of memories are no more such themselves: of a usual arm is that between.
     for there, fall, taken, going_on in (
@@ -91,7 +92,7 @@ def test_a_usual_arm_is_tried_at_each_memory_with_the_few_effects_that_promise_m
         ends.update(there)
         falls.update(b=fall)
         gone_on.clear()
-        found: Any = _arms.with_a_usual_arm(state, [])
+        found: Any = _arms.with_a_usual_arm(state)
         assert (found.one, gone_on) == (taken, going_on)
     arms = [((), 0.08, 1.0 / tau_s, one, 4) for tau_s in STANDARD.memory_s for one in ("best", "a", "b")]
     assert tried == arms * 4
@@ -121,10 +122,10 @@ def test_a_latency_is_the_best_that_is_not_there_yet_beside_a_usual_arm(monkeypa
     likelihood = SimpleNamespace(sessions=())
     stretched = ExtendedModel(1.0, 5.0, 50.0, 800.0, 140.0, "mbar").with_part("delay")
     state: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=stretched), likelihood=lambda sessions: likelihood, thresholds=STANDARD
+        fit=SimpleNamespace(model=stretched), likelihood=lambda: likelihood, thresholds=STANDARD
     )
     expected = [name for name in latencies if name != "delay"]
-    assert _arms.with_a_latency(state, []) == max(expected, key=len)  # type: ignore[comparison-overlap]
+    assert _arms.with_a_latency(state) == max(expected, key=len)  # type: ignore[comparison-overlap]
     assert begun == [(name, ("delay",), 0.08, 0.22) for name in expected]
 
 
@@ -153,10 +154,10 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
     monkeypatch.setattr(_arms, "state_at", lambda found, *given: found)
     for odds, rate in ((10.0, 1.0 / 3.0), (1.0, 0.2)):
         state: Any = SimpleNamespace(
-            fit=SimpleNamespace(model=model), likelihood=lambda sessions: None, thresholds=STANDARD,
-            evidence=SimpleNamespace(odds=odds),
+            fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD,
+            evidence=SimpleNamespace(odds=odds), given=NOTHING_FITTED,
         )  # fmt: skip
-        found: Any = _arms.with_an_arm_that_creeps(state, [])
+        found: Any = _arms.with_an_arm_that_creeps(state)
         assert (found.model.relaxation_rate_per_s, found.steps) == (rate, 25)  # the best go on to their end
     memories = [((), 0.08, 1.0 / tau_s) for tau_s in STANDARD.memory_s]
     arms = [*memories, ((), pytest.approx(0.2), pytest.approx(0.2))]
@@ -172,7 +173,7 @@ def test_an_arm_that_creeps_is_tried_for_each_memory_and_each_effects_arm(monkey
         return SimpleNamespace(model=start, cost=costs[start.relaxation_rate_per_s])
 
     monkeypatch.setattr(_arms, "fit", poled)
-    best: Any = _arms.with_another_pole(state, [])
+    best: Any = _arms.with_another_pole(state)
     assert rates == [1.0 / tau_s for tau_s in STANDARD.memory_s]
     assert best.model.relaxation_rate_per_s == 1.0 / 3.0
 
@@ -191,12 +192,12 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
         model = SimpleNamespace(names=(), parts=(), without=lambda other: f"without {other}")
         return SimpleNamespace(
             name=name, fit=SimpleNamespace(model=model), chosen=(), improved=0.0, thresholds=None, banned=("z",),
-            evidence=SimpleNamespace(odds=10.0), likelihood=lambda sessions: None,
+            evidence=SimpleNamespace(odds=10.0), likelihood=lambda: None,
         )  # fmt: skip
 
     banned: list[Any] = []
 
-    def stated(found: Any, sessions: Any, thresholds: Any, without: Any) -> Any:
+    def stated(found: Any, without: Any) -> Any:
         banned.append(without)
         return state(f"tried {found[-1]}")
 
@@ -206,7 +207,7 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
     monkeypatch.setattr(_settling, "_is_simpler", lambda *given: simpler)
     monkeypatch.setattr(_settling, "state_at", stated)
     monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
-    assert _settling.settled(state("first"), [], lambda said: None).name == ends  # type: ignore[attr-defined]
+    assert _settling.settled(state("first"), lambda said: None).name == ends  # type: ignore[attr-defined]
     assert tried == [("without a", "arm a"), ("without b", "arm b")]
     assert banned == [("z",), ("z",)] * simpler
 
@@ -220,9 +221,7 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
     assert _replaced_with(other) == (other.name,)
     chosen = tuple(SimpleNamespace(effect=one, name=one.name) for one in (curve, effect("dead_band"), other))
     about: Any = SimpleNamespace(model=MODEL.with_part(curve).with_part(other))
-    state: Any = SimpleNamespace(
-        chosen=chosen, fit=about, thresholds=STANDARD, banned=("z",), likelihood=lambda sessions: None
-    )
+    state: Any = SimpleNamespace(chosen=chosen, fit=about, thresholds=STANDARD, banned=("z",), likelihood=lambda: None)
     lawful: Any = SimpleNamespace(model=MODEL)
     asked: list[Any] = []
     bound = STANDARD.departure**2
@@ -238,15 +237,15 @@ def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeyp
         monkeypatch.setattr(_laws, "_law_of", law_of)
         monkeypatch.setattr(
             _laws, "state_at",
-            lambda law, sessions, thresholds, without: SimpleNamespace(
-                law=law, banned=without, thresholds=STANDARD, likelihood=lambda sessions: None
+            lambda law, without: SimpleNamespace(
+                law=law, banned=without, thresholds=STANDARD, likelihood=lambda: None
             ),
         )  # fmt: skip
-        found: Any = with_laws(state, MODEL, [])
+        found: Any = with_laws(state, MODEL)
         assert (found.law, found.banned) == (lawful, ("z", *banned))
         assert asked == [curve, other]
     monkeypatch.setattr(_laws, "_law_of", lambda *given: None)
-    assert with_laws(state, MODEL, []) is state
+    assert with_laws(state, MODEL) is state
 
 
 def _weighed(
@@ -273,7 +272,7 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     asked: list[str] = []
     anew: list[str] = []
 
-    def about(model: Any, sessions: Any, evidence: Any, beside: Any = None) -> Any:
+    def about(model: Any, evidence: Any, beside: Any = None) -> Any:
         name = model if isinstance(model, str) else "found"
         if beside is None and name != "found":  # linearised anew, and for all that it is
             anew.append(name)
@@ -294,7 +293,7 @@ def test_a_likelier_set_is_a_fit_without_a_member_or_with_another_in_its_place(m
     def told(*members: Any) -> list[str]:
         asked.clear()
         anew.clear()
-        states = [*likelier(found, evidence, members, [])]
+        states = [*likelier(found, evidence, members)]
         assert {state.given for state in states} <= {f"given {name}" for name in anew}
         return [state.fit.model for state in states]  # type: ignore[misc]
 

@@ -19,6 +19,7 @@ from smartshoe.diagnosis._baseline import POLES_PER_S, USUAL, _wall_ratio, basel
 from smartshoe.diagnosis._force import force_error
 from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual_of
 from smartshoe.diagnosis._noise import FLOOR, correlated_sd
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import (
     Candidate,
     Linearised,
@@ -33,7 +34,6 @@ from smartshoe.diagnosis._sensitivity import (
     nuisances,
     where,
 )
-from smartshoe.diagnosis._session import Scale
 from smartshoe.models.core import USUAL_WALL_RATIO
 from smartshoe.models.effects import Conditions, effect, is_told_from_its_family
 from smartshoe.models.effects.exposure import WORDS
@@ -500,7 +500,7 @@ def test_a_gain_is_of_norms_and_its_interval_of_cycles_left_out_in_turn() -> Non
 
     for count in (12, 3, 2):
         a, b = after.squares[:count], before.squares[:count]
-        found = gain(replace(before, squares=b), replace(after, squares=a), SCALE)
+        found = gain(replace(before, squares=b), replace(after, squares=a), SCALE, STANDARD)
         whole = math.log(sum(a) / sum(b))
         assert found.gain_percent == pytest.approx(gained(whole))
         kept = [[k for k in range(count) if k != out] for out in range(count)]
@@ -514,10 +514,10 @@ def test_a_gain_is_of_norms_and_its_interval_of_cycles_left_out_in_turn() -> Non
 def test_no_error_at_all_is_a_number_too() -> None:
     none, some = (Errors(np.full(3, size), np.full(3, 5.0), 1.0) for size in (0.0, 1.0))
     one = replace(some, squares=np.array([1.0, 0.0, 0.0]))
-    assert gain(none, none, SCALE).gain_percent == 0.0
-    assert gain(some, none, SCALE).gain_percent == pytest.approx(100.0)
+    assert gain(none, none, SCALE, STANDARD).gain_percent == 0.0
+    assert gain(some, none, SCALE, STANDARD).gain_percent == pytest.approx(100.0)
     for before, after in ((none, some), (one, some), (some, one)):
-        found = gain(before, after, SCALE)
+        found = gain(before, after, SCALE, STANDARD)
         assert np.isfinite([found.gain_percent, *found.ci95]).all()
 
 
@@ -531,7 +531,7 @@ def test_models_that_are_alike_differ_beyond_chance_as_often_as_an_interval_says
     times = np.ones(count)
     losses = gains = certain = 0
     for first, second in zip(np.sum((shared + own) ** 2, 2), np.sum((shared + other) ** 2, 2), strict=True):
-        found = gain(Errors(first, times, 1.0), Errors(second, times, 1.0), SCALE)
+        found = gain(Errors(first, times, 1.0), Errors(second, times, 1.0), SCALE, STANDARD)
         losses += found.ci95[1] < 0.0
         gains += found.ci95[0] > 0.0
         certain += found.is_loss
@@ -545,7 +545,7 @@ def test_a_loss_is_of_what_is_material_and_of_more_than_a_few_cycles(count: int,
     rmse = 0.01 + grows * STANDARD.material
     cycles = np.linspace(0.9, 1.1, count)
     before, after = (Errors(cycles * square, np.ones(count), 1.0) for square in (1e-4, rmse**2))
-    found = gain(before, after, SCALE)
+    found = gain(before, after, SCALE, STANDARD)
     assert found.ci95[1] < 0.0
     assert found.is_loss is is_loss
     coarse = replace(STANDARD, material=2.0 * STANDARD.material)

@@ -20,7 +20,7 @@ from smartshoe.diagnosis._characteristic import (
     friction_of,
 )
 from smartshoe.diagnosis._ranges import Ranges, _between, _gain, ranges_of
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 

@@ -20,7 +20,7 @@ from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._gauss_markov import gauss_markov_of
 from smartshoe.diagnosis._inference import independent
 from smartshoe.diagnosis._lack_of_fit import slow
-from smartshoe.diagnosis._residual_structure import where
+from smartshoe.diagnosis._residual_structure import worst_place
 from smartshoe.diagnosis._session import Session
 from smartshoe.diagnosis._zero import offsets
 from smartshoe.diagnosis.decay import decay_of
@@ -112,7 +112,7 @@ def test_it_is_said_where_the_slow_part_is_not_where_samples_jump(sessions: list
     quiet, drifting, jumping = (np.zeros(session.reading.size) for session in sessions)
     drifting += 0.012
     jumping += 0.05 * (-1.0) ** np.arange(jumping.size)
-    said = where(sessions, [quiet, drifting, jumping], Thresholds())
+    said = worst_place(sessions, [quiet, drifting, jumping], Thresholds())
     assert f"; the worst stretch is {sessions[1].recording.name}, " in said
 
 

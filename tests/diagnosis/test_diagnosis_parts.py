@@ -20,7 +20,8 @@ from smartshoe.diagnosis._lack_of_fit import repeating, slow
 from smartshoe.diagnosis._likelihood import Likelihood, fit
 from smartshoe.diagnosis._next_experiment import expected_margin
 from smartshoe.diagnosis._noise import correlated_sd
-from smartshoe.diagnosis._session import Scale, Session, full_scale, kernel, prepare, smoothed, thinning
+from smartshoe.diagnosis._scale import Scale, full_scale, thinning
+from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -71,7 +72,7 @@ def test_held_out_recordings_are_never_fitted() -> None:
     pair = [recording(seed=1), recording(seed=2)]
     usable = [one.sensor.present for one in pair]
     scale = full_scale(pair, usable, Thresholds())
-    first, second = prepare(pair, usable, [False, True], scale, 3, Thresholds())
+    first, second = prepare(pair, usable, [False, True], scale, [3], Thresholds())
     assert first.fitted.all()
     assert not second.fitted.any()
 
@@ -195,10 +196,10 @@ def test_a_gains_interval_holds_the_gain_and_shrinks_to_nothing_for_nothing() ->
     plain = baseline_of(sessions, scale)
     start = fit(likelihood_of(sessions, plain), plain).model
     better = fit(likelihood_of(sessions, plain), start.with_part(effect("gas_compression"))).model
-    won = gain(errors(sessions, start), errors(sessions, better), scale)
+    won = gain(errors(sessions, start), errors(sessions, better), scale, Thresholds())
     assert won.ci95[0] <= won.gain_percent <= won.ci95[1]
     assert won.gain_percent > 30.0
-    nothing = gain(errors(sessions, start), errors(sessions, start), scale)
+    nothing = gain(errors(sessions, start), errors(sessions, start), scale, Thresholds())
     assert nothing.gain_percent == 0.0
     assert nothing.ci95 == (0.0, 0.0)
 

@@ -95,7 +95,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     given = SimpleNamespace(
         sessions=[held, fitted], fine=[FINE], scale=SCALE, limits=["limit"], start="start",
         excitation=SimpleNamespace(goes_with_the_clock=False, shows=lambda _: True),
-        is_no_unit=False, clocks=(), is_moved=False,
+        is_no_unit=False, clocks=(), is_moved=False, thresholds=STANDARD,
     )  # fmt: skip
     extended = MODEL.with_part("linear_leak").with_part("delay", np.array([0.2]))
     core = SimpleNamespace(effect=effect("second_relaxation"), size=0.5, name="second_relaxation")
@@ -274,7 +274,7 @@ def test_what_the_extended_model_does_away_with_for_certain_is_not_good_enough_w
     of = {False: Errors(0.2**2 * counts, counts, 0.4), True: Errors(after**2 * counts, counts, 0.4)}
     monkeypatch.setattr(_procedure, "errors", lambda fine, model: of[bool(model.parts)])
     said: list[str] = []
-    given = STANDARD if material is None else replace(STANDARD, material=material)
+    given = parts.given.thresholds = STANDARD if material is None else replace(STANDARD, material=material)
     integrity: Any = SimpleNamespace(faults=(FAULT,))
     told = diagnosed(["recordings"], 1, integrity, given, said.append)  # type: ignore[list-item]
     assert told.verdict == verdict

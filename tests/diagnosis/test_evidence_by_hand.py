@@ -15,9 +15,10 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._next_experiment import expected_margin
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._search import additions, allowed, search, step
 from smartshoe.diagnosis._sensitivity import Linearised, departures, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import Scale, Session, prepare
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._state import searched, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.models.effects import Conditions, effect
@@ -47,7 +48,7 @@ def _run(model: ExtendedModel, seed: int, noise: float = SD) -> Recording:
 def _sessions(model: ExtendedModel, count: int = 2, noise: float = SD, thinned: int = 12) -> list[Session]:
     runs = [_run(model, seed, noise) for seed in range(count)]
     usable = [one.sensor.present for one in runs]
-    return prepare(runs, usable, [False] * count, SCALE, thinned, STANDARD)
+    return prepare(runs, usable, [False] * count, SCALE, [thinned], STANDARD)
 
 
 @pytest.fixture(scope="module")
@@ -319,7 +320,7 @@ def test_what_is_found_is_begun_with_at_about_its_size(two: tuple[Linearised, Ev
 def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linearised, Evidence]) -> None:
     given, _ = two
     plain = fit(Likelihood(given.sessions, SD, MODEL, STANDARD), MODEL)
-    state = state_at(plain, given.sessions, STANDARD)
+    state = state_at(plain)
     assert state.start == ()
     assert state.improved == pytest.approx(state.evidence.posterior(()).score - state.best.score)
     assert state.improved > state.evidence.odds
@@ -327,7 +328,7 @@ def test_a_state_says_what_a_new_set_is_worth_and_what_bends_it(two: tuple[Linea
     large = max(state.best.sizes)
     for linear, bends in ((0.5 * large, True), (2.0 * large, False)):
         limits = replace(STANDARD, linear=linear)
-        again = state_at(plain, given.sessions, limits)
+        again = state_at(fit(Likelihood(given.sessions, SD, MODEL, limits), MODEL))
         assert again.bends is bends
         # Only one change where it bends: the next linearisation may tell another.
         assert (len(again.best.members) == 1) is bends

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from told_evidence import STANDARD, session_of
+from told_evidence import STANDARD, session_of, taken_for_exact
 
 from smartshoe.diagnosis._evidence import Evidence, _factor
 from smartshoe.diagnosis._sensitivity import Linearised, departures, nuisance_precision
@@ -179,7 +179,7 @@ def test_a_sets_evidence_is_that_of_its_density_to_the_digit(
 ) -> None:
     evidence = Evidence(given, SD)
     odds = sum(ODDS + SHAPES[m] for m in members)
-    exact, plain = evidence.exact(members), twin.solved(members, None)
+    exact, plain = taken_for_exact(evidence, members), twin.solved(members, None)
     assert exact.score - odds == pytest.approx(plain[0], rel=1e-7)
     for member, strengths in zip(members, exact.strengths, strict=True):
         assert strengths == pytest.approx(plain[1][member], rel=1e-5)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from told_evidence import taken_for_exact
 
 from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
@@ -24,8 +25,9 @@ from smartshoe.diagnosis._gains_and_zeros import (
 )
 from smartshoe.diagnosis._held_out import own_of
 from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import Scale, Session, prepare
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._state import State, state_at
 from smartshoe.diagnosis._step_columns import StepColumns
 from smartshoe.diagnosis._validation import error_of
@@ -55,7 +57,7 @@ def _run(number: int, gain: float, **metadata: str) -> Recording:
 
 def _sessions(*runs: Recording) -> list[Session]:
     usable = [one.sensor.present for one in runs]
-    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), 4, STANDARD)
+    return prepare(list(runs), usable, [False] * len(runs), Scale(800.0, SPAN_MBAR, MILLIBAR), [4], STANDARD)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +108,7 @@ def test_evidence_with_and_without_gains_differs_as_the_explicit_densities_do(
     for member in (None, curve):
         members = () if member is None else (member,)
         # Of one equation that is taken for exact: departures are no matter of gains.
-        fast = [one.score_beside(members) - one.posterior(members).score + one.exact(members).score
+        fast = [one.score_beside(members) - one.posterior(members).score + taken_for_exact(one, members).score
                 for one in (plain, beside)]  # fmt: skip
         slow = [_density(given, some, member) for some in (sessions, gained)]
         assert fast[0] - fast[1] == pytest.approx(slow[0] - slow[1], abs=0.1 + 1e-4 * abs(slow[0] - slow[1]))
@@ -139,7 +141,7 @@ def test_without_gains_the_offset_and_past_are_all_that_is_a_recordings_own(sess
 
 
 def _state(model: ExtendedModel, sessions: list[Session]) -> State:
-    return state_at(fit(Likelihood(sessions, SD, model, STANDARD), model), sessions, STANDARD)
+    return state_at(fit(Likelihood(sessions, SD, model, STANDARD), model))
 
 
 def test_gains_are_asked_for_where_more_is_left_than_imperfections_or_something_goes_with_cycles() -> None:

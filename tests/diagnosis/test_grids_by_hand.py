@@ -15,7 +15,8 @@ from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import followed_share, noise_sd, without_noise
 from smartshoe.diagnosis._jittered import as_sampled, jitter_s
-from smartshoe.diagnosis._session import Scale, Session, kernel, prepare, smoothed
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
 from smartshoe.integrity.thresholds import largest_of_noise
 from smartshoe.units import MILLIBAR, VOLT
 
@@ -35,7 +36,7 @@ def _course(*corners: tuple[int, float], begun: float = 0.0) -> Array:
 
 
 def _prepared(run: Recording, scale: Scale = SCALE, factor: int = 1) -> Session:
-    return prepare([run], [np.ones(len(run), dtype=bool)], [False], scale, factor, STANDARD)[0]
+    return prepare([run], [np.ones(len(run), dtype=bool)], [False], scale, [factor], STANDARD)[0]
 
 
 def _pressed(load: Array, reading: Array | None = None, unit: str = "mbar") -> Recording:

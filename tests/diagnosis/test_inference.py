@@ -10,13 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from told_evidence import taken_for_exact
 
 from smartshoe import Recording, diagnose, dynamic_protocol
 from smartshoe.diagnosis import Diagnosis, Thresholds, described
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
+from smartshoe.diagnosis._scale import full_scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision, nuisances
-from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._session import prepare
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
 
@@ -59,7 +61,7 @@ def small() -> Linearised:
     pair = [recording(MODEL.with_part(effect("gas_compression"), np.array([0.05])), seed) for seed in range(2)]
     usable = [one.sensor.present for one in pair]
     scale = full_scale(pair, usable, Thresholds())
-    sessions = prepare(pair, usable, [False, False], scale, 8, Thresholds())
+    sessions = prepare(pair, usable, [False, False], scale, [8], Thresholds())
     return linearised(baseline_of(sessions, scale), sessions, Thresholds())
 
 
@@ -92,7 +94,7 @@ def test_the_evidence_is_the_gaussian_density_of_the_explicit_covariance(small: 
     evidence = Evidence(small, sd)
     sets = [(k,) for k in (0, 5, 11, 30)]
     slow = [plain_score(small, sd, members) for members in [(), *sets]]
-    fast = [evidence.exact(members).score - evidence.odds_of(members) for members in [(), *sets]]
+    fast = [taken_for_exact(evidence, members).score - evidence.odds_of(members) for members in [(), *sets]]
     # Both are known up to one constant.
     assert_allclose(np.diff(fast), np.diff(slow), rtol=1e-4, atol=0.05)
 
@@ -105,7 +107,7 @@ def test_what_any_effect_adds_to_a_good_unit_is_its_imperfection_whatever_is_mat
     sd, usual, member = 0.002, Evidence(small, 0.002), (11,)
     given = replace(small, thresholds=replace(Thresholds(), **{field: 2e-3}))
     evidence = Evidence(given, sd)
-    gained = [one.exact(member).score - one.exact(()).score for one in (usual, evidence)]
+    gained = [taken_for_exact(one, member).score - taken_for_exact(one, ()).score for one in (usual, evidence)]
     slow = plain_score(given, sd, member) - plain_score(given, sd, ())
     assert gained[1] - evidence.odds_of(member) == pytest.approx(slow, rel=1e-4, abs=0.05)
     assert (gained[0] == pytest.approx(gained[1], rel=1e-9)) is (field == "material")
@@ -114,7 +116,7 @@ def test_what_any_effect_adds_to_a_good_unit_is_its_imperfection_whatever_is_mat
 def test_every_extension_is_the_score_of_the_extended_set(small: Linearised) -> None:
     evidence = Evidence(small, 0.002)
     for score, k, strengths in evidence.extensions(()):
-        exact = evidence.exact((k,))
+        exact = taken_for_exact(evidence, (k,))
         assert score == pytest.approx(exact.score, abs=1e-3)
         assert_allclose(strengths, exact.strengths[0], rtol=1e-3, atol=1e-9)
 

@@ -15,10 +15,10 @@ from smartshoe.diagnosis import _inference
 from smartshoe.diagnosis._inference import (
     _best_alone,
     _is_likelier,
-    _Judged,
-    _judged,
     _redundant,
     _screening,
+    _Validated,
+    _validated,
     _without_redundant,
     independent,
     infer,
@@ -75,13 +75,13 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
         fit = SimpleNamespace(model=SimpleNamespace(relaxing_share=told.share, name=name, names=names))
         return SimpleNamespace(
             name=name, chosen=told.chosen, fit=fit, banned=(), evidence=SimpleNamespace(odds=1.0), thresholds=STANDARD,
-            likelihood=lambda sessions: "likelihood",
+            likelihood=lambda: "likelihood",
         )  # fmt: skip
 
-    def settled(one: Any, sessions: Any, progress: Any) -> Any:
+    def settled(one: Any, progress: Any) -> Any:
         return state(f"settled {one.name}")
 
-    def better_from(begun: Any, one: Any, sessions: Any, progress: Any) -> Any:
+    def better_from(begun: Any, one: Any, progress: Any) -> Any:
         return state(f"(settled {begun.name} or {one.name})")
 
     def named(name: str) -> Callable[..., Any]:
@@ -100,11 +100,11 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
             with_nothing_but=lambda plain: judged(one, plain, ()),
         )
 
-    def likelier(found: Any, evidence: Any, members: Any, sessions: Any) -> Any:
+    def likelier(found: Any, evidence: Any, members: Any) -> Any:
         told.changeable.append([one.name for one in members])
         return iter([state(f"{change} {found.model}") for change in (told.changes.pop() if told.changes else ())])
 
-    def without_redundant(found: Any, given: Any, sessions: Any) -> Any:
+    def without_redundant(found: Any, given: Any) -> Any:
         told.weighed.append((found.fit.model, given is plain))
         return found, found.members()
 
@@ -121,21 +121,21 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "settled", settled)
     monkeypatch.setattr(_inference, "better_from", better_from)
-    monkeypatch.setattr(_inference, "better_from_one", lambda begun, one, sessions, progress: one)
-    monkeypatch.setattr(_inference, "simpler", lambda other, one, sessions: state(f"({other.name} or {one.name})"))
+    monkeypatch.setattr(_inference, "better_from_one", lambda begun, one, progress: one)
+    monkeypatch.setattr(_inference, "simpler", lambda other, one: state(f"({other.name} or {one.name})"))
     monkeypatch.setattr(_inference, "with_a_latency", named("late"))
     monkeypatch.setattr(_inference, "with_a_usual_arm", named("usual"))
     monkeypatch.setattr(_inference, "with_another_pole", named("pole"))
     monkeypatch.setattr(_inference, "with_an_arm_that_creeps", named("creeping"))
-    monkeypatch.setattr(_inference, "with_laws", lambda one, model, sessions: told.lawful or one)
-    monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one, sessions: lawful if told.is_law else one)
+    monkeypatch.setattr(_inference, "with_laws", lambda one, model: told.lawful or one)
+    monkeypatch.setattr(_inference, "law_or_block", lambda lawful, one: lawful if told.is_law else one)
     monkeypatch.setattr(_inference, "with_likelier_gains", lambda state, sessions: None)
-    monkeypatch.setattr(_inference, "_judged", judged)
+    monkeypatch.setattr(_inference, "_validated", judged)
     monkeypatch.setattr(_inference, "_without_redundant", without_redundant)
     monkeypatch.setattr(_inference, "_best_alone", lambda *given: told.alone)
     monkeypatch.setattr(_inference, "probability_of_kind", lambda one, left, thresholds: one if left == 0.0 else 0.0)
     monkeypatch.setattr(_inference, "likelier", likelier)
-    monkeypatch.setattr(_inference, "_is_likelier", lambda other, found, sessions: other.fit.model not in told.unlikely)
+    monkeypatch.setattr(_inference, "_is_likelier", lambda other, found: other.fit.model not in told.unlikely)
     told.state, told.plain = state, plain
     told.infer = lambda is_unit=True: infer(MODEL, [], STANDARD, told.said.append, is_unit)
     return told
@@ -220,8 +220,8 @@ def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(mon
         asked.append((likelihood, model))
         return SimpleNamespace(model=model, likelihood=likelihood)
 
-    def about(model: Any, sessions: Any, evidence: Any) -> Any:
-        return SimpleNamespace(thresholds=STANDARD, of=model, before=evidence.of, sessions=sessions), f"best of {model}"
+    def about(model: Any, evidence: Any) -> Any:
+        return SimpleNamespace(thresholds=STANDARD, of=model, before=evidence.of), f"best of {model}"
 
     monkeypatch.setattr(_inference, "fit", fit)
     monkeypatch.setattr(_inference, "evidence_about", about)
@@ -229,20 +229,16 @@ def test_what_is_redundant_is_taken_out_one_by_one_and_the_rest_weighed_anew(mon
     plain: Any = SimpleNamespace(model=SimpleNamespace(names=()))
     first: Any = SimpleNamespace(thresholds=STANDARD, of="whole")
     whole: Any = SimpleNamespace(model="whole", likelihood="likelihood")
-    begun = _Judged(first, "best", whole, ("refused",), ("undone",), True)  # type: ignore[arg-type]
+    begun = _Validated(first, "best", whole, ("refused",), ("undone",), True)  # type: ignore[arg-type]
 
     def without() -> tuple[Any, Any]:
-        return _without_redundant(begun, plain, "sessions")  # type: ignore[arg-type]
+        return _without_redundant(begun, plain)  # type: ignore[arg-type]
 
     found, members = without()
     assert asked == [("likelihood", "without clock_drift")]  # of what is left the lag is not immaterial any more
     assert members == sets["without clock_drift"]
     assert (found.fit.model, found.best) == ("without clock_drift", "best of without clock_drift")
-    assert (found.evidence.of, found.evidence.before, found.evidence.sessions) == (
-        "without clock_drift",
-        "whole",
-        "sessions",
-    )
+    assert (found.evidence.of, found.evidence.before) == ("without clock_drift", "whole")
     assert (found.refused, found.undone, found.is_stepped_down) == (("refused",), ("undone",), True)
     sets["without clock_drift"] = (_sized("delay", 0.01), _sized("sensor_lag", 0.9 * size))
     sets["without sensor_lag"] = (_sized("delay", 0.01),)
@@ -332,7 +328,7 @@ def test_of_two_sets_that_is_likelier_which_has_more_evidence_about_its_own_fit(
 ) -> None:
     scores = {"a": 5.0, "b": 5.0, "c": 4.9}
 
-    def about(model: Any, sessions: Any, evidence: Any) -> Any:
+    def about(model: Any, evidence: Any) -> Any:
         assert evidence == "of found"  # under one noise
         return None, SimpleNamespace(score=scores[model])
 
@@ -341,7 +337,7 @@ def test_of_two_sets_that_is_likelier_which_has_more_evidence_about_its_own_fit(
     def judged(name: str, evidence: str = "of other") -> Any:
         return SimpleNamespace(fit=SimpleNamespace(model=name), evidence=evidence)
 
-    told = [_is_likelier(judged(other), judged("a", "of found"), []) for other in "abc"]
+    told = [_is_likelier(judged(other), judged("a", "of found")) for other in "abc"]
     assert told == [False, False, True]
 
 
@@ -357,7 +353,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
     monkeypatch.setattr(_inference, "State", lambda evidence, best, fit: fit)
     monkeypatch.setattr(
         _inference,
-        "_judged",
+        "_validated",
         lambda one, plain, sessions: SimpleNamespace(fit=one, is_stepped_down=one.model in stepped),
     )
 
@@ -369,7 +365,7 @@ def test_of_effects_alone_that_stand_the_one_is_taken_that_foresees_best(monkeyp
 
     monkeypatch.setattr(_inference, "LeftOut", Left)
     begun: Any = SimpleNamespace(
-        given=evidence.given, evidence=evidence, start=(), thresholds=STANDARD, likelihood=lambda sessions: None,
+        given=evidence.given, evidence=evidence, start=(), thresholds=STANDARD, likelihood=lambda: None,
         fit=SimpleNamespace(model="plain"),
     )  # fmt: skip
     plain: Any = SimpleNamespace(model="plain")
@@ -408,7 +404,7 @@ def test_where_a_law_is_not_the_same_in_each_recording_its_block_stays(
 
 
 class _Judge:
-    """Fits and errors as they are told, for `_judged`."""
+    """Fits and errors as they are told, for `_validated`."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.errors: dict[tuple[str, ...], float] = {(): 1.0}
@@ -457,7 +453,7 @@ class _Judge:
         monkeypatch.setattr(_inference, "evidence_about", self.about)
         monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
 
-    def about(self, model: Any, sessions: Any, other: Any) -> Any:
+    def about(self, model: Any, other: Any) -> Any:
         self.weighed_about.append(model.names)
         return other, other.posterior(tuple(k for k, one in enumerate(self.candidates) if one.name in model.names))
 
@@ -470,9 +466,9 @@ class _Judge:
         best = self.evidence.posterior((0, 1))
         state: Any = SimpleNamespace(
             given=self.evidence.given, evidence=self.evidence, best=best, thresholds=STANDARD,
-            fit=SimpleNamespace(model=self.start), likelihood=lambda sessions: "likelihood",
+            fit=SimpleNamespace(model=self.start), likelihood=lambda: "likelihood",
         )  # fmt: skip
-        return _judged(state, self.plain, [])
+        return _validated(state, self.plain, [])
 
     def judged(self) -> tuple[Any, Any, Any]:
         found = self.inference()

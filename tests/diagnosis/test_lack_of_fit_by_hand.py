@@ -29,7 +29,7 @@ from smartshoe.diagnosis._lack_of_fit import (
     repeats,
     slow,
 )
-from smartshoe.diagnosis._residual_structure import beyond_noise, where
+from smartshoe.diagnosis._residual_structure import beyond_noise, worst_place
 from smartshoe.models.effects import Conditions
 
 Array = NDArray[np.float64]
@@ -405,7 +405,7 @@ def test_the_place_of_the_largest_part_is_said(level: float, rate: float, words:
     load = np.full(size, level)
     loud, quiet = _session(load, name="loud"), _session(np.full(size, 0.6), name="quiet")
     loud.conditions.cache["rate_per_s"] = np.full(size, rate)
-    said = where([quiet, loud], [np.full(size, 0.01), np.full(size, 1.0)], STANDARD)
+    said = worst_place([quiet, loud], [np.full(size, 0.01), np.full(size, 1.0)], STANDARD)
     assert words in said
     assert said.startswith("100 % of the power that is left lies at")
     assert "(50 % of the samples)" in said
@@ -416,7 +416,7 @@ def test_the_place_of_the_largest_part_is_said(level: float, rate: float, words:
 def test_a_load_is_held_below_the_slowest_ramp(by: float, words: str) -> None:
     one = _session(np.full(100, 0.5))
     one.conditions.cache["rate_per_s"] = np.full(100, by * STANDARD.still_per_s)
-    assert words in where([one], [np.ones(100)], STANDARD)
+    assert words in worst_place([one], [np.ones(100)], STANDARD)
 
 
 def test_the_tenth_of_the_time_with_the_largest_part_is_said() -> None:
@@ -427,11 +427,11 @@ def test_the_tenth_of_the_time_with_the_largest_part_is_said() -> None:
     residual = np.full(1001, 0.1)
     residual[330:360] = 1.0
     residual[950:1000] = 50.0  # masked
-    assert where([one], [residual], STANDARD).endswith("; the worst stretch is one, 30-40 s")
+    assert worst_place([one], [residual], STANDARD).endswith("; the worst stretch is one, 30-40 s")
     # Noise that averages out within half a second is no slow part.
     residual[600:700] = np.resize([2.0, -2.0], 100)
-    assert where([one], [residual], STANDARD).endswith("; the worst stretch is one, 30-40 s")
-    assert where([one], [np.zeros(1001)], STANDARD).startswith("0 % of the power that is left lies at")
+    assert worst_place([one], [residual], STANDARD).endswith("; the worst stretch is one, 30-40 s")
+    assert worst_place([one], [np.zeros(1001)], STANDARD).startswith("0 % of the power that is left lies at")
     # It is the file's own time, which need not begin at none.
     one.recording.time_s += 2215.0
-    assert where([one], [residual], STANDARD).endswith("; the worst stretch is one, 2245-2255 s")
+    assert worst_place([one], [residual], STANDARD).endswith("; the worst stretch is one, 2245-2255 s")

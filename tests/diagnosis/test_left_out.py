@@ -13,7 +13,8 @@ from scipy.optimize import least_squares
 from smartshoe.diagnosis import Thresholds, _validation
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit
-from smartshoe.diagnosis._session import Session, full_scale, prepare
+from smartshoe.diagnosis._scale import full_scale
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._validation import MOST_FOLDS, LeftOut, cancelling, error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
@@ -41,7 +42,7 @@ def _run(model: ExtendedModel, seed: int) -> Recording:
 def _sessions(truths: list[ExtendedModel]) -> list[Session]:
     runs = [_run(truth, seed) for seed, truth in enumerate(truths)]
     usable = [one.sensor.present for one in runs]
-    return prepare(runs, usable, [False] * len(runs), full_scale(runs, usable, STANDARD), 1, STANDARD)
+    return prepare(runs, usable, [False] * len(runs), full_scale(runs, usable, STANDARD), [1], STANDARD)
 
 
 def _curved(amount: float) -> ExtendedModel:

@@ -16,17 +16,9 @@ from smartshoe import Recording
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._diagnose import _without
 from smartshoe.diagnosis._jittered import jitter_s
+from smartshoe.diagnosis._scale import Scale, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
-from smartshoe.diagnosis._session import (
-    Scale,
-    Session,
-    at_full_rate,
-    full_scale,
-    kernel,
-    pastless,
-    smoothed,
-    thinning,
-)
+from smartshoe.diagnosis._session import Session, at_full_rate, kernel, pastless, smoothed
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.units import MILLIBAR
 

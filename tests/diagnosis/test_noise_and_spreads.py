@@ -13,7 +13,7 @@ from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._held_out import errors, gain
 from smartshoe.diagnosis._lack_of_fit import _mean_variance
 from smartshoe.diagnosis._result import Diagnosis, GoodnessOfFit
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._validation import _spread
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.units import MILLIBAR
@@ -51,7 +51,7 @@ def test_where_nothing_is_held_out_no_number_is_said() -> None:
     nothing = errors([], ExtendedModel(1.0, 0.08, 0.22, 800.0, 140.0, "mbar"))
     assert nothing.is_empty
     assert nothing.squares.shape == nothing.counts.shape == (0,)
-    found = gain(nothing, nothing, Scale(800.0, 140.0, MILLIBAR))
+    found = gain(nothing, nothing, Scale(800.0, 140.0, MILLIBAR), STANDARD)
     assert not found.is_loss
     assert found.to_dict() == {
         "rmse_before": None, "rmse_after": None, "unit": "mbar", "gain_percent": None, "ci95": [None, None],

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from courses import STANDARD, prepared, pressed, triangles
+from courses import prepared, pressed, triangles
 from test_diagnosis_parts import MODEL, likelihood_of, recording, sessions_of
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_another_pole, with_arm
 from smartshoe.diagnosis._laws import _is_stretched
 from smartshoe.diagnosis._likelihood import fit
 from smartshoe.diagnosis._parameters import parameters_of
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._state import state_at
 from smartshoe.models.effects import effect
 from smartshoe.models.elements import Arm
@@ -81,8 +81,8 @@ def test_a_rate_that_an_effect_bent_is_found_anew_without_it() -> None:
     likelihood = likelihood_of(sessions)
     bent = replace(truth, relaxing_share=0.02, relaxation_rate_per_s=20.0)
     start = fit(likelihood, bent.with_part(effect("second_relaxation"), np.array([0.3, 2.0])))
-    state = state_at(start, sessions, STANDARD)
-    found = with_another_pole(state, sessions)
+    state = state_at(start)
+    found = with_another_pole(state)
     assert found.fit.model.relaxation_rate_per_s == pytest.approx(0.3, rel=0.05)
     assert found.fit.model.relaxing_share == pytest.approx(0.3, rel=0.05)
     assert found.fit.model.parts == ()

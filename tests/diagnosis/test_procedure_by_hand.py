@@ -25,7 +25,8 @@ from smartshoe.diagnosis._procedure import (
     _with_offset,
 )
 from smartshoe.diagnosis._result import Rival
-from smartshoe.diagnosis._session import Scale, prepare
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import prepare
 from smartshoe.diagnosis._verdict import names_in, not_explained_of, sentence_of, verdict_of
 from smartshoe.diagnosis._zero import Zero, offsets
 from smartshoe.errors import UsageError
@@ -458,7 +459,7 @@ def _prepared_run(offset_mbar: float = 0.0) -> Any:
     share = MODEL.simulate(Conditions(TIME_S, LOAD, 0.05))
     reading = offset_mbar + 3.0 - 140.0 * share
     run = Recording.from_arrays(time_s=TIME_S + 5.0, force_n=800.0 * LOAD, pressure_mbar=reading, name="run")
-    (session,) = prepare([run], [np.ones(600, dtype=bool)], None, SCALE, 1, STANDARD)
+    (session,) = prepare([run], [np.ones(600, dtype=bool)], None, SCALE, [1], STANDARD)
     return session
 
 

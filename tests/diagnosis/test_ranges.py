@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._ranges import Ranges, _foreign, beyond, ranges_of
-from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._scale import full_scale
+from smartshoe.diagnosis._session import prepare
 from smartshoe.recording import Recording
 
 Array = NDArray[np.float64]
@@ -30,7 +31,7 @@ def _ranges(*pairs: tuple[Array, Array], unit: str = "mbar", held_out: Sequence[
     ]
     usable = [np.ones(TIME_S.size, dtype=bool) for _ in recordings]
     scale = full_scale(recordings, usable, Thresholds())
-    return ranges_of(prepare(recordings, usable, held_out, scale, 1, Thresholds()), scale, Thresholds())
+    return ranges_of(prepare(recordings, usable, held_out, scale, [1], Thresholds()), scale, Thresholds())
 
 
 def _proportional(low_n: float, high_n: float) -> tuple[Array, Array]:
@@ -176,7 +177,7 @@ def test_loads_held_out_go_beyond_those_fitted_by_a_quarter(
     )
     usable = [np.ones(one.time_s.size, dtype=bool) for one in (fitted, held_out)]
     scale = full_scale([fitted], usable[:1], Thresholds())
-    told = beyond(prepare([fitted, held_out], usable, [False, True], scale, 1, Thresholds()), scale, Thresholds())
+    told = beyond(prepare([fitted, held_out], usable, [False, True], scale, [1], Thresholds()), scale, Thresholds())
     assert told == (None if said is None else f"the held-out loads {said}")
 
 
@@ -190,7 +191,7 @@ def test_what_held_out_loads_do_that_fitted_ones_lack_is_said() -> None:
     usable, scale = [np.ones(TIME_S.size, dtype=bool)] * 2, full_scale([pressed], [pressed.load.present], Thresholds())
 
     def told(*recordings: Recording) -> str | None:
-        sessions = prepare(recordings, usable, [False, True], scale, 1, Thresholds())
+        sessions = prepare(recordings, usable, [False, True], scale, [1], Thresholds())
         return beyond(sessions, scale, Thresholds())
 
     assert str(told(pressed, resting)).endswith(

@@ -226,7 +226,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     )
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
-    likelihood: Any = SimpleNamespace(sessions=())
+    likelihood: Any = SimpleNamespace(sessions=(), thresholds=STANDARD)
     extended: Any = SimpleNamespace(model=MODEL.with_part(one).with_part(two), cost=100.0, likelihood=likelihood)
     best = Posterior((0, 1), 0.0, (), (), (0.3, 0.7))
     found = members_of(evidence, best, extended)
@@ -302,10 +302,10 @@ def test_in_a_members_place_a_law_is_tried_at_its_likeliest_shapes(monkeypatch: 
 
     monkeypatch.setattr(_members, "fit_with", fitted)
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: [law])
-    less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=()))
+    less: Any = SimpleNamespace(model=MODEL, likelihood=SimpleNamespace(sessions=(), thresholds=STANDARD))
     one: Any = SimpleNamespace(name="power_law_creep", effect=effect("power_law_creep"))
     extended: Any = SimpleNamespace(cost=100.0)
-    (other,) = _other_laws(one, less, extended, found, STANDARD, is_ended=False)
+    (other,) = _other_laws(one, less, extended, found, is_ended=False)
     assert (other.effect, other.margin) == (law.name, 10.0)
     assert tried == [(law.name, [shapes[2], shapes[0]])]
 

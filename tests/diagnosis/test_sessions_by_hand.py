@@ -17,20 +17,17 @@ from smartshoe import Recording
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._denoise import _lines, noise_sd, without_noise
 from smartshoe.diagnosis._prepared import prepared
+from smartshoe.diagnosis._scale import Scale, full_scale, lowest, thinning
 from smartshoe.diagnosis._session import (
-    Scale,
     Session,
     _cycles,
     _left_behind,
     _rests_levelled,
     at_full_rate,
     begins_unloaded,
-    full_scale,
     kernel,
-    lowest,
     prepare,
     smoothed,
-    thinning,
 )
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import examine
@@ -303,7 +300,7 @@ def test_what_a_recording_leaves_behind_adds_to_what_was_before() -> None:
 # -- sessions ---------------------------------------------------------------------------------------------------------
 def _sessions(*runs: Recording, factor: int = 1, usable: Any = None, held: Any = None) -> list[Session]:
     kept = [np.ones(len(one), dtype=bool) for one in runs] if usable is None else usable
-    return prepare(runs, kept, held, SCALE, factor, STANDARD)
+    return prepare(runs, kept, held, SCALE, [factor], STANDARD)
 
 
 PRESSES = course(*((40, 0.0), (60, 1.0), (60, 0.0)) * 7)

@@ -42,8 +42,8 @@ class _State:
     def chosen(self) -> tuple[Any, ...]:
         return tuple(SimpleNamespace(name=name) for name in self.found)
 
-    def likelihood(self, sessions: Any) -> Any:
-        return SimpleNamespace(sessions=sessions)
+    def likelihood(self) -> Any:
+        return SimpleNamespace(sessions=(), thresholds=self.thresholds)
 
     @property
     def itself(self) -> tuple[str, str, float]:
@@ -71,7 +71,7 @@ def _ends(
     monkeypatch.setattr(_settling, "fit", fitted)
     monkeypatch.setattr(_settling, "apart", lambda *given: apart)
     monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
-    return _settling.settled(first, [], lambda said: None, known), len(fits)  # type: ignore[arg-type]
+    return _settling.settled(first, lambda said: None, known), len(fits)  # type: ignore[arg-type]
 
 
 def test_a_set_that_is_found_again_about_another_fit_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,9 +114,7 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
         evidence=SimpleNamespace(posterior=lambda members: members[0]),
     )  # fmt: skip
     model = SimpleNamespace(names=tuple(found), parts=tuple(found), relaxing_share=0.1)
-    state: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=model), likelihood=lambda sessions: None, thresholds=STANDARD
-    )
+    state: Any = SimpleNamespace(fit=SimpleNamespace(model=model), likelihood=lambda: None, thresholds=STANDARD)
     said: list[str] = []
     monkeypatch.setattr(_settling, "additions", lambda evidence, start, breadth: ["x", "y"][:breadth])
     monkeypatch.setattr(_settling, "with_members", lambda given, one, model, likelihood: one)
@@ -124,10 +122,10 @@ def test_the_search_begins_anew_from_one_effect_that_follows_better_than_several
         _settling, "fit",
         lambda likelihood, one: SimpleNamespace(cost=worth_of[one], model=SimpleNamespace(names=(one,))),
     )  # fmt: skip
-    monkeypatch.setattr(_settling, "_is_simpler", lambda other, state, sessions: likely)
-    monkeypatch.setattr(_settling, "state_at", lambda found, sessions, thresholds: found.model.names)
-    monkeypatch.setattr(_settling, "better_from", lambda begun, state, sessions, progress: begun)
-    told = _settling.better_from_one(begun, state, [], said.append)
+    monkeypatch.setattr(_settling, "_is_simpler", lambda other, state: likely)
+    monkeypatch.setattr(_settling, "state_at", lambda found: found.model.names)
+    monkeypatch.setattr(_settling, "better_from", lambda begun, state, progress: begun)
+    told = _settling.better_from_one(begun, state, said.append)
     assert told == (("y",) if one_is else state)
     assert said == (["beginning anew from y"] if one_is else [])
 
@@ -149,12 +147,12 @@ def test_what_began_anew_is_weighed_once_and_its_way_remembered(monkeypatch: pyt
     other = _State("b", "b", 0.0, (_model(""), _model("b")))
     for taken in (state, other):
         monkeypatch.setattr(_settling, "settled", lambda *given: other)
-        monkeypatch.setattr(_settling, "simpler", lambda one, than, sessions, taken=taken: taken)
-        found: Any = _settling.better_from(begun, state, [], lambda said: None)  # type: ignore[arg-type]
+        monkeypatch.setattr(_settling, "simpler", lambda one, than, taken=taken: taken)
+        found: Any = _settling.better_from(begun, state, lambda said: None)  # type: ignore[arg-type]
         assert (found.fitted, [one.names for one in found.path]) == (taken.fitted, [("a",), (), ("b",)])
     monkeypatch.setattr(_settling, "settled", lambda *given: state)
     monkeypatch.setattr(_settling, "simpler", lambda *given: pytest.fail("there is nothing to weigh"))
-    assert _settling.better_from(begun, state, [], lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
+    assert _settling.better_from(begun, state, lambda said: None) is state  # type: ignore[arg-type, comparison-overlap]
 
 
 # -- of several which -------------------------------------------------------------------------------------------------
@@ -173,14 +171,14 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
     monkeypatch: pytest.MonkeyPatch, new: Any, old: Any, near: bool, far: bool
 ) -> None:
     """Odds of ten against an effect; three times what is material apart."""
-    likelihood = SimpleNamespace(cost=lambda model: model.told, sessions=())
+    likelihood = SimpleNamespace(cost=lambda model: model.told, sessions=(), thresholds=STANDARD)
     state: Any = SimpleNamespace(
-        thresholds=STANDARD, likelihood=lambda sessions: likelihood, evidence=SimpleNamespace(odds=10.0), fit=old
+        thresholds=STANDARD, likelihood=lambda: likelihood, evidence=SimpleNamespace(odds=10.0), fit=old
     )
     bound = STANDARD.alike * STANDARD.imperfection
     for by, told in ((0.999, near), (1.0, far), (1.001, far)):
         monkeypatch.setattr(_settling, "apart", lambda *given, by=by: by * bound)
-        assert _settling._is_simpler(new, state, []) is told
+        assert _settling._is_simpler(new, state) is told
 
 
 @pytest.mark.parametrize(
@@ -195,7 +193,8 @@ def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
 ) -> None:
     """Not where a law with no more effects leaves no more beside it than a good unit's imperfections do."""
     evidence = SimpleNamespace(posterior=lambda members: SimpleNamespace(score=7.0))
-    state: Any = SimpleNamespace(thresholds=STANDARD, evidence=evidence, fit=told_fit(1.0, "c"), start=())
+    given = SimpleNamespace(sessions=())
+    state: Any = SimpleNamespace(thresholds=STANDARD, evidence=evidence, fit=told_fit(1.0, "c"), start=(), given=given)
     lawful: Any = SimpleNamespace(fit=law)
     for by, told in ((0.999, near), (1.001, far)):
         left = {law.model.names: np.hypot(0.01, by * STANDARD.tolerable), ("c",): 0.01}
@@ -204,7 +203,7 @@ def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
             monkeypatch.setattr(
                 _settling, "evidence_about", lambda *given, score=score: (None, SimpleNamespace(score=score))
             )
-            found = _settling.law_or_block(lawful, state, [])
+            found = _settling.law_or_block(lawful, state)
             assert (found is lawful) is is_law
 
 
@@ -256,7 +255,7 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
         return SimpleNamespace(
             name=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), given="given",
             chosen=(SimpleNamespace(name="b_c"), SimpleNamespace(name="a")), improved=improved,
-            evidence=SimpleNamespace(odds=10.0), thresholds=STANDARD, banned=("z",), likelihood=lambda _: "likelihood",
+            evidence=SimpleNamespace(odds=10.0), thresholds=STANDARD, banned=("z",), likelihood=lambda: "likelihood",
         )  # fmt: skip
 
     monkeypatch.setattr(_settling, "_promising", lambda state: sorted(evidence))
@@ -272,12 +271,12 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
     )
     taken: list[Any] = []
 
-    def stated(found: Any, sessions: Any, thresholds: Any, banned: Any, given: Any) -> Any:
+    def stated(found: Any, banned: Any, given: Any) -> Any:
         taken.append((found.model, found.steps, banned, given))
         return state("next", 0.0)
 
     monkeypatch.setattr(_settling, "state_at", stated)
     monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
     said: list[str] = []
-    assert _settling.settled(state("first", 50.0), [], said.append).name == "next"  # type: ignore[attr-defined]
+    assert _settling.settled(state("first", 50.0), said.append).name == "next"  # type: ignore[attr-defined]
     assert (taken, said) == ([(chosen, 6, ("z",), f"about {chosen}")], ["fitting a, b c"])

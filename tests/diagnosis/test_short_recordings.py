@@ -12,8 +12,9 @@ from test_diagnosis_parts import MODEL
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._residual_structure import where
-from smartshoe.diagnosis._session import Scale, kernel, prepare, smoothed
+from smartshoe.diagnosis._residual_structure import worst_place
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import kernel, prepare, smoothed
 from smartshoe.models.effects import Conditions
 from smartshoe.units import MILLIBAR
 
@@ -49,7 +50,7 @@ def test_a_diagnosis_bears_a_recording_of_any_length(count: int, is_held_out: bo
 def test_a_window_is_no_longer_than_what_it_averages(count: int) -> None:
     run = _pressed(count, 8.0, "short")
     every = np.ones(count, dtype=bool)
-    (one,) = prepare([run], [every], [False], Scale(800.0, 140.0, MILLIBAR), 25, STANDARD)
+    (one,) = prepare([run], [every], [False], Scale(800.0, 140.0, MILLIBAR), [25], STANDARD)
     assert one.reading.shape == one.usable.shape == one.conditions.time_s.shape
     expected = smoothed(run.sensor.values / 140.0, kernel(min(count, 25)), 25)
     assert one.reading == pytest.approx(expected)
@@ -65,4 +66,4 @@ def test_where_a_residual_is_largest_is_told_of_as_many_stretches_as_there_are_s
     one: Any = SimpleNamespace(
         conditions=Conditions(np.arange(count) * 1.0, load, 1.0), usable=np.ones(count, dtype=bool), recording=run
     )
-    assert where([one], [load + 0.1], STANDARD).endswith(f"; the worst stretch is short, {stretch}")
+    assert worst_place([one], [load + 0.1], STANDARD).endswith(f"; the worst stretch is short, {stretch}")

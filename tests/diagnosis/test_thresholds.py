@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from smartshoe.diagnosis import Thresholds, described
 from smartshoe.diagnosis._characteristic import characteristic_of
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._session import full_scale, prepare
+from smartshoe.diagnosis._scale import full_scale
+from smartshoe.diagnosis._session import prepare
 from smartshoe.diagnosis._zero import first_rests
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.integrity import OneClock
@@ -39,7 +40,7 @@ def _session_traits(load: Array, thresholds: Thresholds, unread: slice | NDArray
     usable = [np.ones(load.size, dtype=bool)]
     usable[0][unread] = False
     scale = full_scale([recording], usable, STANDARD)
-    return excitation_of(prepare([recording], usable, None, scale, 1, STANDARD), thresholds).present
+    return excitation_of(prepare([recording], usable, None, scale, [1], STANDARD), thresholds).present
 
 
 def _held_load(hold_s: float, rest_s: float) -> Array:
@@ -97,7 +98,7 @@ def test_standing_is_what_a_load_must_leave_for_another_cycle() -> None:
 
     def cycles(thresholds: Thresholds) -> int:
         scale = full_scale([rippled], usable, thresholds)
-        return int(prepare([rippled], usable, None, scale, 1, thresholds)[0].cycle[-1]) + 1
+        return int(prepare([rippled], usable, None, scale, [1], thresholds)[0].cycle[-1]) + 1
 
     ripples, triangles = decides("standing", 0.002, 0.02, cycles)
     assert (ripples > 20, triangles) == (True, 10)
@@ -109,7 +110,7 @@ def test_hold_is_how_long_a_first_rest_shows_a_zero() -> None:
     rising = _pressed(load + 0.01 * (time_s > 2.0), load, time_s)
     usable = [np.ones(load.size, dtype=bool)]
     scale = full_scale([rising], usable, STANDARD)
-    sessions = prepare([rising], usable, None, scale, 1, STANDARD)
+    sessions = prepare([rising], usable, None, scale, [1], STANDARD)
     model = ExtendedModel(1.0, 0.0, 0.22, 800.0, 100.0, "mbar")
     before, after = decides("hold_s", 1.0, 4.0, lambda t: float(first_rests(sessions, model, t)[0, 1]))
     assert (before, after) == (pytest.approx(0.0, abs=1e-4), pytest.approx(0.005, abs=1e-3))
@@ -146,7 +147,7 @@ def test_held_out_every_is_the_share_of_load_cycles_that_judges() -> None:
     scale = full_scale([recording], usable, STANDARD)
 
     def held_out(thresholds: Thresholds) -> list[int]:
-        (session,) = prepare([recording], usable, None, scale, 1, thresholds)
+        (session,) = prepare([recording], usable, None, scale, [1], thresholds)
         return sorted({int(number) for number in session.cycle[session.held_out]})
 
     assert decides("held_out_every", 3, 5, held_out) == ([2, 5, 8], [4, 9])

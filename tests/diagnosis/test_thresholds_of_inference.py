@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from deciding import STANDARD, decides
 from numpy.typing import NDArray
+from told_evidence import taken_for_exact
 
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Likelihood, fit
+from smartshoe.diagnosis._scale import Scale, full_scale
 from smartshoe.diagnosis._sensitivity import Linearised, linearised, nuisance_precision
-from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._validation import LeftOut, extrapolating
 from smartshoe.diagnosis._verdict import verdict_of
 from smartshoe.diagnosis._zero import zeros_of
@@ -43,7 +45,7 @@ def _recording(model: ExtendedModel = MODEL, seed: int = 0, peak: float = 1.0, o
 def _sessions(runs: list[Recording], held: list[bool]) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in runs]
     scale = full_scale(runs, usable, STANDARD)
-    return prepare(runs, usable, held, scale, 1, STANDARD), scale
+    return prepare(runs, usable, held, scale, [1], STANDARD), scale
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def _curve(given: Linearised) -> int:
 def test_strength_sd_is_how_large_an_effect_may_be(curved: Linearised) -> None:
     def strength(thresholds: Thresholds) -> float:
         evidence = Evidence(replace(curved, thresholds=thresholds), 0.002)
-        return float(np.abs(evidence.exact((_curve(curved),)).strengths[0]).max())
+        return float(np.abs(taken_for_exact(evidence, (_curve(curved),)).strengths[0]).max())
 
     small, usual = decides("strength_sd", 1e-5, 0.03, strength)
     assert small < 0.1 * usual

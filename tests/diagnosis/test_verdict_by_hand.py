@@ -16,7 +16,7 @@ from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange, changes_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov, _lagged
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.diagnosis._inference import _judged
+from smartshoe.diagnosis._inference import _validated
 from smartshoe.diagnosis._limits import (
     crept_of,
     elsewhere_of,
@@ -30,7 +30,7 @@ from smartshoe.diagnosis._limits import (
     zero_changes_said,
 )
 from smartshoe.diagnosis._residual_structure import ResidualStructure
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._validation import cancelling
 from smartshoe.diagnosis._verdict import known_error, verdict_of
 from smartshoe.diagnosis._zero import Zero, _is_past, creeping
@@ -367,13 +367,13 @@ def test_of_effects_that_undo_each_other_the_idler_goes(
         _inference, "cancelling", lambda sessions, one, thresholds: list(one.names) if len(one.names) > 1 else []
     )
     monkeypatch.setattr(_inference, "extrapolating", lambda *given: None)
-    monkeypatch.setattr(_inference, "evidence_about", lambda one, sessions, other: (other, other.posterior((0,))))
+    monkeypatch.setattr(_inference, "evidence_about", lambda one, other: (other, other.posterior((0,))))
     monkeypatch.setattr(_inference, "members_of", lambda evidence, best, fit: best.members)
     state: Any = SimpleNamespace(
         given=evidence.given, evidence=evidence, best=evidence.posterior((0, 1)), thresholds=replace(STANDARD),
-        fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda sessions: "likelihood",
+        fit=SimpleNamespace(model=model("a", "b")), likelihood=lambda: "likelihood",
     )  # fmt: skip
-    found: Any = _judged(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
+    found: Any = _validated(state, SimpleNamespace(model=model()), [])  # type: ignore[arg-type]
     assert found.fit.model.names == names
     gone = () if len(names) > 1 else ("b",)
     assert (found.members(), found.refused) == (tuple(range(len(names))), gone)

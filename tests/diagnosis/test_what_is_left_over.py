@@ -19,8 +19,9 @@ from smartshoe.diagnosis._held_out import Errors, errors, gain, own_of, residual
 from smartshoe.diagnosis._lack_of_fit import LackOfFit, repeating, repeats, slow
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._noise_kinds import noise_kinds
-from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, where
-from smartshoe.diagnosis._session import Scale, Session, at_full_rate
+from smartshoe.diagnosis._residual_structure import ResidualStructure, beyond_noise, worst_place
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import Session, at_full_rate
 from smartshoe.diagnosis._validation import extrapolating
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import effect
@@ -107,14 +108,16 @@ def test_a_gains_interval_is_that_of_cycles_drawn_anew() -> None:
     """Of n cycles with gains of one or the other kind: that of the binomial draw."""
     before = Errors(np.ones(40), np.full(40, 10.0), 1.0)
     after = Errors(np.repeat([0.04, 0.64], 20), np.full(40, 10.0), 1.0)
-    found = gain(before, after, Scale(800.0, -50.0, MILLIBAR))
+    found = gain(before, after, Scale(800.0, -50.0, MILLIBAR), STANDARD)
     assert found.gain_percent == pytest.approx(100.0 * (1.0 - np.sqrt(0.34)))
     drawn = np.random.default_rng(7).binomial(40, 0.5, 100_000) / 40.0
     expected = np.percentile(100.0 * (1.0 - np.sqrt(0.04 * drawn + 0.64 * (1.0 - drawn))), [2.5, 97.5])
     assert found.ci95 == pytest.approx(expected, abs=2.0)
     assert (found.rmse_before, found.unit) == (pytest.approx(50.0 * np.sqrt(0.1)), "mbar")
     assert found.rmse_after == pytest.approx(50.0 * np.sqrt(0.034))
-    single = gain(Errors(np.ones(1), np.ones(1), 1.0), Errors(np.array([0.25]), np.ones(1), 1.0), found_scale())
+    single = gain(
+        Errors(np.ones(1), np.ones(1), 1.0), Errors(np.array([0.25]), np.ones(1), 1.0), found_scale(), STANDARD
+    )
     assert (single.gain_percent, single.ci95) == (50.0, (50.0, 50.0))
 
 
@@ -359,7 +362,7 @@ def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Se
     residuals = [np.zeros(s.reading.size) for s in sessions]
     late = at.time_s > 0.9 * at.time_s[-1]
     residuals[2] = 0.01 * rising + 0.05 * (rising & late)
-    said = where(sessions, residuals, STANDARD)
+    said = worst_place(sessions, residuals, STANDARD)
     assert "at 50-75 % of full load while loading" in said
     assert f"; the worst stretch is {sessions[2].recording.name}, " in said
     begin, end = map(float, re.findall(r"(\d+)-(\d+) s$", said)[0])
@@ -371,9 +374,9 @@ def test_it_is_said_under_which_load_and_when_the_most_is_left(sessions: list[Se
     here = (loads >= 0.5) & (loads < 0.75) & (rates > STANDARD.still_per_s)
     assert samples == pytest.approx(100.0 * float(np.mean(here)), abs=1.0)
     held = [1.0 * (s.conditions.load < 0.1) * (np.abs(s.conditions.rate_per_s) < 1e-3) for s in sessions]
-    assert "at 0-25 % of full load while the load is held" in where(sessions, held, STANDARD)
+    assert "at 0-25 % of full load while the load is held" in worst_place(sessions, held, STANDARD)
     falling = [1.0 * (s.conditions.load > 0.8) * (s.conditions.rate_per_s < -0.05) for s in sessions]
-    assert "at 75-100 % of full load while unloading" in where(sessions, falling, STANDARD)
+    assert "at 75-100 % of full load while unloading" in worst_place(sessions, falling, STANDARD)
 
 
 def test_the_slow_part_is_as_large_whatever_the_rate_of_the_log() -> None:
@@ -390,7 +393,7 @@ def test_the_slow_part_is_as_large_whatever_the_rate_of_the_log() -> None:
     sessions, _ = sessions_of(coarse, fine)
     assert sessions[1].conditions.step_s < 0.3 * sessions[0].conditions.step_s
     residuals = [np.full(one.reading.size, size) for one, size in zip(sessions, (0.02, 0.01), strict=True)]
-    assert f"; the worst stretch is {coarse.name}, " in where(sessions, residuals, STANDARD)
+    assert f"; the worst stretch is {coarse.name}, " in worst_place(sessions, residuals, STANDARD)
 
 
 # -- which noise ------------------------------------------------------------------------------------------------------

@@ -18,7 +18,8 @@ from smartshoe.diagnosis._held_out import Errors
 from smartshoe.diagnosis._lack_of_fit import LackOfFit
 from smartshoe.diagnosis._procedure import _with_offset
 from smartshoe.diagnosis._residual_structure import ResidualStructure
-from smartshoe.diagnosis._session import Session, full_scale, prepare
+from smartshoe.diagnosis._scale import full_scale
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._verdict import (
     left_where_judged,
     names_in,
@@ -306,7 +307,7 @@ def test_an_offset_that_is_not_named_stands_in_the_model_all_the_same(runs: list
     """So that it reads as was logged; once, whatever the gain at the chain's end."""
     usable = [run.sensor.present for run in runs]
     scale = full_scale(runs, usable, Thresholds())
-    sessions = prepare(runs, usable, [False] * 3, scale, 4, Thresholds())
+    sessions = prepare(runs, usable, [False] * 3, scale, [4], Thresholds())
     model = replace(PLAIN, gain=1.25)
     plain = _with_offset(model, (), sessions, scale)
     (part,) = plain.parts
@@ -367,7 +368,7 @@ def _fitted_and_held_out(time_s: Array, limits: Thresholds) -> list[Session]:
     run = Recording.from_arrays(time_s=time_s, force_n=100.0 + time_s, pressure_mbar=10.0 + time_s, name="r")
     usable = np.ones(time_s.size, dtype=bool)
     scale = full_scale([run], [usable], limits)
-    return prepare([run, run], [usable, usable], [False, True], scale, 1, limits)
+    return prepare([run, run], [usable, usable], [False, True], scale, [1], limits)
 
 
 def test_what_is_off_elsewhere_is_beyond_noise_and_clear_of_what_was_fitted() -> None:

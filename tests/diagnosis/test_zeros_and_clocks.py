@@ -16,7 +16,8 @@ from smartshoe.diagnosis._baseline import baseline_of
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._limits import wall_ratio_of
-from smartshoe.diagnosis._session import Scale, Session, full_scale, prepare
+from smartshoe.diagnosis._scale import Scale, full_scale
+from smartshoe.diagnosis._session import Session, prepare
 from smartshoe.diagnosis._zero import Zero, first_rests, offsets, zeros_of
 from smartshoe.errors import InputError
 from smartshoe.integrity import OneClock
@@ -51,7 +52,7 @@ def _run(
 def _sessions(*runs: Recording) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in runs]
     scale = full_scale(runs, usable, STANDARD)
-    return prepare(runs, usable, [False] * len(runs), scale, 1, STANDARD), scale
+    return prepare(runs, usable, [False] * len(runs), scale, [1], STANDARD), scale
 
 
 def _zeros(*runs: Recording, left: float = 0.0, remembered: float = 0.0) -> dict[str, Zero]:

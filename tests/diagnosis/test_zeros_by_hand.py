@@ -16,7 +16,7 @@ from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
-from smartshoe.diagnosis._session import Scale
+from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._zero import _drifted, _unseen, first_rests, offsets, zeros_of
 from smartshoe.integrity import OneClock
 from smartshoe.models.effects import Conditions, effect, shift_of
@@ -107,7 +107,7 @@ def _told(monkeypatch: pytest.MonkeyPatch, offsets: list[float], left: float = 0
     monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
     sessions = [_session(np.linspace(0.2, 0.9, 101)), _session(np.linspace(-0.4, -0.9, 101))]
     sessions.append(_session(np.full(9, 0.01), np.zeros(9, dtype=bool)))
-    return _unseen(sessions, MODEL, left, remembered, shift_of("reading"), shift_of("load"), STANDARD)
+    return _unseen(sessions, MODEL, left, remembered, STANDARD)
 
 
 def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,7 +137,7 @@ def _scaled_down(monkeypatch: pytest.MonkeyPatch, shown: list[float]) -> Any:
     monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
     sessions = [_session(0.1 * np.linspace(0.2, 0.9, 101)), _session(-0.1 * np.linspace(0.4, 0.9, 101))]
     thresholds = replace(STANDARD, zero_sd=4e-5)
-    return _unseen(sessions, MODEL, 0.0003, 0.02, shift_of("reading"), shift_of("load"), thresholds)
+    return _unseen(sessions, MODEL, 0.0003, 0.02, thresholds)
 
 
 def test_an_unseen_zero_is_told_between_its_deviations_and_what_is_foreign(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,7 +147,7 @@ def test_an_unseen_zero_is_told_between_its_deviations_and_what_is_foreign(monke
 
     def told(offset: float) -> bool:
         monkeypatch.setattr(_zero, "offsets", lambda *given: np.array([offset]))
-        return bool(_unseen([session], still, 0.0, 0.0, shift_of("reading"), shift_of("load"), STANDARD))
+        return bool(_unseen([session], still, 0.0, 0.0, STANDARD))
 
     bound = MANY * STANDARD.zero_sd
     assert [told(by * bound) for by in (0.999, 1.001, -0.999, -1.001)] == [False, True, False, True]

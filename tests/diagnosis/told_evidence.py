@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds
-from smartshoe.diagnosis._evidence import Posterior
+from smartshoe.diagnosis._evidence import Evidence, Members, Posterior
 from smartshoe.diagnosis._session import Quiet, Session
 from smartshoe.models.effects import Conditions
 
@@ -81,3 +81,8 @@ def told_fit(cost: float, *names: str, share: float = 0.1) -> Any:
     """A fit of a model with these effects and this share of its arm, which costs what it is told."""
     parts = tuple(SimpleNamespace(name=name, effect=SimpleNamespace(parameters=())) for name in names)
     return SimpleNamespace(model=SimpleNamespace(parts=parts, names=names, relaxing_share=share, told=cost), cost=cost)
+
+
+def taken_for_exact(evidence: Evidence, members: Members) -> Posterior:
+    """The evidence of a set whose equations are taken for exact."""
+    return evidence._described(members, *evidence._solved(members, None))

@@ -25,7 +25,8 @@ import numpy as np
 from simulators.hidden.effects import EFFECTS
 from simulators.hidden.recordings import HiddenCase
 from smartshoe.diagnosis import Cause, Diagnosis, Thresholds
-from smartshoe.diagnosis._session import Scale, prepare
+from smartshoe.diagnosis._scale import Scale
+from smartshoe.diagnosis._session import prepare
 
 # What a fault's word of its own stands for.
 FAULT_IS = {
@@ -160,7 +161,7 @@ def removed(case: HiddenCase, diagnosis: Diagnosis) -> float | None:
     twins = case.noise_free[len(case.recordings) :]
     model = diagnosis.model
     scale = Scale(model.full_scale_load_n, model.full_scale_reading, case.recordings[0].sensor.unit)
-    sessions = prepare(twins, [np.ones(len(twin), dtype=bool) for twin in twins], None, scale, 1, Thresholds())
+    sessions = prepare(twins, [np.ones(len(twin), dtype=bool) for twin in twins], None, scale, [1], Thresholds())
     before = sum(float(np.sum((s.reading - diagnosis.baseline_model.simulate(s.conditions)) ** 2)) for s in sessions)
     after = sum(float(np.sum((s.reading - model.simulate(s.conditions)) ** 2)) for s in sessions)
     return 1.0 - after / before

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from smartshoe import Recording, diagnose
 from smartshoe.integrity import examine
-from smartshoe.integrity._held_rate import at_their_rates
+from smartshoe.integrity._held_rate import without_held
 from smartshoe.integrity.thresholds import Thresholds
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def test_a_channel_that_is_held_is_used_where_it_was_read(count: int, which: str
     noise = 0.05 * np.random.default_rng(seed).standard_normal(load_n.size)
     reading = 0.2 * load_n + noise
     given_ = _recording(_held(load_n, count), reading) if which == "load" else _recording(load_n, _held(reading, count))
-    ((taken, (finding,)),) = at_their_rates([given_], STANDARD)
+    ((taken, (finding,)),) = without_held([given_], STANDARD)
     assert (finding.kind, finding.masks) == ("held_samples", False)
     assert finding.says.startswith(f"{'force' if which == 'load' else 'pressure'} is read every {0.01 * count:.3g} s")
     kept = np.round(taken.time_s / STEP_S).astype(int)
@@ -59,19 +59,19 @@ def test_a_coarse_grid_is_no_channel_that_is_held(grid_mbar: float, seed: int) -
     load_n = _load_n()
     reading = 0.2 * load_n + 0.3 * grid_mbar * np.random.default_rng(seed).standard_normal(load_n.size)
     given_ = _recording(load_n, grid_mbar * np.round(reading / grid_mbar))
-    assert at_their_rates([given_], STANDARD) == [(given_, [])]
+    assert without_held([given_], STANDARD) == [(given_, [])]
     # Nor is a load without noise, of one rate or several, on the grid of its converter.
     for rates in ((100.0,), (100.0, 250.0, 400.0)):
         coarse = _load_n(rates)
         smooth = _recording(5.0 * np.round(coarse / 5.0), 0.2 * coarse)
-        assert at_their_rates([smooth], STANDARD) == [(smooth, [])]
+        assert without_held([smooth], STANDARD) == [(smooth, [])]
 
 
 def test_what_one_recording_shows_holds_for_the_others() -> None:
     """Of one rate alone a load that is held looks as on a coarse grid."""
     several, single = (_recording(_held(load, 10), 0.2 * load) for load in (_load_n(), _load_n((250.0,))))
-    assert at_their_rates([single], STANDARD) == [(single, [])]
-    (_, of_several), (taken, of_single) = at_their_rates([several, single], STANDARD)
+    assert without_held([single], STANDARD) == [(single, [])]
+    (_, of_several), (taken, of_single) = without_held([several, single], STANDARD)
     assert len(of_several) == len(of_single) == 1
     assert np.diff(taken.time_s) == pytest.approx(0.1)
 

@@ -13,7 +13,7 @@ from test_integrity_clean import simulated
 
 from smartshoe import diagnose
 from smartshoe.integrity import Integrity, examine
-from smartshoe.integrity._lines import aliases
+from smartshoe.integrity._hum import aliases
 from smartshoe.protocol import Protocol, dynamic_protocol, static_protocol
 from smartshoe.recording import Channel, Recording
 from smartshoe.signals.lags import lagged

@@ -13,7 +13,7 @@ from test_integrity_clean import SHAPES
 
 from smartshoe import diagnose
 from smartshoe.integrity import examine
-from smartshoe.integrity._interpolated import where_measured
+from smartshoe.integrity._interpolated import without_interpolated
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.protocol import dynamic_protocol, static_protocol
 
@@ -51,7 +51,7 @@ def test_each_moment_is_found_to_the_sample(factor: int, phase: int, which: str,
         given_ = _recording(_interpolated(load_n, factor, phase), reading)
     else:
         given_ = _recording(load_n, _interpolated(reading, factor, phase))
-    taken, (finding,) = where_measured(given_, STANDARD)
+    taken, (finding,) = without_interpolated(given_, STANDARD)
     name = "force" if which == "load" else "pressure"
     assert (finding.kind, finding.masks) == ("interpolated", False)
     assert finding.says.startswith(f"{name} was measured every {0.01 * factor:.3g} s and interpolated to 100 Hz")
@@ -74,7 +74,7 @@ def test_moments_between_samples_and_uneven_ones_are_found(
     measured_n = np.interp(at, here, load_n)
     logged_n = np.interp(here, at, measured_n)
     given_ = _recording(logged_n if digits is None else np.round(logged_n, digits), reading)
-    taken, findings = where_measured(given_, STANDARD)
+    taken, findings = without_interpolated(given_, STANDARD)
     assert [one.kind for one in findings] == ["interpolated"]
     assert len(taken) == pytest.approx(load_n.size / factor, rel=0.05)
     nearest = np.argmin(np.abs(at - taken.time_s[:, None] / STEP_S), axis=1)
@@ -90,7 +90,7 @@ def test_the_moments_of_a_spline_are_found(factor: float, phase: float, digits: 
     here, at = np.arange(load_n.size), _moments(load_n.size, factor, phase * factor)
     logged_n = CubicSpline(at, np.interp(at, here, load_n))(here)
     given_ = _recording(logged_n if digits is None else np.round(logged_n, digits), reading)
-    taken, findings = where_measured(given_, STANDARD)
+    taken, findings = without_interpolated(given_, STANDARD)
     assert [one.kind for one in findings] == ["interpolated"]
     assert np.median(np.diff(taken.time_s)) == pytest.approx(STEP_S * factor, rel=0.02)
 
@@ -98,7 +98,7 @@ def test_the_moments_of_a_spline_are_found(factor: float, phase: float, digits: 
 def test_of_two_interpolated_channels_the_slower_one_decides() -> None:
     load_n, reading = _noisy(1)
     given_ = _recording(_interpolated(load_n, 4, 1.5), _interpolated(reading, 15, 3.0))
-    taken, (finding,) = where_measured(given_, STANDARD)
+    taken, (finding,) = without_interpolated(given_, STANDARD)
     assert finding.says.startswith("pressure was measured every 0.15 s")
     assert np.diff(taken.time_s) == pytest.approx(0.15)
 
@@ -119,7 +119,7 @@ def test_a_measured_load_is_never_told(shape: str, steps: float, exponent: float
     if is_rounded:
         load_n = grid_n * np.round(load_n / grid_n)
     given_ = _recording(load_n, _noisy(seed)[1][:1].repeat(time_s.size) + 0.2 * load_n)
-    assert where_measured(given_, STANDARD) == (given_, [])
+    assert without_interpolated(given_, STANDARD) == (given_, [])
 
 
 @pytest.mark.parametrize("digits", [None, 3, 1])
@@ -137,13 +137,13 @@ def test_ramps_of_a_machine_without_noise_are_lines_of_its_own(digits, rate, res
         load_n = load_n if digits is None else np.round(load_n, digits)
         reading = 0.2 * load_n + 0.05 * np.random.default_rng(cycles).standard_normal(load_n.size)
         given_ = _recording(load_n, reading)
-        assert where_measured(given_, STANDARD) == (given_, [])
+        assert without_interpolated(given_, STANDARD) == (given_, [])
 
 
 def test_held_samples_are_no_lines() -> None:
     load_n, reading = _noisy(2)
     given_ = _recording(_held(load_n, 10), reading)
-    assert where_measured(given_, STANDARD) == (given_, [])
+    assert without_interpolated(given_, STANDARD) == (given_, [])
 
 
 def test_a_walk_on_a_slow_load_is_judged_where_the_load_was_measured() -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from smartshoe.diagnosis import Gain
 from smartshoe.diagnosis._result import Rival
-from smartshoe.models.effects import effect
+from smartshoe.models.effects import effect, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.diagnosis._sentences import (
@@ -23,7 +23,6 @@ from smartshoe.report.diagnosis._sentences import (
     gain_sentence,
     heading,
     interval,
-    listed,
     parameter_text,
     percent_of_whole,
     shares,
@@ -154,7 +153,7 @@ def test_words_for_numbers() -> None:
     assert sure(0.9999) == "over 99 %"
     assert sure(0.62) == "62 %"
     assert two_numbers(0.17853, 0.17906) == ("0.1785", "0.1791")
-    assert listed(["a_b", "c", "d"]) == "a b, c or d"
+    assert listed(["a_b", "c", "d"], "or") == "a b, c or d"
     part = shares(replace(case("refused"), explained_percent=120.0, explainable_percent=50.0))
     assert (part.explained, part.left, part.noise) == (100.0, 0.0, 0.0)
 

@@ -9,6 +9,7 @@ from smartshoe.models.effects.catalogue import (
     effect,
     in_words,
     is_told_from_its_family,
+    listed,
     shift_of,
     told_apart_by,
 )
@@ -36,6 +37,7 @@ __all__ = [
     "catalogue",
     "effect",
     "in_words",
+    "listed",
     "is_told_from_its_family",
     "shift_of",
     "told_apart_by",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -89,6 +89,12 @@ def in_words(name: str) -> str:
     found = _found().get(name)
     said = f"{name.removeprefix('flexible_')} of free form" if found is not None and found.is_flexible else name
     return said.replace("_", " ")
+
+
+def listed(names: Iterable[str], last: str = "") -> str:
+    """What a person calls effects, one after the other: "a, b, c", or with a word before the ``last``: "a, b or c"."""
+    said = [in_words(name) for name in names]
+    return f"{', '.join(said[:-1])} {last} {said[-1]}" if last and len(said) > 1 else ", ".join(said)
 
 
 def effect(name: str) -> Effect:

@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
 from smartshoe.integrity import DataFault
-from smartshoe.models.effects import catalogue, in_words, told_apart_by
+from smartshoe.models.effects import catalogue, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.parameter import Parameter
 from smartshoe.report.numbers import plain
@@ -43,12 +43,6 @@ def heading(diagnosis: Diagnosis) -> str:
     return HEADINGS["explained"] if is_sure else NOT_SURE
 
 
-def listed(names: Sequence[str], last: str = "or") -> str:
-    """Identifiers as "a, b or c"."""
-    said = [in_words(name) for name in names]
-    return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} {last} {said[-1]}" if said else ""
-
-
 def sure(confidence: float) -> str:
     """A probability as a person takes it; never a hundred percent."""
     if not math.isfinite(confidence):
@@ -59,7 +53,7 @@ def sure(confidence: float) -> str:
 def how_sure(cause: Cause) -> str:
     """The confidence of a cause, and where others may be meant how far it is this one."""
     said = f"{sure(cause.confidence)} sure"
-    meant = listed(("this", *cause.equivalents))
+    meant = listed(("this", *cause.equivalents), "or")
     return f"{said} that it is {meant}, {for_this_one(cause)}" if cause.equivalents else said
 
 

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from smartshoe.diagnosis import Cause, Diagnosis
 from smartshoe.diagnosis.design import Design
-from smartshoe.models.effects import in_words
+from smartshoe.models.effects import in_words, listed
 from smartshoe.report.diagnosis._sentences import (
     comparison,
     fault_text,
@@ -19,7 +19,6 @@ from smartshoe.report.diagnosis._sentences import (
     heading,
     how_much,
     is_free_form,
-    listed,
     parameter_text,
     shares_text,
     sure,
@@ -74,7 +73,7 @@ def print_design(design: Design) -> None:
     )
     for name, least in zip(design.names, design.least, strict=True):
         shows = f"{100 * least:.2g}" if math.isfinite(least) else "never"
-        table.add_row(in_words(name), shows, listed(design.cannot_be_told(name)) or "–")
+        table.add_row(in_words(name), shows, listed(design.cannot_be_told(name), "or") or "–")
     console.print(table)
     _line(
         console,
@@ -94,7 +93,9 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
             shown = [("free form", "no equation fits well enough")]
         for k, (name, value) in enumerate(shown):
             of_cause = (
-                (gain_text(cause.held_out), _sure(cause), listed(cause.equivalents) or "–") if k == 0 else ("", "", "")
+                (gain_text(cause.held_out), _sure(cause), listed(cause.equivalents, "or") or "–")
+                if k == 0
+                else ("", "", "")
             )
             table.add_row(in_words(cause.name) if k == 0 else "", name, value, *of_cause)
     console.print()

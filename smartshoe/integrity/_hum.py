@@ -19,7 +19,7 @@ HARMONICS = 3  # that a line is called by: half and twice as many changed no fin
 
 def hum(view: View, bad: Mask) -> Iterator[Finding]:
     """Kind ``hum``: one finding for all lines; nothing is masked, since every sample has it."""
-    found = lines(view, bad)
+    found = spectral_lines(view, bad)
     if not found:
         return
     rate_hz = 1.0 / view.step_s
@@ -50,7 +50,7 @@ def aliases(frequency_hz: float, rate_hz: float, duration_s: float) -> list[str]
     return names
 
 
-def lines(view: View, bad: Mask) -> list[tuple[float, float]]:
+def spectral_lines(view: View, bad: Mask) -> list[tuple[float, float]]:
     """Frequency in Hz and amplitude (of the reading) of each spectral line, the strongest first."""
     if view.span == 0.0:
         return []

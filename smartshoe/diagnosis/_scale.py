@@ -1,0 +1,124 @@
+"""What all fitted recordings set together: the full scale that shares are of, and how far each may be thinned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smartshoe.arrays import Array, Mask
+from smartshoe.errors import NotIdentifiableError, UnitError
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.recording import Recording
+from smartshoe.signals.loading import ramps
+from smartshoe.units import Unit
+
+# Resolutions, for the sake of speed: half and twice of each changed no name in two cases.
+SAMPLES_A_RAMP = 24  # of the fastest ramp from 10 to 90 % of the load
+MOST_SAMPLES = 12_000
+MOST_COARSENED = 6.0  # times, beyond what keeps the fastest ramp
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What the shares are of, over all that is fitted: the largest load in N and the span of the reading in ``unit``.
+
+    ``reading`` is negative where the reading falls as the load grows. ``zero`` is what is taken off every reading
+    before it is made a share: a convention of numbers that decides nothing, since each recording's offset is free.
+    """
+
+    load_n: float
+    reading: float
+    unit: Unit
+    zero: float = 0.0
+
+    def share(self, values: Array) -> Array:
+        """Readings (n,) in ``unit`` as shares."""
+        return (values - self.zero) / self.reading
+
+
+def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds) -> Scale:
+    """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
+
+    Raises `NotIdentifiableError` where load or reading never changes, `UnitError` for readings of two quantities.
+    """
+    unit = recordings[0].sensor.unit
+    pairs = [
+        (recording.force_n[mask], reading_in(recording, unit)[mask])
+        for recording, mask in zip(recordings, usable, strict=True)
+        if mask.any()
+    ]
+    load = max((float(np.percentile(np.abs(force), 99.9)) for force, _ in pairs), default=0.0)
+    # The span of each recording by itself: their zeros may differ by more than the load moves the reading.
+    spans = [float(np.ptp(np.percentile(values, [0.1, 99.9]))) for _, values in pairs]
+    if load <= 0 or not spans or max(spans) <= 0:
+        raise NotIdentifiableError(
+            f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
+        )
+    slope = sum(float(np.dot(force - force.mean(), values - values.mean())) for force, values in pairs)
+    zero = 0.0
+    if unit.quantity != "pressure":
+        zero = float(np.median(np.concatenate([values[lowest(force, thresholds)] for force, values in pairs])))
+    return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
+
+
+def reading_in(recording: Recording, unit: Unit) -> Array:
+    """(n,) the reading in ``unit``; raises `UnitError` naming the recording where it is of another quantity."""
+    sensor = recording.sensor
+    if sensor.unit.quantity != unit.quantity:
+        raise UnitError(
+            f"{recording.label}: {sensor.name} is in {sensor.unit.symbol} ({sensor.unit.quantity}), the first recording"
+            f" is in {unit.symbol} ({unit.quantity}): give all recordings in units of one quantity"
+        )
+    return sensor.in_unit(unit)
+
+
+def lowest(load_n: Array, thresholds: Thresholds) -> Mask:
+    """(n,) samples at the lowest load, where it stands still."""
+    low, high = float(np.percentile(load_n, 0.1)), float(np.percentile(load_n, 99.9))
+    return np.asarray(load_n <= low + thresholds.standing * (high - low))
+
+
+def thinning(recordings: Sequence[Recording], scale: Scale, thresholds: Thresholds) -> list[int]:
+    """By how much the samples of each recording may be thinned so that the fastest ramp of all keeps its shape.
+
+    Where that leaves more than so many, further, down to what the fastest ramp needs at least: that of all recordings,
+    or its own where one may lose clearly more than they. Of quick steps between long holds, which take next to no
+    time, what is clear of that many samples is enough.
+    """
+    finest = []  # steps in samples, not rounded, at which the fastest ramp keeps its shape
+    for recording, span in zip(recordings, _spans(recordings, scale, thresholds.standing), strict=True):
+        step_s = recording.sample_time_s
+        load = recording.force_n / scale.load_n
+        window = max(1, round(0.05 / step_s))
+        if load.size <= 2 * window:
+            finest.append(1.0)
+            continue
+        slope = np.abs(load[window:] - load[:-window]) / (window * step_s)
+        moved = [
+            one
+            for one in ramps(recording.time_s, load)
+            if abs(load[one.stop - 1] - load[one.start]) > thresholds.same * span
+        ]
+        stepped = max((abs(one.rate_n_per_s) for one in moved), default=0.0)
+        fastest = max(float(np.percentile(slope, 99.5)), stepped / thresholds.clear)
+        ramp_s = 0.8 * span / fastest if fastest > 0 else recording.duration_s
+        finest.append(ramp_s / SAMPLES_A_RAMP / step_s + 1e-3)  # time stamps are rounded
+    total = sum(len(recording) for recording in recordings)
+    shape = max(1, int(min(finest)))
+    wanted, most = -(-total // MOST_SAMPLES), -(-total // round(MOST_COARSENED * MOST_SAMPLES))
+    factors = []
+    for steps in finest:
+        # Of a ramp that has no more than what keeps its shape a sixth part stays, where the logger itself saw as much.
+        kept = int(MOST_COARSENED * min(steps, max(1, int(steps)))) or round(MOST_COARSENED)
+        factors.append(max(shape, min(wanted, max(kept, most))))
+    alike = min(factors)
+    return [one if one >= thresholds.clear * alike else alike for one in factors]
+
+
+def _spans(recordings: Sequence[Recording], scale: Scale, standing: float) -> Array:
+    """By how much each load moves, in full scales; one where that is nearly all, or where it stands still."""
+    spans = np.array([np.ptp(np.percentile(one.force_n, [0.1, 99.9])) for one in recordings]) / scale.load_n
+    is_part = (spans > standing * spans.max()) & (spans < 1.0 - standing)
+    return np.where(is_part, spans, 1.0)
