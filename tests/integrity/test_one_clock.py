@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Thresholds, diagnose
-from smartshoe.diagnosis._aligned import aligned, as_they_follow
+from smartshoe.diagnosis._aligned import _is_load_known, aligned, as_they_follow
 from smartshoe.diagnosis._characteristic import friction_of
 from smartshoe.integrity import OneClock, examine
 from smartshoe.integrity._clocks import UNSEEN, Lags, _correlation, _peak, one_clock
@@ -292,3 +292,45 @@ def test_a_drift_that_one_recording_tells_and_others_follow_is_one_cause() -> No
     assert float(parts[0][1][0]) == pytest.approx(drift, rel=0.25)
     causes = {cause.name: cause for cause in diagnose(runs, hold_out=[_ramps(0.0, drift, seed=5)]).causes}
     assert causes["clock_drift"].parameters["clock_rate_error"].value == pytest.approx(drift, rel=0.02)
+
+
+# -- diagnoses --------------------------------------------------------------------------------------------------------
+def _parted(recording: Recording, late_s: float) -> Recording:
+    """What was logged while both clocks ran, the reading's ``late_s`` (early where negative) after the load's."""
+    by = round(abs(late_s) * RATE_HZ)
+    ahead, behind = slice(by, None), slice(None, len(recording) - by)
+    load, read = (ahead, behind) if late_s > 0.0 else (behind, ahead)
+    return Recording.from_arrays(
+        time_s=recording.time_s[behind],
+        force_n=recording.force_n[load],
+        pressure_mbar=recording.sensor.values[read],
+        name=recording.name,
+    )
+
+
+@pytest.mark.parametrize("late_s", [-2.0, -0.5, -0.3, 0.3, 0.5, 1.2, 2.0])
+@pytest.mark.parametrize("made", [lambda: _walked(0.0, held=False), lambda: _ramps(0.0)], ids=["steps", "ramps"])
+def test_a_recording_alone_that_is_late_or_early_is_that_and_nothing_else(
+    made: Callable[[], Recording], late_s: float
+) -> None:
+    """Low where the load is high it is no falling reading, on its way where the load rests it has no offset."""
+    found = diagnose([_parted(made(), late_s)])
+    assert [cause.name for cause in found.causes] == ["delay"]
+    assert found.causes[0].parameters["delay"].value == pytest.approx(late_s, abs=0.002)
+    assert found.verdict == "explained"
+    assert found.full_scale_reading > 0.0
+    assert {fault.kind for fault in found.data_faults} == {"two_clocks"}
+
+
+@given(before_s=st.floats(-3.0, 3.0), rate=st.floats(-0.01, 0.01), begins_s=st.floats(-5.0, 1e6))
+def test_a_reading_is_used_where_the_load_that_it_follows_was_logged(
+    before_s: float, rate: float, begins_s: float
+) -> None:
+    time_s = begins_s + 0.1 * np.arange(600)
+    recording = Recording.from_arrays(time_s=time_s, force_n=np.ones(600), pressure_mbar=np.ones(600))
+    clock = OneClock(before_s, rate)
+    lasted_s = time_s - time_s[0]
+    followed_s = lasted_s - before_s - rate * lasted_s
+    known = _is_load_known(recording, clock)
+    assert np.array_equal(known, (followed_s >= 0.0) & (followed_s <= lasted_s[-1]))
+    assert known.sum() >= 600 - (abs(before_s) + 60.0 * abs(rate)) / 0.1 - 2
