@@ -89,7 +89,10 @@ def moment(time_s: float, digits: int = 6) -> str:
     A clock that counts from 1970 has ten digits before its decimal point, of which six tell no stretch from another.
     """
     late = abs(time_s) >= 10.0 ** (digits - 1)
-    return f"{time_s:.{digits - 3}f}".rstrip("0").rstrip(".") if late else f"{time_s:.{digits}g}"
+    if not late:
+        return f"{time_s:.{digits}g}"
+    fixed = f"{time_s:.{digits - 3}f}"
+    return fixed.rstrip("0").rstrip(".") if "." in fixed else fixed
 
 
 def panels(count: int, *, height: float = 2.6) -> tuple[Figure, list[Axes]]:

@@ -45,7 +45,8 @@ def aligned(recordings: Sequence[Recording], integrity: Integrity) -> Aligned:
     shared = integrity.one_clock
     if shared is not None and abs(shared.before_s) < delay.parameters[0].upper:
         late, parting = (delay, np.array([shared.before_s])), (drift, np.array([shared.rate]))
-        return replace(plain, parts=(parting, late) if shared.rate else (late,))
+        known = [mask & _is_load_known(one, shared) for one, mask in zip(recordings, masks, strict=True)]
+        return replace(plain, usable=known, parts=(parting, late) if shared.rate else (late,))
     made, usable, says, moved = [], [], [], []
     for place, recording, mask, offset_s, rate in zip(places, recordings, masks, lags, rates, strict=True):
         if offset_s or rate:
@@ -70,6 +71,13 @@ def as_they_follow(recordings: Sequence[Recording], shared: OneClock | None) -> 
         _on_one_clock(one, one.sensor.present, offset_s, shared.rate)[0]
         for one, offset_s in zip(recordings, offsets_s, strict=True)
     ]
+
+
+def _is_load_known(recording: Recording, clock: OneClock) -> Mask:
+    """(n,) samples whose reading, late or early by a ``clock``, follows a load within the recording."""
+    time_s = recording.time_s - recording.time_s[0]
+    followed_s = time_s - clock.lag_s(time_s)
+    return np.asarray((followed_s >= 0.0) & (followed_s <= time_s[-1]))
 
 
 def _on_one_clock(recording: Recording, usable: Mask, offset_s: float, rate: float) -> tuple[Recording, Mask]:

@@ -57,8 +57,10 @@ def diagnose(
     fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
-    if len(units := sorted({one.unit for one in (*fitted, *kept_out) if one.unit})) > 1:
-        raise UsageError(f"recordings of different units ({', '.join(units)}): diagnose one unit at a time")
+    first_of = {one.unit: one.label for one in reversed((*fitted, *kept_out)) if one.unit}
+    if len(first_of) > 1:
+        units = ", ".join(f"{unit} in {first_of[unit]}" for unit in sorted(first_of))
+        raise UsageError(f"recordings of different units ({units}): diagnose one unit at a time")
     decided = decided_by(thresholds, material)
     everything, count = [*fitted, *kept_out], len(fitted)
     integrity = examine(everything, decided)

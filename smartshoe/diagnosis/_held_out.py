@@ -1,7 +1,7 @@
 """What a model is worth on data that it was not fitted to: errors at the full rate, gains and their intervals.
 
 A recording's own offset and initial state are no part of a model. They are estimated on the recording itself, for
-every model alike, from what was fitted of it, or from all of it where nothing was.
+every model alike, from what was fitted of it, or from all of it where nothing was; its state after a long gap likewise.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from sys import float_info
 
 import numpy as np
 from scipy.special import stdtrit
 
-from smartshoe.arrays import Array
+from smartshoe.arrays import Array, Mask
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances
 from smartshoe.diagnosis._session import Session
@@ -29,7 +30,7 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     (2 + k,): after them its own gains, the changes of its zero and its states after long gaps, if any. A state is
     bounded by what an arm can hold: its share of the whole load.
     """
-    mask = session.fitted if session.fitted.any() else session.usable
+    mask = _told_by(session, model.pole_per_s)
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
     seen = columns[mask]
     variance = float(np.var(residual[mask])) if mask.any() else 0.0
@@ -37,6 +38,19 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     inner = seen.T @ seen + a_nuisance_each(session, offset=1e-9, past=of_state, change=variance, gap=of_state)
     found = np.asarray(np.linalg.solve(inner, seen.T @ residual[mask]), dtype=np.float64)
     return found, columns @ found
+
+
+def _told_by(session: Session, pole_per_s: float) -> Mask:
+    """(n,) samples that tell what is the recording's own: a state after a gap is told before it has faded, or never."""
+    if not session.fitted.any():
+        return session.usable
+    told = session.fitted.copy()
+    fades = max(1, round(1.0 / (pole_per_s * session.conditions.step_s)))
+    for begins, ends in pairwise((*session.gap_ends, told.size)):
+        after = slice(begins, min(begins + fades, ends))
+        if not told[after].any():
+            told[after] = session.usable[after]
+    return told
 
 
 def residual_of(session: Session, model: ExtendedModel) -> Array:

@@ -44,9 +44,13 @@ def parted_clocks(
     if abs(fitted_s - lag_s) <= max(thresholds.same * abs(lag_s), thresholds.echo_s):
         return None
     return (
-        f"the reading is {lag_s:.3g} s late by the edges of load and reading, {fitted_s:.3g} s beside the other"
+        f"the reading is {_late(lag_s)} by the edges of load and reading, {_late(fitted_s)} beside the other"
         " effects: one of them imitates the rest (record both by one clock)"
     )
+
+
+def _late(lag_s: float) -> str:
+    return f"{abs(lag_s):.3g} s {'late' if lag_s >= 0.0 else 'early'}"
 
 
 def _unnamed(name: Name, but: str) -> str:

@@ -46,7 +46,8 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     clocks = aligned(recordings, integrity)
     held_out = [place >= count for place in clocks.places]
     count = held_out.count(False)
-    scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds)
+    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
+    scale = full_scale(clocks.recordings[:count], clocks.usable[:count], thresholds, following)
     held = held_out if any(held_out) else None
     factors = thinning(clocks.recordings[:count], scale, thresholds)
     sessions = [
@@ -59,7 +60,6 @@ def prepared(recordings: Sequence[Recording], count: int, integrity: Integrity, 
     for added, values in clocks.parts:
         start = start.with_part(added, values)
     excitation, ranges = excitation_of(sessions, thresholds), ranges_of(sessions, scale, thresholds)
-    following = as_they_follow(clocks.recordings[:count], None if clocks.moved else integrity.one_clock)
     friction = [friction_of(recording, thresholds) for recording in following]  # what is late is not rubbed
     said_of_curve = (*friction, conductance_of(clocks.recordings[:count], thresholds))
     limits = [*clocks.says, *ranges.says, *(said for said in said_of_curve if said is not None), *excitation.limits()]

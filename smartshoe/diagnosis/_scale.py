@@ -38,10 +38,17 @@ class Scale:
         return (values - self.zero) / self.reading
 
 
-def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], thresholds: Thresholds) -> Scale:
+def full_scale(
+    recordings: Sequence[Recording],
+    usable: Sequence[Mask],
+    thresholds: Thresholds,
+    following: Sequence[Recording] | None = None,
+) -> Scale:
     """The largest load (its 99.9th percentile, so that a spike does not count) and the reading's span beside it.
 
-    Raises `NotIdentifiableError` where load or reading never changes, `UnitError` for readings of two quantities.
+    Negative where the reading falls as the load rises, in the recordings or in those ``following``, the same with each
+    reading at the moment whose load it follows: late by half a step, a reading that rises is low where the load is
+    high. Raises `NotIdentifiableError` where load or reading never changes, `UnitError` for readings of two quantities.
     """
     unit = recordings[0].sensor.unit
     pairs = [
@@ -56,11 +63,20 @@ def full_scale(recordings: Sequence[Recording], usable: Sequence[Mask], threshol
         raise NotIdentifiableError(
             f"{recordings[0].label}: load or reading never leaves zero: record a load that rises and falls"
         )
-    slope = sum(float(np.dot(force - force.mean(), values - values.mean())) for force, values in pairs)
+    slope = sum(_moves_with(one, mask) for one, mask in zip(following or recordings, usable, strict=True))
     zero = 0.0
     if unit.quantity != "pressure":
         zero = float(np.median(np.concatenate([values[lowest(force, thresholds)] for force, values in pairs])))
     return Scale(load, max(spans) if slope >= 0 else -max(spans), unit, zero)
+
+
+def _moves_with(recording: Recording, usable: Mask) -> float:
+    """Sum of products of load and reading about their means, over what is usable: negative where one falls."""
+    mask = usable & recording.sensor.present
+    if not mask.any():
+        return 0.0
+    force, values = recording.force_n[mask], recording.sensor.si[mask]
+    return float(np.dot(force - force.mean(), values - values.mean()))
 
 
 def reading_in(recording: Recording, unit: Unit) -> Array:

@@ -50,11 +50,13 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
     """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
-    by then, which is taken out: the third column is how much that is. A load that begins to rise at once is no rest.
+    by then, which is taken out: the third column is how much that is. A load that begins to rise at once is no rest,
+    nor is one whose reading, on a clock that is early, has begun to rise before it.
     """
     found = []
     for session in sessions:
         load = session.conditions.load
+        borne = _without_what_rests_show(model).simulate(session.conditions)
         resting = session.resting.copy()
         command = session.recording.command_n
         if command is not None:
@@ -64,6 +66,7 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
             resting = np.pad(nothing, (0, resting.size - nothing.size)) & (np.abs(load - load[0]) < thresholds.standing)
         elif begins_unloaded(load, session.reading, session.conditions.step_s, thresholds):
             resting = np.abs(load - load[0]) < thresholds.standing
+        resting = resting & (np.abs(borne - borne[0]) < thresholds.standing * model.gain)
         moved = np.flatnonzero(~resting)
         most = max(1, round(thresholds.hold_s / session.conditions.step_s))  # nothing has crept yet
         lasts = int(moved[0]) if moved.size else resting.size
@@ -87,11 +90,14 @@ def _risen(load: Array) -> float:
 
 def _drifted(session: Session, model: ExtendedModel) -> Array:
     """(n,) by how much the model's effects that move the reading at rest have moved it."""
-    still = model
+    return model.simulate(session.conditions) - _without_what_rests_show(model).simulate(session.conditions)
+
+
+def _without_what_rests_show(model: ExtendedModel) -> ExtendedModel:
     for part in model.parts:
         if part.effect.is_seen_at_rest:
-            still = still.without(part.name)
-    return model.simulate(session.conditions) - still.simulate(session.conditions)
+            model = model.without(part.name)
+    return model
 
 
 def _is_past(value: float, sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> bool:

@@ -219,11 +219,12 @@ def _form(
 
 
 def _unit_name(recordings: Sequence[Recording]) -> str:
-    names = {recording.unit for recording in recordings if recording.unit}
-    names = names or {recording.sensor.name for recording in recordings}
-    if len(names) > 1:
-        raise UsageError(f"recordings of different units ({', '.join(sorted(names))}): identify one unit at a time")
-    return names.pop()
+    first_of = {one.unit: one.label for one in reversed(recordings) if one.unit}
+    first_of = first_of or {one.sensor.name: one.label for one in reversed(recordings)}
+    if len(first_of) > 1:
+        units = ", ".join(f"{unit} in {first_of[unit]}" for unit in sorted(first_of))
+        raise UsageError(f"recordings of different units ({units}): identify one unit at a time")
+    return next(iter(first_of))
 
 
 def _scale(

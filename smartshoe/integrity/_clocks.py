@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from smartshoe.arrays import Array, Mask
+from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._fault import Finding, OneClock
 from smartshoe.integrity._following import of_load
 from smartshoe.integrity._scales import five_point_median
@@ -185,7 +185,7 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
     grid, places = of.grid, of.places
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
-    before, repeating = None, _repeats_itself(of.load, given)
+    repeating = _repeats_itself(of.load, given)
     # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
     for lags, earned in ((of.smallest, 1.0 - given.same), (of.best, 1.0 / given.clear)):
         if np.max(np.abs(lags)) <= least:
@@ -195,17 +195,17 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
             ends = offset_s + 0.5 * rate * duration_s * np.array([-1.0, 1.0])
             if np.max(np.abs(ends)) <= least or not _describes(offset_s + rate * (places - middle), lags, given):
                 continue
-            shifted = np.interp(grid - offset_s - rate * (grid - middle), grid, of.load)
-            before = _unexplained(of, of.load, given) if before is None else before
-            after = _unexplained(of, shifted, given)
+            followed_s = grid - offset_s - rate * (grid - middle)
+            known = (followed_s >= grid[0]) & (followed_s <= grid[-1])
+            before = _unexplained(of, of.load, known, given)
+            after = _unexplained(of, np.interp(followed_s, grid, of.load), known, given)
             agreed = lags is of.smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
             # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
             # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
             # a constant lag from a relaxation neither way.
-            if agreed and after.sum() < before.sum() / (1.0 if rate else 1.0 - given.same):
-                return offset_s, rate
+            agrees = agreed and after.sum() < before.sum() / (1.0 if rate else 1.0 - given.same)
             # At rising and at falling edges alike: load that the unit remembers has a lag for each direction.
-            if np.all(after <= earned * before):
+            if agrees or np.all(after <= earned * before):
                 offered.append((float(after.sum()), offset_s, rate))
         if offered:
             return min(offered)[1:]
@@ -265,8 +265,7 @@ def _by_windows(
     d_load = gaussian_filter1d(load, smooth, order=1)
     d_reading = gaussian_filter1d(reading, smooth, order=1)
     moving = np.abs(d_load) > thresholds.faulty_share * np.max(np.abs(d_load))
-    limit = largest_of_noise(grid.size, thresholds) * float(np.median(np.abs(d_reading[moving]))) + 1e-300
-    d_reading = np.clip(d_reading, -limit, limit)  # edges of dropouts and jumps
+    d_reading = _without_jumps(d_reading, moving, thresholds)
     longest_s = thresholds.lasting_s
     most = min(int(np.ceil(longest_s / width_s)), grid.size // 6)
     windows = int(max(1, min(WINDOWS, grid.size * width_s / (thresholds.clear * longest_s))))
@@ -278,36 +277,90 @@ def _by_windows(
         low, high = max(int(first) - most, 0), min(int(last) + most, grid.size)
         if high - low < 4 * most:
             continue
-        correlation = _correlation(d_load[low:high], d_reading[low:high], most)
-        best = int(np.argmax(correlation))
-        if correlation[best] < thresholds.follows or -thresholds.clear * correlation[-1 - best] > correlation[best]:
-            continue  # as much against it as for it, on both sides of zero: one is the other's rate, as in friction
+        correlation = _correlation(d_load[low:high], d_reading[low:high], most, thresholds)
+        best = _peak(correlation, thresholds)
+        if best is None:
+            continue
+        closeness, against = float(correlation[best]), -float(correlation[-1 - best])
+        is_opposed = thresholds.clear * against > closeness
+        # As much against it as for it, on both sides of zero: one is the other's rate, as in friction. Of even steps so
+        # is a delay, which the reading follows far more closely.
+        if closeness < thresholds.follows or (is_opposed and thresholds.clear * (1.0 - closeness) > 1.0 - against):
+            continue
         good = np.flatnonzero(correlation >= (1.0 - thresholds.standing) * correlation[best])
         chosen = int(good[np.argmin(np.abs(lags_bins[good]))])
         # Where zero is not as good as the best there is no plateau from zero on: the peak itself is the lag.
-        peak = float(lags_bins[best]) * width_s
+        peak = (float(lags_bins[best]) + _beside_its_sample(correlation, best)) * width_s
         power = d_load[low:high] ** 2
         places.append(float(np.dot(power, grid[low:high]) / power.sum()))
         smallest.append(peak if lags_bins[chosen] != 0 else 0.0)
         peaks.append(peak)
-        weights.append(float(correlation[best]))
+        weights.append(closeness)
     if not places:
         return None
     each = (np.array(one) for one in (places, smallest, peaks, weights))
     return _Followed(grid, load, reading, smooth_s, *each)
 
 
-def _correlation(load: Array, reading: Array, most: int) -> Array:
-    """(2 most + 1,) correlation at lags -most..most bins; the reading's tail may lie beyond the window."""
+def _without_jumps(increments: Array, moving: Mask, thresholds: Thresholds) -> Array:
+    """(b,) a reading's increments, cut short where they are those of dropouts and jumps.
+
+    Usual is the median of as many of the largest as there are increments in which the load is ``moving`` (b,): when the
+    reading moves, other than how often, is not known before the clocks are.
+    """
+    usual = float(np.quantile(np.abs(increments), 1.0 - 0.5 * float(moving.mean())))
+    limit = largest_of_noise(increments.size, thresholds) * usual + 1e-300
+    return np.asarray(np.clip(increments, -limit, limit))
+
+
+def _correlation(load: Array, reading: Array, most: int, thresholds: Thresholds) -> Array:
+    """(2 most + 1,) correlation at lags -most..most bins, each of what overlaps at it.
+
+    Held against all that moves in the window, a longer lag would seem worse than one shorter by a step of a walk. Where
+    less than half of what moves overlaps, it tells as little as that half would.
+    """
     from scipy.signal import correlate
 
-    load, reading = load - load.mean(), reading - reading.mean()
-    size = float(np.sqrt(np.dot(load, load) * np.dot(reading, reading)))
-    if size == 0.0:
-        return np.zeros(2 * most + 1)
-    full = correlate(reading, load, mode="full", method="fft") / size
-    middle = load.size - 1
-    return full[middle - most : middle + most + 1]
+    lags = np.arange(-most, most + 1)
+    begin, count = np.maximum(lags, 0), load.size - np.abs(lags)  # the reading's samples that overlap
+
+    def overlapping(values: Array, first: Index) -> Array:
+        total = np.append(0.0, np.cumsum(values))
+        return np.asarray(total[first + count] - total[first])
+
+    products = correlate(reading, load, mode="full", method="fft")[load.size - 1 - most : load.size + most]
+    of_load, of_reading = overlapping(load, begin - lags), overlapping(reading, begin)
+    together = products - of_load * of_reading / count
+    power = (overlapping(load**2, begin - lags) - of_load**2 / count) * (
+        overlapping(reading**2, begin) - of_reading**2 / count
+    )
+    least = load.size * float(np.std(load) * np.std(reading)) / thresholds.clear
+    if least == 0.0:
+        return np.zeros(lags.size)
+    return np.asarray(np.minimum(together / np.maximum(np.sqrt(np.maximum(power, 0.0)), least), 1.0))
+
+
+def _peak(correlation: Array, thresholds: Thresholds) -> int | None:
+    """The place, among lags about zero, at which a reading follows; None where it does beyond the longest of them.
+
+    Of an even load each period is a peak: the nearest to zero that no other exceeds far.
+    """
+    best = int(np.argmax(correlation))
+    if best in (0, correlation.size - 1):
+        return None
+    inner = correlation[1:-1]
+    is_peak = (inner >= correlation[:-2]) & (inner >= correlation[2:])
+    peaks = np.flatnonzero(is_peak & (thresholds.clear * (1.0 - correlation[best]) >= 1.0 - inner)) + 1
+    return int(peaks[np.argmin(np.abs(peaks - correlation.size // 2))])
+
+
+def _beside_its_sample(values: Array, best: int) -> float:
+    """Where the peak of ``values`` (n,) lies beside its largest, in samples: that of a parabola through three."""
+    if not 0 < best < values.size - 1:
+        return 0.0
+    before, at, after = values[best - 1 : best + 2]
+    bend = before - 2.0 * at + after
+    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def _lines(places: Array, lags: Array, weights: Array, half_s: float) -> list[tuple[float, float]]:
@@ -340,10 +393,11 @@ def _middle(values: Array, weights: Array) -> float:
 
 
 @on_one_thread
-def _unexplained(of: _Followed, load: Array, thresholds: Thresholds) -> Array:
+def _unexplained(of: _Followed, load: Array, known: Mask, thresholds: Thresholds) -> Array:
     """(2,) sums over rising and over falling ``load`` (b,): squared increments of the reading that no unit makes of it.
 
-    Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
+    Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short. Only
+    where the load is ``known`` (b,): what a reading follows may lie before the recording, or after it.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -355,8 +409,8 @@ def _unexplained(of: _Followed, load: Array, thresholds: Thresholds) -> Array:
     matrix = gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1)
     target = gaussian_filter1d(of.reading, smooth, order=1)
     moving = np.abs(matrix[:, 0]) > thresholds.faulty_share * np.max(np.abs(matrix[:, 0]))
-    limit = largest_of_noise(target.size, thresholds) * float(np.median(np.abs(target[moving])))
-    target = np.clip(target, -limit, limit)
+    target = _without_jumps(target, moving, thresholds)
+    matrix, target = matrix[known], target[known]
     matrix /= np.linalg.norm(matrix, axis=0) + 1e-300
     normal = matrix.T @ matrix
     normal[np.diag_indices_from(normal)] += 1e-6

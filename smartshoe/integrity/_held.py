@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
+from smartshoe.display import moment
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity._scales import ROUNDING, SECOND_DIFFERENCE, turns
 from smartshoe.integrity._view import View, toggling
@@ -46,7 +47,7 @@ def frozen(view: View) -> Finding | None:
     if clear * at.mean() < 1.0 or clear * float(np.ptp(view.load.values[first : last + 1])) < view.load_span:
         return None
     says = (
-        f"the reading stands still from {view.time_s[first]:.4g} to {view.time_s[last]:.4g} s,"
+        f"the reading stands still from {moment(view.time_s[first])} to {moment(view.time_s[last])} s,"
         f" {100 * float(at.mean()):.0f} % of the samples, while the load moves: find what froze, and record it again"
     )
     return Finding.fatal("held_samples", view.whole(at), says)

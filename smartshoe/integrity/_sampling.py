@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from smartshoe.display import moment
 from smartshoe.integrity._fault import Finding
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.recording import Recording
@@ -16,7 +17,7 @@ from smartshoe.signals.noise import robust_sd
 
 def short_recording(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
     """Kind ``short_recording``: fatal, since so little shows nothing, nor what is over before a reading answers."""
-    held = f"{len(recording)} samples in {recording.duration_s:.3g} s" if len(recording) > 1 else "one sample"
+    held = f"{len(recording)} samples in {moment(recording.duration_s, 3)} s" if len(recording) > 1 else "one sample"
     if len(recording) < thresholds.least_samples:
         mend = f"give at least {thresholds.least_samples} samples"
     elif recording.duration_s < thresholds.echo_s:
@@ -71,7 +72,7 @@ def gaps(recording: Recording, thresholds: Thresholds) -> Iterator[Finding]:
     at = np.zeros(len(recording), dtype=bool)
     at[1:][wide] = True
     at[:-1][wide] = True
-    share, longest_s = lost / (lost + len(recording)), f"{float(step.max()):.3g} s"
+    share, longest_s = lost / (lost + len(recording)), f"{moment(float(step.max()), 3)} s"
     yield Finding(
         "gaps",
         at,
@@ -95,5 +96,5 @@ def uneven_sampling(recording: Recording, thresholds: Thresholds) -> Iterator[Fi
         at,
         f"the sampling step varies: {100 * float(at.mean()):.2g} % of the steps differ from the usual"
         f" {usual:.4g} s by more than {100 * thresholds.same:.0f} %"
-        f" (from {float(step.min()):.3g} to {float(step.max()):.3g} s)",
+        f" (from {float(step.min()):.3g} to {moment(float(step.max()), 3)} s)",
     )

@@ -122,7 +122,7 @@ def grid_step(levels: Array, count: Index, thresholds: Thresholds) -> float:
     within = 0.5 * thresholds.same
     steps = [_refined(some, float(np.exp(thresholds.standing * one)), within) for one in np.unique(offered)[::-1]]
     # A ramp without noise takes every tenth step, say: what fits all gaps comes before what fits most.
-    shares = [float(_fits(some, step, within).mean()) if step > 0.0 else 0.0 for step in steps]
+    shares = [np.count_nonzero(_fits(some, step, within)) / some.size if step > 0.0 else 0.0 for step in steps]
     nearly_all, most = 1.0 - thresholds.standing, 1.0 - thresholds.same
     for least in (
         (nearly_all,) if gaps.size < thresholds.local else (nearly_all, most)
@@ -142,4 +142,8 @@ def _fits(gaps: Array, step: float, within: float) -> Mask:
 def _refined(gaps: Array, step: float, within: float) -> float:
     """The step by the gaps that are its multiples, 0 where none is."""
     near = gaps[_fits(gaps, step, within)]
-    return float(np.median(near / np.rint(near / step))) if near.size else 0.0
+    if not near.size:
+        return 0.0
+    sizes = np.sort(near / np.rint(near / step))
+    # np.median of a few dozen gaps, for each of a hundred steps of each recording, takes five times as long.
+    return 0.5 * float(sizes[(sizes.size - 1) // 2] + sizes[sizes.size // 2])

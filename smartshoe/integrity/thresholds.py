@@ -277,10 +277,17 @@ def decided_by(given: Thresholds | None, material: float | None = None) -> Thres
 
 
 def described(given: Thresholds) -> list[dict[str, Any]]:
-    """Name, value, unit, meaning and origin of each."""
-    said = ("unit", "meaning", "origin")
+    """Name, value, unit, meaning and origin of each; of one that is not the usual, what is usual too."""
     return [
-        {"name": f.name, "value": getattr(given, f.name), **{k: f.metadata[k] for k in said}} for f in fields(given)
+        {
+            "name": one.name,
+            "value": (value := getattr(given, one.name)),
+            "unit": one.metadata["unit"],
+            "meaning": one.metadata["meaning"],
+            "origin": origin if value == one.default else f"as asked for; usual is {one.default} ({origin})",
+        }
+        for one in fields(given)
+        for origin in [one.metadata["origin"]]
     ]
 
 

@@ -186,7 +186,8 @@ def test_files_of_several_units_end_in_status_2_and_name_them(
         smartshoe.write(replace(smartshoe.read(files[0]), unit=name), path)
     assert run_command(["diagnose", str(tmp_path / "one.csv"), "--hold-out", str(other), "--json", str(result)]) == 2
     last = capsys.readouterr().err.strip().splitlines()[-1]
-    assert "recordings of different units (left_toe, right_heel): diagnose one unit at a time" in last
+    where = f"left_toe in {tmp_path / 'one.csv'}, right_heel in {other}"
+    assert last == f"error: recordings of different units ({where}): diagnose one unit at a time"
     assert not result.exists()
 
 

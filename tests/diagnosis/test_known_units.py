@@ -79,6 +79,18 @@ def test_a_unit_that_went_on_being_pressed_in_a_gap_of_its_file_has_no_effect(
     assert 1.0 / found.model.relaxation_rate_per_s == pytest.approx((1.0 - SHARE) * tau_s, rel=0.6)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_holds_of_which_the_ramps_were_not_logged_are_foretold_as_well_as_they_are_fitted(seed: int) -> None:
+    """What the arm holds after a gap is the recording's own, also where all of it lies in what is held out."""
+    peaks = np.random.default_rng(seed).permutation(np.linspace(0.1, 1.0, 10))
+    load = _course((0.0, 3.0), *((x, s) for p in peaks for x, s in ((p, 10), (p, 12), (0, 10), (0, 12))), peak_n=PEAK_N)
+    run = _run(load, _solid(load, 5.0), "holds", 0.05, seed)
+    found = diagnose(run.taken(np.abs(np.gradient(load)) < 1e-9))
+    assert (found.verdict, found.causes) == ("adequate", ())
+    assert found.baseline is not None
+    assert found.baseline.rmse == pytest.approx(0.05, rel=0.1)
+
+
 @pytest.mark.parametrize(("load", "offset"), [(TRIANGLES_N, 0.0), (TRIANGLES_N, 5.0), (HOLDS_N, 0.0), (HOLDS_N, 1.0)])
 def test_a_line_without_any_noise_is_diagnosed_and_has_its_offset_alone(load: Array, offset: float) -> None:
     """Of which rounding is all that is left."""

@@ -175,7 +175,7 @@ def test_a_copy_of_wild_values_taken_out_is_one_all_the_same() -> None:
 @pytest.mark.parametrize("hold_out", [True, False])
 def test_recordings_of_several_units_are_refused_by_the_units_names(hold_out: bool) -> None:
     left, right = replace(GOOD, unit="left toe"), replace(OTHER, unit="right heel")
-    said = r"^recordings of different units \(left toe, right heel\): diagnose one unit at a time$"
+    said = r"^recordings of different units \(left toe in good, right heel in other\): diagnose one unit at a time$"
     with pytest.raises(UsageError, match=said):
         diagnose(right, hold_out=left) if hold_out else diagnose([right, left])
     # What says nothing of its unit may be of any.

@@ -18,7 +18,7 @@ from smartshoe.diagnosis._zero import first_rests
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.integrity import OneClock
 from smartshoe.integrity._clocks import Lags, one_clock
-from smartshoe.integrity.thresholds import largest_of_noise
+from smartshoe.integrity.thresholds import decided_by, largest_of_noise
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.recording import Recording
 
@@ -61,6 +61,14 @@ def test_a_hold_or_a_rest_shows_nothing_where_nothing_is_read() -> None:
     assert {"holds", "idle"} <= shown
     # A sample here and there is no hold's end.
     assert {"holds", "rests"} <= _session_traits(load, STANDARD, slice(0, None, 50))
+
+
+def test_a_number_that_was_asked_for_says_so_beside_what_is_usual() -> None:
+    usual = {entry["name"]: entry["origin"] for entry in described(STANDARD)}
+    finer = {entry["name"]: entry for entry in described(decided_by(None, material=1e-4))}
+    for name in ("material", "imperfection", "tolerable"):
+        assert finer[name]["origin"] == f"as asked for; usual is {getattr(STANDARD, name)} ({usual[name]})"
+    assert finer["departure"]["origin"] == usual["departure"]
 
 
 def test_each_number_has_a_unit_a_meaning_and_an_origin() -> None:

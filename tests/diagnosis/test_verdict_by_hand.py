@@ -60,7 +60,8 @@ def test_a_lag_that_a_fit_sees_otherwise_is_said(sign: float, lag_s: float, off_
             said = parted_clocks([(told, value)], model, LONG, STANDARD)
             assert (said is not None) is is_said
             if said is not None:
-                assert f"is {sign * lag_s:.3g} s late by the edges of load and reading, {fitted:.3g} s beside" in said
+                way = "late" if sign > 0.0 else "early"
+                assert f"is {lag_s:.3g} s {way} by the edges of load and reading, {abs(fitted):.3g} s {way}" in said
     # One that is no longer in the model is as it was.
     assert parted_clocks([(told, value)], MODEL, LONG, STANDARD) is None
 
@@ -71,7 +72,8 @@ def test_a_lag_is_that_of_all_that_is_late_in_the_middle_of_a_recording() -> Non
     both = MODEL.with_part(delay, np.array([0.1])).with_part(drift, np.array([0.005]))
     assert parted_clocks(told, both, LONG, STANDARD) is None
     early = MODEL.with_part(delay, np.array([0.1])).with_part(drift, np.array([0.002]))
-    assert "is 0.6 s late by the edges of load and reading, 0.3 s" in str(parted_clocks(told, early, LONG, STANDARD))
+    said = str(parted_clocks(told, early, LONG, STANDARD))
+    assert "is 0.6 s late by the edges of load and reading, 0.3 s late" in said
     beside = MODEL.with_part(delay, np.array([0.1])).with_part(lag, np.array([0.5, 0.1]))
     assert parted_clocks(told, beside, LONG, STANDARD) is None
     assert parted_clocks([(delay, np.array([0.2]))], beside, LONG, STANDARD) is not None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from smartshoe.diagnosis import Thresholds, diagnose
-from smartshoe.diagnosis._aligned import aligned, as_they_follow
+from smartshoe.diagnosis._aligned import _is_load_known, aligned, as_they_follow
 from smartshoe.diagnosis._characteristic import friction_of
 from smartshoe.integrity import OneClock, examine
-from smartshoe.integrity._clocks import UNSEEN, Lags, one_clock
+from smartshoe.integrity._clocks import UNSEEN, Lags, _correlation, _peak, one_clock
 from smartshoe.recording import Recording
 
 STANDARD = Thresholds()
@@ -88,8 +88,8 @@ def test_recordings_of_two_pairs_of_clocks_share_none() -> None:
 
 
 # -- readings ---------------------------------------------------------------------------------------------------------
-def _walked(late_s: float, seed: int = 1, *, held: bool = True) -> Recording:
-    """Steps of about a second, and then a few loads that are ``held``, read ``late_s`` late."""
+def _walked(late_s: float, seed: int = 1, *, held: bool = True, slow_share: float = 0.05) -> Recording:
+    """Steps of about a second, and then a few loads that are ``held``, read ``late_s`` late; a share follows slowly."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(0.0, 90.0, 1.0 / RATE_HZ)
     load = np.zeros(time_s.size)
@@ -110,7 +110,7 @@ def _walked(late_s: float, seed: int = 1, *, held: bool = True) -> Recording:
     return Recording.from_arrays(
         time_s=time_s,
         force_n=800.0 * load + rng.normal(0.0, 0.5, time_s.size),
-        pressure_mbar=100.0 * (read + 0.05 * slow) + rng.normal(0.0, 0.1, time_s.size),
+        pressure_mbar=100.0 * (read + slow_share * slow) + rng.normal(0.0, 0.1, time_s.size),
         name=f"walked_{seed}",
     )
 
@@ -151,16 +151,75 @@ def test_nor_does_one_of_steps_alone_that_is_read_late_by_half_of_one(late_s: fl
     assert found.clock_offset_s[0] == pytest.approx(late_s, abs=0.02)
 
 
-@pytest.mark.parametrize("late_s", [1.6, 2.5])
+@pytest.mark.parametrize("late_s", [-2.5, -2.0, 1.6, 2.0, 2.5, 3.0])
 @pytest.mark.parametrize("seed", [2, 3])
-def test_steps_alone_are_read_as_late_as_other_recordings(late_s: float, seed: int) -> None:
-    """By themselves they follow as closely half a step earlier, turned over."""
+def test_steps_are_read_as_late_as_they_are_alone_and_beside_others(late_s: float, seed: int) -> None:
+    """Late by more than a step: no two steps are alike, so that the reading follows its own far more closely."""
     alone, beside = _walked(late_s, seed, held=False), _ramps(late_s)
-    assert examine([alone], STANDARD).clock_offset_s[0] != pytest.approx(late_s, abs=0.03)
+    found = examine([alone], STANDARD)
+    assert {fault.kind for fault in found.faults} == {"two_clocks"}
+    assert found.clock_offset_s == pytest.approx((late_s,), abs=0.005)
     found = examine([beside, alone], STANDARD)
     assert {fault.kind for fault in found.faults} == {"two_clocks"}
-    assert found.clock_offset_s == pytest.approx((late_s, late_s), abs=0.03)
+    assert found.clock_offset_s == pytest.approx((late_s, late_s), abs=0.05)
     assert found.one_clock is not None
+
+
+@given(
+    seed=st.integers(0, 2**31),
+    size=st.integers(400, 800),
+    lag=st.integers(-50, 50),
+    offset=st.floats(-5.0, 5.0),
+    scale=st.floats(0.1, 10.0),
+)
+def test_what_lags_correlates_wholly_at_its_lag_however_long(
+    seed: int, size: int, lag: int, offset: float, scale: float
+) -> None:
+    """Of what overlaps, whatever zero and gain the reading has: 1 at its own lag, and nowhere more."""
+    longest = 100
+    load = np.random.default_rng(seed).standard_normal(size + 2 * longest)
+    reading = offset + scale * load[longest - lag : longest - lag + size]
+    found = _correlation(load[longest : longest + size], reading, longest, STANDARD)
+    assert found.size == 2 * longest + 1
+    assert np.max(np.abs(found)) <= 1.0
+    assert found[longest + lag] == pytest.approx(1.0, abs=1e-9)
+    assert _peak(found, STANDARD) == longest + lag
+
+
+def test_of_peaks_that_are_as_high_the_one_nearest_to_no_lag_is_taken() -> None:
+    even = np.cos(2.0 * np.pi * np.arange(-100, 101) / 40.0)
+    nudged = even - 1e-6
+    nudged[100 + 40] = 1.0 - 0.6e-6
+    assert _peak(nudged, STANDARD) == 100
+    nudged[100 + 40] = 1.0 - 0.4e-6  # far closer
+    assert _peak(nudged, STANDARD) == 140
+
+
+def test_what_rises_to_the_longest_lag_is_no_peak() -> None:
+    rising = np.linspace(0.0, 1.0, 201)
+    assert _peak(rising, STANDARD) is None
+    assert _peak(rising[::-1], STANDARD) is None
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.4])
+def test_even_strokes_that_are_read_late_are_turned_over_where_others_show_by_how_much(late_s: float) -> None:
+    """Even triangles look the same from above: by themselves they may as well fall as the load rises."""
+    rng = np.random.default_rng(5)
+    time_s = np.arange(0.0, 60.0, 1.0 / RATE_HZ)
+
+    def stroked(at_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 2.0 * np.abs(at_s % 1.0 - 0.5) * np.interp(at_s, [0.0, 60.0], [0.7, 1.0])
+
+    even = Recording.from_arrays(
+        time_s=time_s,
+        force_n=800.0 * stroked(time_s) + rng.normal(0.0, 0.5, time_s.size),
+        pressure_mbar=100.0 * stroked(time_s - late_s) + rng.normal(0.0, 0.1, time_s.size),
+        name="even",
+    )
+    assert "wrong_sign" in {fault.kind for fault in examine([even], STANDARD).faults}
+    found = examine([_ramps(late_s), even], STANDARD)
+    assert {fault.kind for fault in found.faults} == {"two_clocks"}
+    assert found.one_clock == OneClock(pytest.approx(late_s, abs=0.03), 0.0)
 
 
 def test_a_reversed_reading_among_others_on_one_clock_stays_so() -> None:
@@ -211,7 +270,7 @@ def test_what_is_late_by_a_quarter_of_its_period_is_no_friction(drift: float) ->
 
 
 def test_a_walk_shares_the_delay_that_ramps_show() -> None:
-    runs = [_ramps(0.25), _walked(0.25)]
+    runs = [_ramps(0.25), _walked(0.25, slow_share=0.0)]
     integrity = examine(runs, STANDARD)
     assert integrity.clock_offset_s[0] == pytest.approx(0.25, abs=0.06)
     ((one, value),) = aligned(runs, integrity).parts
@@ -233,3 +292,45 @@ def test_a_drift_that_one_recording_tells_and_others_follow_is_one_cause() -> No
     assert float(parts[0][1][0]) == pytest.approx(drift, rel=0.25)
     causes = {cause.name: cause for cause in diagnose(runs, hold_out=[_ramps(0.0, drift, seed=5)]).causes}
     assert causes["clock_drift"].parameters["clock_rate_error"].value == pytest.approx(drift, rel=0.02)
+
+
+# -- diagnoses --------------------------------------------------------------------------------------------------------
+def _parted(recording: Recording, late_s: float) -> Recording:
+    """What was logged while both clocks ran, the reading's ``late_s`` (early where negative) after the load's."""
+    by = round(abs(late_s) * RATE_HZ)
+    ahead, behind = slice(by, None), slice(None, len(recording) - by)
+    load, read = (ahead, behind) if late_s > 0.0 else (behind, ahead)
+    return Recording.from_arrays(
+        time_s=recording.time_s[behind],
+        force_n=recording.force_n[load],
+        pressure_mbar=recording.sensor.values[read],
+        name=recording.name,
+    )
+
+
+@pytest.mark.parametrize("late_s", [-2.0, -0.5, -0.3, 0.3, 0.5, 1.2, 2.0])
+@pytest.mark.parametrize("made", [lambda: _walked(0.0, held=False), lambda: _ramps(0.0)], ids=["steps", "ramps"])
+def test_a_recording_alone_that_is_late_or_early_is_that_and_nothing_else(
+    made: Callable[[], Recording], late_s: float
+) -> None:
+    """Low where the load is high it is no falling reading, on its way where the load rests it has no offset."""
+    found = diagnose([_parted(made(), late_s)])
+    assert [cause.name for cause in found.causes] == ["delay"]
+    assert found.causes[0].parameters["delay"].value == pytest.approx(late_s, abs=0.002)
+    assert found.verdict == "explained"
+    assert found.full_scale_reading > 0.0
+    assert {fault.kind for fault in found.data_faults} == {"two_clocks"}
+
+
+@given(before_s=st.floats(-3.0, 3.0), rate=st.floats(-0.01, 0.01), begins_s=st.floats(-5.0, 1e6))
+def test_a_reading_is_used_where_the_load_that_it_follows_was_logged(
+    before_s: float, rate: float, begins_s: float
+) -> None:
+    time_s = begins_s + 0.1 * np.arange(600)
+    recording = Recording.from_arrays(time_s=time_s, force_n=np.ones(600), pressure_mbar=np.ones(600))
+    clock = OneClock(before_s, rate)
+    lasted_s = time_s - time_s[0]
+    followed_s = lasted_s - before_s - rate * lasted_s
+    known = _is_load_known(recording, clock)
+    assert np.array_equal(known, (followed_s >= 0.0) & (followed_s <= lasted_s[-1]))
+    assert known.sum() >= 600 - (abs(before_s) + 60.0 * abs(rate)) / 0.1 - 2

@@ -168,3 +168,12 @@ def test_where_a_fault_lies_is_told_on_a_clock_that_counts_from_any_day(begins_s
 def test_a_moment_is_told_to_the_millisecond(at_s: float) -> None:
     assert float(moment(at_s)) == pytest.approx(at_s, rel=0.0, abs=1e-3)
     assert "e" not in moment(at_s) or abs(at_s) < 1e-3
+
+
+@given(at_s=st.floats(1e-3, 1e7), digits=st.integers(3, 6))
+def test_a_time_is_told_to_its_digits_however_many_are_noughts(at_s: float, digits: int) -> None:
+    for exact_s in (at_s, float(round(at_s, -2)) or 100.0):
+        told = moment(exact_s, digits)
+        assert float(told) == pytest.approx(exact_s, rel=0.5 * 10.0 ** (1 - digits))
+        assert "e" not in told or exact_s < 1e-3
+    assert moment(3600.0, digits) == "3600"

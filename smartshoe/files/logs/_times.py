@@ -91,7 +91,10 @@ def check_increasing(sheet: Sheet, time_s: Array) -> None:
     if step.size and not (step > 0).all():
         at = int(np.argmax(~(step > 0)))
         fault = "repeats" if step[at] == 0 else "goes back"
+        more = int(np.count_nonzero(~(step > 0))) - 1
+        where, which = (f", as in {more} more", "those rows") if more else ("", "that row")
+        by_rate = ", or read all by their rate (--time 'rows[100Hz]')" if more and (step >= 0.0).all() else ""
         raise InputError(
-            f"{sheet.place(at + 1)}: time {fault} ({time_s[at]:.9g} s, then {time_s[at + 1]:.9g} s): remove or"
-            " re-time that row"
+            f"{sheet.place(at + 1)}: time {fault} ({time_s[at]:.9g} s, then {time_s[at + 1]:.9g} s){where}: remove or"
+            f" re-time {which}{by_rate}"
         )

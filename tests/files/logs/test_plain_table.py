@@ -114,6 +114,8 @@ FAULTS = {
     "time_s,force_n,pressure_mbar\n0,1,2\n1,2\n2,3,4\n": r"line 3 has 2 cells",
     "time_s,force_n\n0,1\n1,2,3\n": r"line 3 has 3 cells",
     "time_s,force_n\n0,1\n0.5,2\n0.5,3\n": r"line 4: time repeats \(0.5 s, then 0.5 s\)",
+    "time_s,force_n\n0,1\n0,2\n1,2\n1,3\n2,2\n2,3\n": r"line 3: time repeats .*as in 2 more: .*'rows\[100Hz\]'",
+    "time_s,force_n\n2,1\n1,2\n0,2\n": r"line 3: time goes back \(2 s, then 1 s\), as in 1 more: [^']*rows$",
     "time_s,force_n\n\n0,1\n0.5,2\n0.25,3\n": r"line 5: time goes back \(0.5 s, then 0.25 s\)",
     "time_s,force_n\n0,1\n,2\n": r"line 3 has no time",
     "time_s,force_n\n0,\n1,\n": r"line 2: every sample of column 'force' is missing",
