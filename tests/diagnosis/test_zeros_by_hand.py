@@ -162,6 +162,7 @@ def test_offsets_are_of_what_is_fitted_without_what_a_past_adds() -> None:
     for offset, fitted in ((0.3, True), (9.0, False), (-0.2, True)):
         one = _session(load, np.full(400, fitted))
         one.held_out, one.usable = ~one.fitted, np.ones(400, dtype=bool)
+        one.judged = one.held_out
         one.reading = MODEL.simulate(one.conditions) + offset + 0.05 * np.exp(-0.22 * time_s)
         sessions.append(one)
     assert offsets(sessions, MODEL) == pytest.approx([0.3, -0.2], abs=2e-3)
