@@ -249,3 +249,26 @@ def test_a_gain_by_the_clock_and_one_by_load_cycles_are_one_where_cycles_come_ev
         assert {*found.next_experiment.separates} == {"gain_drift", "cycle_conditioning"}
     else:
         assert (cause.name, cause.equivalents) == ("gain_drift" if by_clock else "cycle_conditioning", ())
+
+
+# -- zeros that no rest shows -----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("tare", [0.0, 1.0])
+def test_a_zero_that_is_led_back_from_high_loads_is_told_and_one_from_no_load_is_named(tare: float) -> None:
+    """By how much the reading is off at no load is seen; what does it may lie below the lowest load."""
+
+    def run(lowest: float, name: str) -> Recording:
+        load = lowest + (1.0 - lowest) * _course(*[(x, s) for s in (4.0, 2.0) for _ in range(5) for x in (1, 0)])
+        acting = load + tare * 0.025
+        reading = 100.0 * (_solid(acting - acting[0], 2.0) + acting[0] + (1.0 - tare) * 0.025)
+        return _run(PEAK_N * load, reading, name, 0.02, len(name))
+
+    high = [run(0.2, "high"), run(0.25, "higher")]
+    found = diagnose(high)
+    assert (found.verdict, found.causes) == ("adequate", ())
+    (said,) = (one for one in found.limits if one.startswith("led back to no load from 2"))
+    assert "an offset, a tare, or what the unit does below" in said
+    found = diagnose([*high, run(0.0, "from nothing")])
+    (cause,) = found.causes
+    assert {cause.name, *cause.equivalents} == {"zero_offset", "load_cell_tare"}
+    assert cause.parameters["offset"].value == pytest.approx(2.5, rel=0.1)
+    assert not any(one.startswith("led back") for one in found.limits)
