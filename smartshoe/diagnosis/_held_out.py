@@ -16,8 +16,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from smartshoe.arrays import Array, Mask
+from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._scale import Scale
-from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances
+from smartshoe.diagnosis._sensitivity import a_nuisance_each, nuisances, past_sd
 from smartshoe.diagnosis._session import Session
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
@@ -29,14 +30,25 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
 
     (2 + k,): after them its own gains, the changes of its zero and its states after long gaps, if any. A state is
     bounded by what an arm can hold: its share of the whole load.
+
+    Where what is judged comes before all that was fitted, the initial state has the prior that it has in every fit, and
+    noise counts once each correlation time: led back to there, what slow noise does grows by exp(p t).
     """
     mask = _told_by(session, model.pole_per_s)
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
     seen = columns[mask]
-    variance = float(np.var(residual[mask])) if mask.any() else 0.0
-    of_state = variance / max(abs(model.relaxing_share * model.gain), 1e-6) ** 2 + 1e-9
-    inner = seen.T @ seen + a_nuisance_each(session, offset=1e-9, past=of_state, change=variance, gap=of_state)
-    found = np.asarray(np.linalg.solve(inner, seen.T @ residual[mask]), dtype=np.float64)
+    inner, pulled = seen.T @ seen, seen.T @ residual[mask]
+    held = max(abs(model.relaxing_share * model.gain), 1e-6)
+
+    def under(variance: float, state_sd: float) -> Array:
+        of_past, of_gap = (variance / sd**2 + 1e-9 for sd in (state_sd, held))
+        prior = a_nuisance_each(session, offset=1e-9, past=of_past, change=variance, gap=of_gap)
+        return np.asarray(np.linalg.solve(inner + prior, pulled), dtype=np.float64)
+
+    found = under(float(np.var(residual[mask])) if mask.any() else 0.0, held)
+    if session.judged[: int(np.argmax(mask))].any():
+        left = residual - columns @ found
+        found = under(correlated_sd([left], [mask]) ** 2, past_sd(session, model, session.unknown_past))
     return found, columns @ found
 
 

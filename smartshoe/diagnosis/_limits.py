@@ -189,6 +189,16 @@ def past_of(zero: Zero, scale: Scale) -> str:
     )
 
 
+def led_back_of(zero: Zero, scale: Scale) -> str:
+    """What is said of a zero that is led back from loads so high that the unit may do anything below."""
+    value = zero.value * scale.reading
+    return (
+        f"led back to no load from {100 * zero.led_from:.2g} % of it, the reading stands at {value:.3g}"
+        f" {scale.unit.symbol} ({100 * zero.size:.2g} % of full scale): an offset, a tare, or what the unit does below"
+        " such loads, or remembers of those before, of which this data shows nothing (record a rest without load)"
+    )
+
+
 def crept_of(drift: Name, tare: Zero | None) -> str | None:
     """What is said of a drift of the zero that a tare may make by creeping, where there is one."""
     if tare is None:

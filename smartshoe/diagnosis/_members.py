@@ -9,12 +9,13 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._evidence import Evidence, Posterior
+from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of
 from smartshoe.diagnosis._search import BREADTH, RIVALS, additions, allowed
 from smartshoe.diagnosis._sensitivity import Candidate, available, cosines, logged_channels
 from smartshoe.diagnosis._session import Session
-from smartshoe.models.effects import Effect, catalogue
+from smartshoe.models.effects import Effect, blocks, catalogue, told_apart_by
 from smartshoe.models.extended import ExtendedModel
 
 SIZES = (0.5, 5.0, 20.0)  # typical ones, from which a fit begins, a resolution: halved or doubled, no name changed
@@ -44,7 +45,8 @@ class Member:
     place; margins, and the ``fall`` that the effect itself brings, of -2 log likelihood. ``others_depart``: rms by
     which the other members' equations are asked to depart. ``likeness``: largest cosine of what it adds to the reading
     with what another member adds, 0 where all pull against it. ``is_ended``: it lies where it turns into an effect of
-    another kind.
+    another kind. ``untold``: laws of other kinds that nothing in this data tells from it, each fitted in its place as
+    the ``laws`` are, or the free form of its branch where that follows better.
     """
 
     effect: Effect
@@ -57,6 +59,7 @@ class Member:
     others_depart: float = 0.0
     likeness: float = 0.0
     is_ended: bool = False
+    untold: tuple[Alternative, ...] = ()
 
     @property
     def is_any_curve(self) -> bool:
@@ -80,24 +83,28 @@ def members_of(evidence: Evidence, best: Posterior, extended: Fit) -> tuple[Memb
     likeness = cosines(inner)
     np.fill_diagonal(likeness, 0.0)
     departures = thresholds.departure * np.array(best.departed) * sizes
+    present = excitation_of(likelihood.sessions, thresholds).tells_apart
     made = []
     for k, (member, one) in enumerate(zip(best.members, chosen, strict=True)):
         is_there = sizes[k] > thresholds.imperfection
         is_ended = bool(extended.model.part(one.name).kind_ends_at)
         shapes = _shapes_beside(best, member, evidence)
         laws = _other_laws(one, less[k], extended, shapes, is_ended=is_ended) if is_there else ()
+        others = alternatives(evidence, best, member)
+        rivals = [law for a in others if (law := _untold_law(a, one.effect, present)) is not None]
         made.append(
             Member(
                 one.effect,
                 float(sizes[k]),
                 best.departed[k],
-                alternatives(evidence, best, member),
+                others,
                 less[k],
                 laws,
                 less[k].cost - extended.cost,
                 float(np.linalg.norm(np.delete(departures, k))),
                 float(likeness[k].max()),
                 is_ended,
+                tuple(_of_kind(law, less[k], extended) for law in rivals) if is_there else (),
             )
         )
     return tuple(sorted(made, key=lambda one: -one.size))
@@ -151,6 +158,22 @@ def _other_laws(
             continue  # as little a law as what it would stand for
         found.append(Alternative(law.name, fitted.cost - extended.cost, fitted))
     return tuple(sorted(found, key=lambda a: a.margin))
+
+
+def _untold_law(other: Alternative, one: Effect, present: frozenset[str]) -> Effect | None:
+    """An alternative of another kind that the catalogue knows how to tell from ``one``, by nothing that is present."""
+    if other.effect is None or (law := catalogue()[other.effect]).kind == one.kind:
+        return None
+    words = told_apart_by(one, law)
+    return law if words and not words & present else None
+
+
+def _of_kind(law: Effect, less: Fit, extended: Fit) -> Alternative:
+    """A law in a member's place, or the free form of its branch where that follows better."""
+    free = (one for one in blocks().get(law.family, ()) if one.branch == law.branch)
+    fits = [fit_with(one, less.model, less.likelihood) for one in (law, *free)]
+    found = min(fits, key=lambda one: one.cost)
+    return Alternative(law.name, found.cost - extended.cost, found)
 
 
 def begun_with(law: Effect, model: ExtendedModel, likelihood: Likelihood) -> ExtendedModel:

@@ -57,6 +57,7 @@ def names_of(
     where its kind ends, is named by the law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
+    likely = [_with_untold(name, thresholds) for name in likely]
     likely = [
         _doubted(name) if is_unsteady or (is_clocked and name.effect.goes_with_the_clock) else name for name in likely
     ]
@@ -100,6 +101,18 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
     ruled_out = {a.effect for a in one.laws if thresholds.clear * a.margin > one.fall}
     kin = tuple(name for name in others if name not in ruled_out)
     return Name(one, nearest, kind, 1.0 / (1.0 + len(kin)), kin, True, is_sure)
+
+
+def _with_untold(name: Name, thresholds: Thresholds) -> Name:
+    """Also equivalent are laws of other kinds that nothing tells from it and that miss no more of it than laws do."""
+    member = name.member
+    alike = [one for one in member.untold if one.margin <= thresholds.departure**2 * member.fall]
+    if not alike:
+        return name
+    others = dict.fromkeys((*name.equivalents, *(str(one.effect) for one in alike)))
+    nearest = float(odds_of_law(min(one.margin for one in alike), member.fall, thresholds))
+    law = min(name.law_probability, 1.0 / (1.0 + nearest))
+    return replace(name, law_probability=law, equivalents=tuple(others))
 
 
 def _law_in_its_place(one: Member) -> Alternative | None:

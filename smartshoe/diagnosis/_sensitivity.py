@@ -116,11 +116,15 @@ def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thres
     rest still carries some of what went before. One more row for each gain of its own, each change of its zero, and
     each long gap, in which any load may have come.
     """
-    held = abs(model.relaxing_share) * abs(model.gain)
-    begun = float(np.abs(session.conditions.load[0]))
-    sd = max(held * max(begun, thresholds.unknown_past), FLOOR)
-    gap_sd = max(held * float(np.max(session.conditions.load)), FLOOR)
+    sd = past_sd(session, model, thresholds.unknown_past)
+    gap_sd = max(abs(model.relaxing_share) * abs(model.gain) * float(np.max(session.conditions.load)), FLOOR)
     return a_nuisance_each(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
+
+
+def past_sd(session: Session, model: ExtendedModel, unknown_past: float) -> float:
+    """Standard deviation of what the arm brings along: of the load that it begins with, ``unknown_past`` at least."""
+    held = abs(model.relaxing_share) * abs(model.gain)
+    return max(held * max(float(np.abs(session.conditions.load[0])), unknown_past), FLOOR)
 
 
 def a_nuisance_each(session: Session, *, offset: float, past: float, change: float, gap: float) -> Array:

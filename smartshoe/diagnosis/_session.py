@@ -50,6 +50,7 @@ class Session:
     recording lies beside that of all; 0 where they share one. ``gain_changes``: the samples from which on it is
     another, in order; ``zero_changes`` those from which on its reading without load is, by ``zero_sd`` of full scale.
     ``gap_ends``: the first samples after gaps in which the load is not known for so long that the wall may have crept.
+    ``unknown_past``: the load, as a share, that a unit may remember from before it where it begins at rest.
     """
 
     recording: Recording
@@ -67,6 +68,7 @@ class Session:
     zero_changes: tuple[int, ...] = ()
     zero_sd: float = 0.0
     gap_ends: tuple[int, ...] = ()
+    unknown_past: float = 1.0
 
     @property
     def gain_parts(self) -> tuple[Mask, ...]:
@@ -224,6 +226,7 @@ def _session(
             for begin, end in zip(*runs_of(~logged.load_known), strict=True)
             if begin > 0 and end < logged.load_known.size and (end - begin) * step_s > thresholds.settled_s
         ),
+        unknown_past=thresholds.unknown_past,
     )
 
 

@@ -10,6 +10,7 @@ from smartshoe.diagnosis._limits import (
     crept_of,
     departure_of,
     few_cycles_of,
+    led_back_of,
     moved_of,
     not_shown_of,
     other_kind_of,
@@ -56,11 +57,14 @@ def causes_among(found: Inference, given: Prepared, zeros: Sequence[Zero], left:
     names = tuple(one for one in seen.names if one.effect not in clocks)
     before = () if parted is None else (parted,)
     past = tuple(past_of(one, given.scale) for one in zeros if one.is_past)
+    led = tuple(led_back_of(one, given.scale) for one in zeros if one.led_from and not one.is_past)
     # A zero that jumps within recordings is no offset.
     kept = tuple(
-        one for one in zeros if not one.is_past and not (found.zero_changes and one.effect.shifts == "reading")
+        one
+        for one in zeros
+        if not (one.is_past or one.led_from or (found.zero_changes and one.effect.shifts == "reading"))
     )
-    seen = Chosen(names, kept, (*before, *seen.limits, *past), seen.nameless)
+    seen = Chosen(names, kept, (*before, *seen.limits, *past, *led), seen.nameless)
     return seen.without(lambda one: crept_of(one, creeping(kept, one.effect, one.member.size, thresholds)))
 
 

@@ -29,6 +29,8 @@ class Zero:
     ``size`` it moves the reading by; ``alternatives`` that this data cannot tell from it. ``is_past``: the model's own
     drift of the zero may have brought it there before the recordings began, so that no offset beside it is seen (nor a
     tare, where the unit bears the load that is shown, and the zero may have drifted to what it reads beyond that).
+    ``led_from``: the load from which on it is led back to none, where what the unit does below, or remembers, may make
+    as much of it.
     """
 
     effect: Effect
@@ -37,6 +39,7 @@ class Zero:
     size: float
     alternatives: tuple[str, ...] = ()
     is_past: bool = False
+    led_from: float = 0.0
 
 
 def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
@@ -176,17 +179,22 @@ def _unseen(
 ) -> tuple[Zero, ...]:
     """The zero of a unit that is never seen unloaded at first: by its model, and an offset or a tare may be it."""
     found = offsets(sessions, model)
-    mean = float(np.mean(found))
     fitted = fitted_of(sessions)
-    begun = float(np.mean([abs(one.conditions.load[0]) for one in fitted]))
-    lowest = min(float(np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01)) for one in fitted)
-    scatter = float(np.std(found, ddof=1) / np.sqrt(found.size)) if found.size > 1 else 0.0
-    # What the unit remembers of an unknown past, beyond what its one arm does; the curve below the lowest load; drifts.
+    # What each remembers of an unknown past, beyond what its one arm does; drifts; the curve below its lowest load.
+    begun = np.array([abs(one.conditions.load[0]) for one in fitted])
     past = begun * (thresholds.departure * abs(model.relaxing_share) + remembered)
-    below = thresholds.departure * lowest
-    drifted = thresholds.departure * float(np.mean([np.ptp(_drifted(one, model)) for one in fitted]))
-    sd = float(np.linalg.norm([scatter, thresholds.zero_sd, left, past, below, drifted]))
-    if abs(mean) > thresholds.foreign_zero or abs(mean) < largest_of_noise(1, thresholds) * sd:
+    drifted = thresholds.departure * np.array([np.ptp(_drifted(one, model)) for one in fitted])
+    lowest = np.array([np.quantile(np.abs(one.conditions.load[one.fitted]), 0.01) for one in fitted])
+    own = np.hypot(thresholds.zero_sd, drifted)
+    sds = np.sqrt(own**2 + past**2 + (thresholds.departure * lowest) ** 2)
+    weights = sds**-2 / np.sum(sds**-2)
+    mean = float(weights @ found)
+    scatter = float(np.sqrt(weights @ (found - mean) ** 2 / (found.size - 1))) if found.size > 1 else 0.0
+    # Errors of the model are of one sign in all of them, and no number of recordings takes them out.
+    near, sd = (float(np.linalg.norm([scatter, left, weights @ one])) for one in (own, sds))
+    many = largest_of_noise(1, thresholds)
+    if abs(mean) > thresholds.foreign_zero or abs(mean) < many * near:
         return ()
+    led_from = float(weights @ lowest) if abs(mean) < many * sd else 0.0
     is_past = _is_past(mean, sessions, model, thresholds)
-    return (Zero(shift_of("reading"), mean, sd, abs(mean), (shift_of("load").name,), is_past),)
+    return (Zero(shift_of("reading"), mean, sd, abs(mean), (shift_of("load").name,), is_past, led_from),)

@@ -237,3 +237,50 @@ def test_holds_without_any_noise_are_diagnosed_without_overflow(offset_mbar: flo
     run = Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name="exact")
     with np.errstate(over="raise"):
         diagnose(run)
+
+
+# -- what nothing in the data tells apart -----------------------------------------------------------------------------
+@pytest.mark.parametrize("by_clock", [True, False])
+@pytest.mark.parametrize("paces_s", [(3.0,), (2.0, 6.0)])
+def test_a_gain_by_the_clock_and_one_by_load_cycles_are_one_where_cycles_come_evenly(
+    by_clock: bool, paces_s: tuple[float, ...]
+) -> None:
+    """At one pace, in recordings of one rate, cycles are a clock; at two, they are none."""
+    runs = []
+    for k, ramp_s in enumerate((*paces_s, *paces_s)[:2]):
+        load = _course((0.0, 2.0), *[(x, s) for _ in range(14) for x, s in ((1, ramp_s), (0, ramp_s), (0, 1))])
+        gone = _times(load) / 42.0 if by_clock else np.cumsum(np.abs(np.diff(load, prepend=0.0))) / 2.0 / 6.0
+        reading = 100.0 * _solid(load, 2.0) * (1.04 - 0.04 * np.exp(-gone))
+        runs.append(_run(PEAK_N * load, reading, f"run_{k}", 0.02, k))
+    found = diagnose(runs)
+    (cause,) = (one for one in found.causes if one.name in {"gain_drift", "cycle_conditioning"})
+    assert cause.confidence >= 0.5  # by the clock only its free form follows
+    if len(paces_s) == 1:
+        assert {cause.name, *cause.equivalents} == {"gain_drift", "cycle_conditioning"}
+        assert found.next_experiment is not None
+        assert {*found.next_experiment.separates} == {"gain_drift", "cycle_conditioning"}
+    else:
+        assert (cause.name, cause.equivalents) == ("gain_drift" if by_clock else "cycle_conditioning", ())
+
+
+# -- zeros that no rest shows -----------------------------------------------------------------------------------------
+@pytest.mark.parametrize("tare", [0.0, 1.0])
+def test_a_zero_that_is_led_back_from_high_loads_is_told_and_one_from_no_load_is_named(tare: float) -> None:
+    """By how much the reading is off at no load is seen; what does it may lie below the lowest load."""
+
+    def run(lowest: float, name: str) -> Recording:
+        load = lowest + (1.0 - lowest) * _course(*[(x, s) for s in (4.0, 2.0) for _ in range(5) for x in (1, 0)])
+        acting = load + tare * 0.025
+        reading = 100.0 * (_solid(acting - acting[0], 2.0) + acting[0] + (1.0 - tare) * 0.025)
+        return _run(PEAK_N * load, reading, name, 0.02, len(name))
+
+    high = [run(0.2, "high"), run(0.25, "higher")]
+    found = diagnose(high)
+    assert (found.verdict, found.causes) == ("adequate", ())
+    (said,) = (one for one in found.limits if one.startswith("led back to no load from 2"))
+    assert "an offset, a tare, or what the unit does below" in said
+    found = diagnose([*high, run(0.0, "from nothing")])
+    (cause,) = found.causes
+    assert {cause.name, *cause.equivalents} == {"zero_offset", "load_cell_tare"}
+    assert cause.parameters["offset"].value == pytest.approx(2.5, rel=0.1)
+    assert not any(one.startswith("led back") for one in found.limits)

@@ -236,6 +236,21 @@ def test_a_block_is_named_by_a_law_of_its_own_stage() -> None:
     assert "zero_drift" in name.equivalents
 
 
+@pytest.mark.parametrize("of", ["gain_drift", "flexible_gain_drift"])
+def test_a_law_of_another_kind_that_nothing_tells_from_it_is_equivalent_where_it_misses_no_more_than_laws(
+    of: str,
+) -> None:
+    drift, most = member(of, laws=()), STANDARD.departure**2 * 1000.0
+    for margin, equivalents in ((most, ("cycle_conditioning",)), (1.01 * most, ())):
+        told = replace(drift, untold=(Alternative("cycle_conditioning", margin),))
+        name = only(names_of([told], 0.0, STANDARD))
+        assert (name.effect.name, name.equivalents) == ("gain_drift", equivalents)
+    near = replace(drift, untold=(Alternative("cycle_conditioning", 0.0),))
+    assert only(names_of([near], 0.0, STANDARD)).law_probability == pytest.approx(0.5)
+    both = [near, member("cycle_conditioning")]  # what is there itself stands for no other
+    assert [one.equivalents for one in names_of(both, 0.0, STANDARD)] == [(), ()]
+
+
 def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() -> None:
     """A leak or a drift may do what the other does, or a curve; a fast effect is none of these."""
     fast, slow, doubted = member("play_hysteresis"), member("zero_drift"), member("linear_leak", departed=7.5)

@@ -16,6 +16,7 @@ from smartshoe.diagnosis import _members, _search, _state, _validation
 from smartshoe.diagnosis._evidence import Posterior
 from smartshoe.diagnosis._held_out import residual_of
 from smartshoe.diagnosis._members import (
+    Alternative,
     _other_laws,
     _shapes_beside,
     alternatives,
@@ -220,10 +221,13 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
         return np.array([3.0, 7.0]) + sum((sizes[name] * ways[name] for name in missing), np.zeros(2))
 
     monkeypatch.setattr(_members, "_left", left)
-    monkeypatch.setattr(_members, "alternatives", lambda *given: given[2:])
+    near = [Alternative(name, 1.0) for name in ("orifice_leak", "zero_drift", "delay", "contact_area")]
+    monkeypatch.setattr(_members, "alternatives", lambda *given: (Alternative(None, float(given[2])), *near))
     monkeypatch.setattr(
-        _members, "fit_with", lambda law, model, likelihood, shapes: fitted(likelihood, model.with_part(law), 4)
+        _members, "fit_with", lambda law, model, likelihood, shapes=(): fitted(likelihood, model.with_part(law), 4)
     )
+    present = frozenset({"low_loads"})
+    monkeypatch.setattr(_members, "excitation_of", lambda *given: SimpleNamespace(tells_apart=present))
     laws = [effect(name) for name in ("orifice_leak", "dead_band", "delay")]
     monkeypatch.setattr(_members, "available", lambda sessions, thresholds: laws)
     likelihood: Any = SimpleNamespace(sessions=(), thresholds=STANDARD)
@@ -236,8 +240,12 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     assert [m.others_depart for m in found] == pytest.approx(
         [0.25 * 0.3 * sizes["linear_leak"], 0.25 * 0.7 * sizes["dead_band"]]
     )
-    assert found[1].alternatives == (0,)
-    assert found[1].laws == ()  # what is hardly there has no other law
+    assert [[one.margin for one in m.alternatives] for m in found] == [
+        [1.0, 1.0, 1.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0, 1.0, 1.0],
+    ]
+    assert (found[1].laws, found[1].untold) == ((), ())  # what is hardly there has no other law
+    assert found[0].untold == ()  # low loads tell a dead band from a curve, and nothing must tell it from a delay
     others = [law.name for law in laws if law.family == two.family and law.name != two.name]
     assert [law.effect for law in found[0].laws] == others
     assert set(asked) == {4}
@@ -246,6 +254,8 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     (leak, _) = members_of(evidence, best, extended)
     assert [(law.effect, law.margin) for law in leak.laws] == [("orifice_leak", 15.0)]
     assert leak.likeness == 0.0  # the other pulls against it
+    # Of another kind, and told from it by what is not there; the free form of another branch is none of its kind.
+    assert [(law.effect, law.margin) for law in leak.untold] == [("zero_drift", 13.0)]
 
 
 def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:

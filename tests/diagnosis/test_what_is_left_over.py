@@ -74,6 +74,22 @@ def test_an_initial_state_is_no_larger_than_what_the_arm_can_hold(one: Session) 
     assert abs(stiff[1]) < 0.2 * abs(found[1])
 
 
+def test_slow_noise_is_not_led_back_to_first_cycles_that_are_held_out(one: Session) -> None:
+    """What a unit brings along grows by exp(p t) towards them: white noise would tell it from what little is left."""
+    step_s, time_s = one.conditions.step_s, one.conditions.time_s
+    held = time_s < 2.0 / MODEL.pole_per_s
+    decay = np.exp(-step_s / 2.0)
+    for seed in range(5):
+        white = 1e-3 * np.sqrt(1.0 - decay**2) * np.random.default_rng(seed).standard_normal(time_s.size)
+        slow_noise = lfilter([1.0], [1.0, -decay], white)
+        off = replace(one, reading=one.reading + slow_noise, held_out=held)
+        assert np.max(np.abs(residual_of(off, MODEL)[held] - slow_noise[held])) < 2.5e-3
+    loaded = replace(one, conditions=replace(one.conditions, load=one.conditions.load + 0.3), held_out=held)
+    past = np.exp(-MODEL.pole_per_s * time_s)
+    own, _ = own_of(loaded, MODEL, 0.01 + 0.02 * past)
+    assert own == pytest.approx([0.01, 0.02], rel=0.02)  # where nothing hides it, it is found
+
+
 def test_errors_are_counted_by_held_out_cycle(one: Session) -> None:
     held = np.isin(one.cycle, [2, 5])
     off = 0.01 * (one.cycle == 2) + 0.03 * (one.cycle == 5)

@@ -102,42 +102,62 @@ def _session(load: Array, fitted: Any = None) -> Any:
     )  # fmt: skip
 
 
-def _told(monkeypatch: pytest.MonkeyPatch, offsets: list[float], left: float = 0.0, remembered: float = 0.0) -> Any:
+def _told(
+    monkeypatch: pytest.MonkeyPatch,
+    offsets: list[float],
+    left: float = 0.0,
+    remembered: float = 0.0,
+    share: float = 1.0,
+    begun: tuple[float, ...] = (0.2, 0.4),
+) -> Any:
+    """Of recordings that begin at such a ``share`` of these loads, their lowest, and drift by as much."""
     monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(offsets))
     monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
-    sessions = [_session(np.linspace(0.2, 0.9, 101)), _session(np.linspace(-0.4, -0.9, 101))]
+    sessions = [_session(share * np.linspace(one, 0.9, 101)) for one in begun[: len(offsets)]]
     sessions.append(_session(np.full(9, 0.01), np.zeros(9, dtype=bool)))
     return _unseen(sessions, MODEL, left, remembered, STANDARD)
 
 
-def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Past: begun at 0.3 on the mean, a quarter of the arm's tenth and what is remembered; lowest 0.207; drifts 0.3.
-    past = 0.3 * (0.25 * 0.1 + 0.02)
-    drifted = 0.25 * np.mean([0.2, 0.4])
-    for shown in ([0.2], [0.25, 0.27], [0.2, 0.24, 0.25]):
-        scatter = np.std(shown, ddof=1) / math.sqrt(len(shown)) if len(shown) > 1 else 0.0
-        sd = math.sqrt(scatter**2 + 4e-4**2 + 0.003**2 + past**2 + (0.25 * 0.207) ** 2 + drifted**2)
-        mean = float(np.mean(shown))
-        assert mean < MANY * sd
-        assert _told(monkeypatch, shown, 0.003, 0.02) == ()
-        (zero,) = _scaled_down(monkeypatch, shown)
-        assert zero.sd == pytest.approx(0.1 * sd)
-        assert (zero.value, zero.size) == (pytest.approx(mean), pytest.approx(abs(mean)))
-        assert (zero.effect.shifts, zero.alternatives) == ("reading", (shift_of("load").name,))
-    for sign in (1.0, -1.0):
-        (zero,) = _scaled_down(monkeypatch, [sign * 0.2])
-        assert (zero.value, zero.size) == (pytest.approx(sign * 0.2), pytest.approx(0.2))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("shown", [[0.2], [0.25, 0.27]])
+def test_a_zero_that_is_never_seen_is_known_as_well_as_all_that_may_lie_in_it(
+    monkeypatch: pytest.MonkeyPatch, shown: list[float], sign: float
+) -> None:
+    """The past of a quarter of the arm and of what is remembered; a quarter of the lowest load and of drifts."""
+    begun = 0.02 * np.array([0.2, 0.4])[: len(shown)]
+    lowest = begun + 0.01 * (0.02 * 0.9 - begun)
+    own = 4e-4**2 + (begun * (0.25 * 0.1 + 0.02)) ** 2 + (0.25 * begun) ** 2 + (0.25 * lowest) ** 2
+    weights = 1.0 / own
+    weights /= weights.sum()
+    mean = float(weights @ shown)
+    scatter = math.sqrt(weights @ (np.array(shown) - mean) ** 2) if len(shown) > 1 else 0.0
+    sd = math.sqrt(scatter**2 + 0.003**2 + (weights @ np.sqrt(own)) ** 2)
+    (zero,) = _told(monkeypatch, [sign * one for one in shown], 0.003, 0.02, 0.02)
+    assert zero.sd == pytest.approx(sd)
+    assert (zero.value, zero.size) == (pytest.approx(sign * mean), pytest.approx(mean))
+    assert (zero.effect.shifts, zero.alternatives) == ("reading", (shift_of("load").name,))
+    assert zero.led_from == 0.0
 
 
-def _scaled_down(monkeypatch: pytest.MonkeyPatch, shown: list[float]) -> Any:
-    """All that may lie in it a tenth as large, the scatter's share by more recordings like these."""
-    mean = float(np.mean(shown))
-    small = [mean + 0.1 * (one - mean) for one in shown]
-    monkeypatch.setattr(_zero, "offsets", lambda *given: np.array(small))
-    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.linspace(0.01, 0.01 + one.conditions.load[0], 5))
-    sessions = [_session(0.1 * np.linspace(0.2, 0.9, 101)), _session(-0.1 * np.linspace(0.4, 0.9, 101))]
-    thresholds = replace(STANDARD, zero_sd=4e-5)
-    return _unseen(sessions, MODEL, 0.0003, 0.02, thresholds)
+def test_of_recordings_that_are_never_unloaded_those_tell_the_zero_that_come_nearest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One that begins at half of full scale, or is pressed from there on, hides nothing of one from next to none."""
+    for shown in ([0.02], [0.02, 0.05], [0.02, -0.3]):
+        (zero,) = _told(monkeypatch, shown, begun=(1e-4, 0.5))
+        assert (zero.value, zero.led_from) == (pytest.approx(0.02, abs=2e-3), 0.0)
+        assert zero.sd < 0.005
+
+
+def test_a_zero_that_is_led_back_from_high_loads_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the unit does below them may make it: it is no cause."""
+    monkeypatch.setattr(_zero, "_drifted", lambda one, model: np.zeros(5))
+    still, load = replace(MODEL, relaxing_share=0.0), np.linspace(0.2, 0.9, 101)
+    near, sd = MANY * STANDARD.zero_sd, MANY * math.hypot(STANDARD.zero_sd, 0.25 * 0.207)
+    for offset, led_from in ((0.999 * near, None), (1.001 * near, 0.207), (0.999 * sd, 0.207), (1.001 * sd, 0.0)):
+        monkeypatch.setattr(_zero, "offsets", lambda *given, offset=offset: np.array([offset]))
+        found = _unseen([_session(load)], still, 0.0, 0.0, STANDARD)
+        assert [one.led_from for one in found] == ([] if led_from is None else [pytest.approx(led_from)])
 
 
 def test_an_unseen_zero_is_told_between_its_deviations_and_what_is_foreign(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,6 +182,7 @@ def test_offsets_are_of_what_is_fitted_without_what_a_past_adds() -> None:
     for offset, fitted in ((0.3, True), (9.0, False), (-0.2, True)):
         one = _session(load, np.full(400, fitted))
         one.held_out, one.usable = ~one.fitted, np.ones(400, dtype=bool)
+        one.judged = one.held_out
         one.reading = MODEL.simulate(one.conditions) + offset + 0.05 * np.exp(-0.22 * time_s)
         sessions.append(one)
     assert offsets(sessions, MODEL) == pytest.approx([0.3, -0.2], abs=2e-3)

@@ -42,7 +42,7 @@ class CycleConditioning(Remembering):
     )
     exposed_by = by("repeats", "pauses")
     separated_by = {
-        "gain_drift": by("pauses", "temperature"),
+        "gain_drift": by("pauses", "rates", "temperature"),
         "mullins_softening": by("shuffled_loads"),
         "warm_up": by("pauses"),
     }

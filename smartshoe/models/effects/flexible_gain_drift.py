@@ -28,7 +28,7 @@ class FlexibleGainDrift(Effect):
     shapes = tuple({"time_constant": tau, "stretch": 1.0} for tau in (30.0, 100.0, 300.0))
     exposed_by = by("repeats", "peaks", "pauses")
     separated_by = {
-        "cycle_conditioning": by("pauses", "temperature"),
+        "cycle_conditioning": by("pauses", "rates", "temperature"),
         "mullins_softening": by("pauses", "shuffled_loads"),
     }
     is_flexible = True

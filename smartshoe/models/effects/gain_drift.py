@@ -48,7 +48,7 @@ class GainDrift(Effect):
     exposed_by = by("repeats", "peaks", "pauses")
     separated_by = {
         "coloured_noise": by("repeats"),
-        "cycle_conditioning": by("pauses", "temperature"),
+        "cycle_conditioning": by("pauses", "rates", "temperature"),
         "load_unload_asymmetry": by("repeats"),
         "mullins_softening": by("pauses", "shuffled_loads"),
         "zero_drift": by("rests", "peaks"),
