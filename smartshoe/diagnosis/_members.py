@@ -161,18 +161,23 @@ def _other_laws(
 
 
 def _untold_law(other: Alternative, one: Effect, present: frozenset[str]) -> Effect | None:
-    """An alternative of another kind that the catalogue knows how to tell from ``one``, by nothing that is present."""
+    """An alternative of another kind that the catalogue knows how to tell from ``one``, by nothing that is present.
+
+    Curves are weighed against one another by their laws: the free form of one follows any.
+    """
     if other.effect is None or (law := catalogue()[other.effect]).kind == one.kind:
+        return None
+    if law.is_memoryless and one.is_memoryless:
         return None
     words = told_apart_by(one, law)
     return law if words and not words & present else None
 
 
 def _of_kind(law: Effect, less: Fit, extended: Fit) -> Alternative:
-    """A law in a member's place, or the free form of its branch where that follows better."""
+    """A law in a member's place, or the free form of its branch where that follows better, fitted to its end."""
     free = (one for one in blocks().get(law.family, ()) if one.branch == law.branch)
     fits = [fit_with(one, less.model, less.likelihood) for one in (law, *free)]
-    found = min(fits, key=lambda one: one.cost)
+    found = fit(less.likelihood, min(fits, key=lambda one: one.cost).model)
     return Alternative(law.name, found.cost - extended.cost, found)
 
 

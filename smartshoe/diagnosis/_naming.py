@@ -104,9 +104,12 @@ def _named(one: Member, left: float, thresholds: Thresholds) -> Name:
 
 
 def _with_untold(name: Name, thresholds: Thresholds) -> Name:
-    """Also equivalent are laws of other kinds that nothing tells from it and that miss no more of it than laws do."""
+    """Also equivalent are laws of other kinds that nothing tells from it and that follow it as its own would.
+
+    A law of its kind, or the free form, follows what its equation departs by, and misses what that departs by again.
+    """
     member = name.member
-    alike = [one for one in member.untold if one.margin <= thresholds.departure**2 * member.fall]
+    alike = [one for one in member.untold if one.margin <= thresholds.departure**4 * member.fall]
     if not alike:
         return name
     others = dict.fromkeys((*name.equivalents, *(str(one.effect) for one in alike)))

@@ -188,11 +188,14 @@ def test_what_lags_correlates_wholly_at_its_lag_however_long(
 
 def test_of_peaks_that_are_as_high_the_one_nearest_to_no_lag_is_taken() -> None:
     even = np.cos(2.0 * np.pi * np.arange(-100, 101) / 40.0)
-    nudged = even - 1e-6
-    nudged[100 + 40] = 1.0 - 0.6e-6
+    nudged = even - 0.1
+    nudged[100 + 40] = 1.0 - 0.06
     assert _peak(nudged, STANDARD) == 100
-    nudged[100 + 40] = 1.0 - 0.4e-6  # far closer
+    nudged[100 + 40] = 1.0 - 0.04  # far closer
     assert _peak(nudged, STANDARD) == 140
+    nudged = even - 0.01
+    nudged[100 + 40] = 1.0  # closer by what a unit itself does
+    assert _peak(nudged, STANDARD) == 100
 
 
 def test_what_rises_to_the_longest_lag_is_no_peak() -> None:
