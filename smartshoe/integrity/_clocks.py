@@ -343,17 +343,16 @@ def _correlation(load: Array, reading: Array, most: int, thresholds: Thresholds)
 def _peak(correlation: Array, thresholds: Thresholds) -> int | None:
     """The place, among lags about zero, at which a reading follows; None where it does beyond the longest of them.
 
-    Of an even load each period is a peak: the nearest to zero that no other exceeds far, nor by more than what a unit
-    does to its reading: a gain that drifts makes of two periods the later one the closer.
+    Of an even load each period is a peak: the nearest to zero that no other exceeds far. By as little as the square of
+    what counts as standing still none does: a gain that drifts makes of two periods the later one the closer.
     """
     best = int(np.argmax(correlation))
     if best in (0, correlation.size - 1):
         return None
     inner = correlation[1:-1]
     is_peak = (inner >= correlation[:-2]) & (inner >= correlation[2:])
-    is_near = inner >= (1.0 - thresholds.standing) * correlation[best]
-    is_as_close = is_near | (thresholds.clear * (1.0 - correlation[best]) >= 1.0 - inner)
-    peaks = np.flatnonzero(is_peak & is_as_close) + 1
+    missed = max(1.0 - float(correlation[best]), thresholds.standing**2)
+    peaks = np.flatnonzero(is_peak & (thresholds.clear * missed >= 1.0 - inner)) + 1
     return int(peaks[np.argmin(np.abs(peaks - correlation.size // 2))])
 
 

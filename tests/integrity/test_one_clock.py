@@ -193,7 +193,7 @@ def test_of_peaks_that_are_as_high_the_one_nearest_to_no_lag_is_taken() -> None:
     assert _peak(nudged, STANDARD) == 100
     nudged[100 + 40] = 1.0 - 0.04  # far closer
     assert _peak(nudged, STANDARD) == 140
-    nudged = even - 0.01
+    nudged = even - 7e-4
     nudged[100 + 40] = 1.0  # closer by what a unit itself does
     assert _peak(nudged, STANDARD) == 100
 
