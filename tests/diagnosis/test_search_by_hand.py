@@ -19,6 +19,7 @@ from smartshoe.diagnosis._members import (
     Alternative,
     _other_laws,
     _shapes_beside,
+    _untold_law,
     alternatives,
     begun_with,
     fit_with,
@@ -208,7 +209,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     costs = {(): 500.0, ("dead_band",): 130.0, ("linear_leak",): 170.0}
     asked: list[Any] = []
 
-    def fitted(likelihood: Any, model: ExtendedModel, steps: int) -> Any:
+    def fitted(likelihood: Any, model: ExtendedModel, steps: int = 99) -> Any:
         asked.append(steps)
         cost = costs.get(model.names, 103.0 + len(model.names[-1]))
         return SimpleNamespace(model=model, cost=cost, likelihood=likelihood)
@@ -256,6 +257,9 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     assert leak.likeness == 0.0  # the other pulls against it
     # Of another kind, and told from it by what is not there; the free form of another branch is none of its kind.
     assert [(law.effect, law.margin) for law in leak.untold] == [("zero_drift", 13.0)]
+    assert 99 in asked  # fitted to its end, others a few steps
+    assert _untold_law(Alternative("gas_compression", 1.0), two, frozenset()) is None  # curves are weighed by their laws
+    assert _untold_law(Alternative("zero_drift", 1.0), one, frozenset()) is effect("zero_drift")
 
 
 def test_a_law_begins_at_the_likeliest_of_its_shapes() -> None:
