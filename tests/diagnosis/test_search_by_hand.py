@@ -258,7 +258,7 @@ def test_a_member_is_as_large_as_the_reading_moves_without_it(monkeypatch: pytes
     # Of another kind, and told from it by what is not there; the free form of another branch is none of its kind.
     assert [(law.effect, law.margin) for law in leak.untold] == [("zero_drift", 13.0)]
     assert 99 in asked  # fitted to its end, others a few steps
-    assert _untold_law(Alternative("gas_compression", 1.0), two, frozenset()) is None  # curves are weighed by their laws
+    assert _untold_law(Alternative("gas_compression", 1.0), two, frozenset()) is None  # two curves
     assert _untold_law(Alternative("zero_drift", 1.0), one, frozenset()) is effect("zero_drift")
 
 
