@@ -185,7 +185,7 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
     grid, places = of.grid, of.places
     least = _least_lag_s(view)
     middle = 0.5 * (view.time_s[0] + view.time_s[-1])
-    repeating = _repeats_itself(of.load, given)
+    as_logged, repeating = None, _repeats_itself(of.load, given)
     # Where zero lag correlates nearly as well, as it does on long even ramps, the line must earn more.
     for lags, earned in ((of.smallest, 1.0 - given.same), (of.best, 1.0 / given.clear)):
         if np.max(np.abs(lags)) <= least:
@@ -197,8 +197,9 @@ def _lag_line(view: View, of: _Followed) -> tuple[float, float] | None:
                 continue
             followed_s = grid - offset_s - rate * (grid - middle)
             known = (followed_s >= grid[0]) & (followed_s <= grid[-1])
-            before = _unexplained(of, of.load, known, given)
-            after = _unexplained(of, np.interp(followed_s, grid, of.load), known, given)
+            as_logged = _increments(of, of.load, given) if as_logged is None else as_logged
+            before = _unexplained(*as_logged, known)
+            after = _unexplained(*_increments(of, np.interp(followed_s, grid, of.load), given), known)
             agreed = lags is of.smallest and not repeating and _unanimous(places - middle, lags, offset_s, rate, given)
             # A unit that relaxes answers later the farther it is pressed, which makes a line that grows of no clock.
             # Where it relaxes by half it is seconds late, and the shifted clock explains it far worse; blunt edges tell
@@ -357,9 +358,7 @@ def _peak(correlation: Array, thresholds: Thresholds) -> int | None:
 
 
 def _beside_its_sample(values: Array, best: int) -> float:
-    """Where the peak of ``values`` (n,) lies beside its largest, in samples: that of a parabola through three."""
-    if not 0 < best < values.size - 1:
-        return 0.0
+    """Where the peak of ``values`` (n,) lies beside its sample within, in samples: that of a parabola through three."""
     before, at, after = values[best - 1 : best + 2]
     bend = before - 2.0 * at + after
     return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
@@ -394,12 +393,10 @@ def _middle(values: Array, weights: Array) -> float:
     return float(values[order][np.searchsorted(np.cumsum(weights[order]) / weights.sum(), 0.5)])
 
 
-@on_one_thread
-def _unexplained(of: _Followed, load: Array, known: Mask, thresholds: Thresholds) -> Array:
-    """(2,) sums over rising and over falling ``load`` (b,): squared increments of the reading that no unit makes of it.
+def _increments(of: _Followed, load: Array, thresholds: Thresholds) -> tuple[Array, Array]:
+    """(b, k) increments of what a unit may make of a ``load`` (b,), its own the first; (b,) those of the reading.
 
-    Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short. Only
-    where the load is ``known`` (b,): what a reading follows may lie before the recording, or after it.
+    Increments, since edges tell of clocks, and the static curve does not. Jumps of the reading are cut short.
     """
     from scipy.ndimage import gaussian_filter1d
 
@@ -408,11 +405,20 @@ def _unexplained(of: _Followed, load: Array, known: Mask, thresholds: Thresholds
     viscous = of_load(load, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
     rubbed = _play(viscous[:, 0], thresholds.standing * OCTAVES)
     smooth = max(of.smooth_s / step_s, 1.0)
-    matrix = gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1)
-    target = gaussian_filter1d(of.reading, smooth, order=1)
-    moving = np.abs(matrix[:, 0]) > thresholds.faulty_share * np.max(np.abs(matrix[:, 0]))
-    target = _without_jumps(target, moving, thresholds)
-    matrix, target = matrix[known], target[known]
+    made = gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1)
+    read = gaussian_filter1d(of.reading, smooth, order=1)
+    moving = np.abs(made[:, 0]) > thresholds.faulty_share * np.max(np.abs(made[:, 0]))
+    return made, _without_jumps(read, moving, thresholds)
+
+
+@on_one_thread
+def _unexplained(made: Array, read: Array, known: Mask) -> Array:
+    """(2,) sums over rising and over falling load: squares of what is ``read`` (b,) and not ``made`` (b, k) of it.
+
+    Of `_increments`. Only where the load is ``known`` (b,): what a reading follows may lie before the recording, or
+    after it.
+    """
+    matrix, target = made[known], read[known]
     matrix /= np.linalg.norm(matrix, axis=0) + 1e-300
     normal = matrix.T @ matrix
     normal[np.diag_indices_from(normal)] += 1e-6
