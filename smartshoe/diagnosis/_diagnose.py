@@ -14,7 +14,7 @@ from smartshoe.diagnosis._session import pastless
 from smartshoe.diagnosis._settling import Progress
 from smartshoe.diagnosis.decay import decay_of
 from smartshoe.errors import UsageError
-from smartshoe.files.logs.accepted import RecordingLike, recordings_of
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of, unit_of
 from smartshoe.integrity import Integrity, examine, twins
 from smartshoe.integrity.thresholds import Thresholds, decided_by
 from smartshoe.recording import Recording
@@ -57,12 +57,9 @@ def diagnose(
     fitted, kept_out = recordings_of(recordings), recordings_of(() if hold_out is None else hold_out, "hold_out")
     if not fitted:
         raise UsageError("diagnose was given no recording: give one at least")
-    first_of = {one.unit: one.label for one in reversed((*fitted, *kept_out)) if one.unit}
-    if len(first_of) > 1:
-        units = ", ".join(f"{unit} in {first_of[unit]}" for unit in sorted(first_of))
-        raise UsageError(f"recordings of different units ({units}): diagnose one unit at a time")
-    decided = decided_by(thresholds, material)
     everything, count = [*fitted, *kept_out], len(fitted)
+    unit_of(everything, "diagnose")
+    decided = decided_by(thresholds, material)
     integrity = examine(everything, decided)
     everything = [*integrity.recordings]
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]

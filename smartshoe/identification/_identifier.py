@@ -11,7 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Mask, require_positive
 from smartshoe.errors import NotConvergedError, NotIdentifiableError, UsageError
-from smartshoe.files.logs.accepted import RecordingLike, recordings_of
+from smartshoe.files.logs.accepted import RecordingLike, recordings_of, unit_of
 from smartshoe.identification._conclude import Choice, conclude
 from smartshoe.identification._estimator import Estimator, estimate
 from smartshoe.identification._experiment import Direction, prepare
@@ -219,12 +219,7 @@ def _form(
 
 
 def _unit_name(recordings: Sequence[Recording]) -> str:
-    first_of = {one.unit: one.label for one in reversed(recordings) if one.unit}
-    first_of = first_of or {one.sensor.name: one.label for one in reversed(recordings)}
-    if len(first_of) > 1:
-        units = ", ".join(f"{unit} in {first_of[unit]}" for unit in sorted(first_of))
-        raise UsageError(f"recordings of different units ({units}): identify one unit at a time")
-    return next(iter(first_of))
+    return unit_of(recordings, "identify") or unit_of(recordings, "identify", lambda one: one.sensor.name)
 
 
 def _scale(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
@@ -48,6 +48,20 @@ def recordings_of(given: Any, argument: str = "recordings") -> list[Recording]:
     if not several or _is_frame(given):
         return [recording_of(given, argument)]
     return [recording_of(one, f"{argument}[{index}]") for index, one in enumerate(given)]
+
+
+def unit_of(
+    recordings: Sequence[Recording], do: str, called: Callable[[Recording], str | None] = lambda one: one.unit
+) -> str:
+    """What the one unit of ``recordings`` is ``called``, empty where none says so.
+
+    Raises `UsageError` where there are several, with a recording of each: to ``do`` something is for one at a time.
+    """
+    first_of = {unit: one.label for one in reversed(recordings) if (unit := called(one))}
+    if len(first_of) > 1:
+        units = ", ".join(f"{unit} in {first_of[unit]}" for unit in sorted(first_of))
+        raise UsageError(f"recordings of different units ({units}): {do} one unit at a time")
+    return next(iter(first_of), "")
 
 
 def _is_frame(given: Any) -> bool:
