@@ -167,7 +167,7 @@ def _common(y: Array, starts: Index, stops: Index, beside: int) -> Array:
 def _alternates(y: Array, starts: Index, stops: Index, thresholds: Thresholds) -> Mask:
     """(runs,) whether second differences change sign more often than not before and after: noise, not curvature."""
     beside = thresholds.local // 2
-    counts = [np.concatenate([[0], np.cumsum(one)]) for one in turns(y)]
+    counts = [np.concatenate([[0], np.cumsum(one)]) for one in turns(np.diff(y, 2))]
     turned, stayed = np.zeros(starts.size, dtype=np.int64), np.zeros(starts.size, dtype=np.int64)
     for low, high in ((starts - beside, starts - 2), (stops, stops + beside - 2)):
         a, b = (np.clip(one, 0, counts[0].size - 1) for one in (low, high))
@@ -268,8 +268,9 @@ def _stuck(view: View, bad: Mask, starts: Index, stops: Index) -> Mask:
         near = max(y[max(first - beside, 0) : first + 1], y[last : last + beside + 1], key=len)
         if near.size <= given.local:
             continue
-        turned, stayed = (int(one.sum()) for one in turns(near))
+        bends = np.diff(near, 2)
+        turned, stayed = (int(one.sum()) for one in turns(bends))
         alternates = bool(_is_noise(turned, stayed, given))
         least = toggling(given) * view.reading.local_step[first]
-        out[i] = alternates and float(np.std(np.diff(near, 2))) / SECOND_DIFFERENCE > least
+        out[i] = alternates and float(np.std(bends)) / SECOND_DIFFERENCE > least
     return out

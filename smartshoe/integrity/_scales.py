@@ -60,9 +60,8 @@ def white_noise(values: Array, thresholds: Thresholds, step: float) -> Array:
     return local_scale(second, thresholds, step)
 
 
-def turns(values: Array) -> tuple[Mask, Mask]:
-    """(n - 3,) each: where second differences change sign, as white noise's mostly do; and where they keep it."""
-    second = np.diff(values, 2)
+def turns(second: Array) -> tuple[Mask, Mask]:
+    """(n - 1,) each: where ``second`` differences (n,) change sign, as white noise's mostly do; where they keep it."""
     product = second[1:] * second[:-1]
     return product < 0.0, product > 0.0
 

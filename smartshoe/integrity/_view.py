@@ -85,7 +85,7 @@ class Signal:
     @cached_property
     def is_noisy(self) -> bool:
         """Whether second differences change sign more often than not: noise above one grid step, not curvature."""
-        turned, stayed = turns(self.values)
+        turned, stayed = turns(np.diff(self.values, 2))
         least = max(toggling(self.thresholds) * self.step, self.thresholds.material * float(np.ptp(self.values)))
         return bool(turned.sum() > stayed.sum()) and self.quiet_noise > least
 

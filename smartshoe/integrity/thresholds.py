@@ -278,17 +278,13 @@ def decided_by(given: Thresholds | None, material: float | None = None) -> Thres
 
 def described(given: Thresholds) -> list[dict[str, Any]]:
     """Name, value, unit, meaning and origin of each; of one that is not the usual, what is usual too."""
-    return [
-        {
-            "name": one.name,
-            "value": (value := getattr(given, one.name)),
-            "unit": one.metadata["unit"],
-            "meaning": one.metadata["meaning"],
-            "origin": origin if value == one.default else f"as asked for; usual is {one.default} ({origin})",
-        }
-        for one in fields(given)
-        for origin in [one.metadata["origin"]]
-    ]
+    return [_described(one, getattr(given, one.name)) for one in fields(given)]
+
+
+def _described(one: Field[Any], value: Any) -> dict[str, Any]:
+    said, usual = one.metadata, one.default
+    origin = said["origin"] if value == usual else f"as asked for; usual is {usual} ({said['origin']})"
+    return {"name": one.name, "value": value, "unit": said["unit"], "meaning": said["meaning"], "origin": origin}
 
 
 def largest_of_noise(count: int, thresholds: Thresholds) -> float:
