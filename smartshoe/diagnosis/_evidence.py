@@ -104,9 +104,7 @@ class Evidence:
         self._extensions: dict[Members, list[tuple[float, int, Array]]] = {}
         parts = list(zip(given.products, given.nuisance_counts, strict=True))
         self._inverse = [
-            np.linalg.inv(
-                ridged(products[-n:, -n:] + noise_sd**2 * nuisance_precision(one, given.model, self.thresholds))
-            )
+            np.linalg.inv(ridged(products[-n:, -n:] + noise_sd**2 * nuisance_precision(one, given.model)))
             for (products, n), one in zip(parts, given.sessions, strict=True)
         ]
         own_past = [products[:-n, -n:] for products, n in parts]

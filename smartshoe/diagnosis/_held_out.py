@@ -48,7 +48,7 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     found = under(float(np.var(residual[mask])) if mask.any() else 0.0, held)
     if session.judged[: int(np.argmax(mask))].any():
         left = residual - columns @ found
-        found = under(correlated_sd([left], [mask]) ** 2, past_sd(session, model, session.unknown_past))
+        found = under(correlated_sd([left], [mask]) ** 2, past_sd(session, model))
     return found, columns @ found
 
 

@@ -44,7 +44,7 @@ class Likelihood:
         self._last: tuple[ExtendedModel, list[Trace]] | None = None
         self._rows: list[Array] = []  # `rows_of` where they were last asked for, with room for one column more
         self._scales = np.zeros(0)
-        self._precision = [nuisance_precision(session, like, thresholds) for session in self.sessions]
+        self._precision = [nuisance_precision(session, like) for session in self.sessions]
         self._pole_per_s = math.nan
         self._past: list[Array] = []
         self._inverse: list[Array] = []

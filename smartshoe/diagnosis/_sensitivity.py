@@ -109,22 +109,22 @@ def nuisances(session: Session, pole_per_s: float, read: Array | float = 0.0) ->
     return columns
 
 
-def nuisance_precision(session: Session, model: ExtendedModel, thresholds: Thresholds) -> Array:
+def nuisance_precision(session: Session, model: ExtendedModel) -> Array:
     """(2 + k, 2 + k) prior precision of the nuisances: none of the offset, that of an unknown past of the arm's.
 
     A unit that begins loaded has been loaded for an unknown time: all that the arm holds is open. One that begins at
     rest still carries some of what went before. One more row for each gain of its own, each change of its zero, and
     each long gap, in which any load may have come.
     """
-    sd = past_sd(session, model, thresholds.unknown_past)
+    sd = past_sd(session, model)
     gap_sd = max(abs(model.relaxing_share) * abs(model.gain) * float(np.max(session.conditions.load)), FLOOR)
     return a_nuisance_each(session, offset=0.0, past=1.0 / sd**2, change=1.0, gap=1.0 / gap_sd**2)
 
 
-def past_sd(session: Session, model: ExtendedModel, unknown_past: float) -> float:
+def past_sd(session: Session, model: ExtendedModel) -> float:
     """Standard deviation of what the arm brings along: of the load that it begins with, ``unknown_past`` at least."""
     held = abs(model.relaxing_share) * abs(model.gain)
-    return max(held * max(float(np.abs(session.conditions.load[0])), unknown_past), FLOOR)
+    return max(held * max(float(np.abs(session.conditions.load[0])), session.unknown_past), FLOOR)
 
 
 def a_nuisance_each(session: Session, *, offset: float, past: float, change: float, gap: float) -> Array:

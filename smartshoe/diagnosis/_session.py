@@ -8,6 +8,7 @@ mostly gone; and a fit costs a fraction.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -145,9 +146,11 @@ def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
     order: list[int] = []
     waiting = list(range(len(recordings)))
     while waiting:
-        ready = [k for k in waiting if not any(continues(recordings[k], recordings[j]) for j in waiting if j != k)]
-        order += ready or waiting  # of those that continue each other in a ring none is the first
-        waiting = [k for k in waiting if k not in order]
+        names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
+        ready = [k for k in waiting if names[_before(recordings[k])] <= continues(recordings[k], recordings[k])]
+        placed = {*(ready or waiting)}  # of those that continue each other in a ring none is the first
+        order += sorted(placed)
+        waiting = [k for k in waiting if k not in placed]
     return order
 
 
@@ -159,7 +162,12 @@ def pastless(recordings: Sequence[Recording]) -> list[Recording]:
 
 def continues(later: Recording, earlier: Recording) -> bool:
     """Whether a recording carries on from another one."""
-    return later.metadata.get("continues") == earlier.name
+    return _before(later) == earlier.name
+
+
+def _before(recording: Recording) -> str | None:
+    """The name of the recording that one carries on from."""
+    return recording.metadata.get("continues")
 
 
 def at_full_rate(

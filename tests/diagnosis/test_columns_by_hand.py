@@ -55,7 +55,7 @@ def _session(load: Array, reading: Array, seed: int = 0, lost: float = 0.2, held
     return SimpleNamespace(
         conditions=Conditions(STEP_S * np.arange(load.size), load, STEP_S), reading=reading, usable=usable,
         held_out=held_out, fitted=usable & ~held_out, judged=usable & held_out,
-        cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}),
+        cycle=np.arange(load.size) * 7 // load.size, recording=SimpleNamespace(metadata={}), unknown_past=0.05,
         own_gain_sd=0.0, gain_parts=(), zero_changes=(), zero_sd=0.0, gap_ends=(), thinned=1, resting=load <= 0.0,
     )  # fmt: skip
 
@@ -259,9 +259,9 @@ def test_what_no_column_reaches_is_the_noise() -> None:
 def test_the_prior_of_a_past_is_of_what_the_arm_may_hold(share: float, begun: float) -> None:
     session = _session(np.full(5, begun), np.zeros(5))
     sd = max(abs(share) * 1.1 * max(abs(begun), 0.05), 1e-6)
-    found = nuisance_precision(session, replace(MODEL, relaxing_share=share), STANDARD)
+    found = nuisance_precision(session, replace(MODEL, relaxing_share=share))
     assert found == pytest.approx(np.diag([0.0, sd**-2]))
-    turned = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=-1.1), STANDARD)
+    turned = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=-1.1))
     assert turned == pytest.approx(found)
 
 
@@ -288,11 +288,11 @@ def test_what_the_arm_may_hold_after_a_gap_is_of_the_largest_load(share: float) 
     past, gap = (max(abs(share) * 1.1 * most, 1e-6) ** -2 for most in (0.05, 0.7))
     session.gap_ends = (2, 4)
     for by in (1.1, -1.1):
-        found = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=by), STANDARD)
+        found = nuisance_precision(session, replace(MODEL, relaxing_share=share, gain=by))
         assert found == pytest.approx(np.diag([0.0, past, gap, gap]))
     every = np.ones(5, dtype=bool)
     session.own_gain_sd, session.gain_parts, session.zero_changes = 0.03, (every,), (3,)
-    found = nuisance_precision(session, replace(MODEL, relaxing_share=share), STANDARD)
+    found = nuisance_precision(session, replace(MODEL, relaxing_share=share))
     assert found == pytest.approx(np.diag([0.0, past, 1.0, 1.0, gap, gap]))
 
 

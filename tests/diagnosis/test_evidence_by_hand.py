@@ -79,7 +79,7 @@ class _Twin:
         pasts = []
         for k, session in enumerate(given.sessions):
             own = nuisances(session, given.model.pole_per_s)[self.kept[k]]
-            rest = nuisance_precision(session, given.model, given.thresholds)[1, 1] ** -0.5
+            rest = nuisance_precision(session, given.model)[1, 1] ** -0.5
             wide = np.zeros((own.shape[0], 2 * len(given.sessions)))
             wide[:, 2 * k : 2 * k + 2] = own * np.array([1e3, rest])
             pasts.append(wide)
@@ -379,7 +379,7 @@ def _slow_cost(likelihood: Likelihood, model: ExtendedModel, like: ExtendedModel
         kept = session.fitted
         residual = (session.reading - model.simulate(session.conditions))[kept]
         past = nuisances(session, model.pole_per_s)[kept]
-        rest = nuisance_precision(session, like, STANDARD)[1, 1] ** -0.5
+        rest = nuisance_precision(session, like)[1, 1] ** -0.5
         wide = past * np.array([10.0, rest])
         covariance = likelihood.noise_sd**2 * np.eye(residual.size) + wide @ wide.T
         total += float(residual @ np.linalg.solve(covariance, residual))

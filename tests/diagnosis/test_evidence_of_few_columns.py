@@ -55,7 +55,7 @@ class _Twin:
             kept = session.fitted
             past = np.array([[1.0, math.exp(-MODEL.pole_per_s * at)] for at in session.conditions.time_s])
             seen = past[kept]
-            inner = seen.T @ seen / SD**2 + nuisance_precision(session, MODEL, STANDARD)
+            inner = seen.T @ seen / SD**2 + nuisance_precision(session, MODEL)
             blocks.append(np.eye(kept.sum()) / SD**2 - seen @ np.linalg.solve(inner, seen.T) / SD**4)
             pasts.append(past)
         size = sum(one.shape[0] for one in blocks)

@@ -136,7 +136,7 @@ def _weight(session: Any, sd: float, pole_per_s: float) -> tuple[Array, Array]:
     """Precision of a session's samples, its offset and past unknown; and what these are per residual, (2, n)."""
     kept = session.fitted
     past = np.array([[1.0, math.exp(-pole_per_s * at)] for at in session.conditions.time_s])[kept]
-    inner = past.T @ past / sd**2 + nuisance_precision(session, MODEL, STANDARD)
+    inner = past.T @ past / sd**2 + nuisance_precision(session, MODEL)
     found = np.linalg.solve(inner, past.T) / sd**2
     return np.eye(kept.sum()) / sd**2 - past @ found / sd**2, found
 

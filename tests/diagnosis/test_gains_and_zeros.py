@@ -75,7 +75,7 @@ def _wide(sessions: list[Session], model: ExtendedModel) -> tuple[Array, ...]:
     made = []
     for one in sessions:
         read = model.simulate(one.conditions)
-        sds = np.concatenate([[1e3], np.diag(nuisance_precision(one, model, STANDARD))[1:] ** -0.5])
+        sds = np.concatenate([[1e3], np.diag(nuisance_precision(one, model))[1:] ** -0.5])
         made.append((nuisances(one, model.pole_per_s, read) * sds)[one.fitted])
     return tuple(made)
 

@@ -74,7 +74,7 @@ def plain_score(given: Linearised, sd: float, members: tuple[int, ...]) -> float
     for k, (session, rows) in enumerate(zip(given.sessions, given.rows, strict=True)):
         past = np.zeros((rows.shape[0], 2 * len(given.sessions)))
         own = nuisances(session, given.model.pole_per_s)
-        precision = nuisance_precision(session, given.model, limits)
+        precision = nuisance_precision(session, given.model)
         past[:, 2 * k : 2 * k + 2] = own * np.array([offset_sd, precision[1, 1] ** -0.5])
         prior = np.full(rows.shape[1] - 1, limits.imperfection)
         prior[: given.own] = 1.0

@@ -327,7 +327,7 @@ def test_an_effect_is_looked_for_where_its_channel_is_logged_throughout() -> Non
 def test_what_an_arm_may_remember_is_its_share_of_what_the_unit_may_have_borne(begun: float, share: float) -> None:
     (session,), _ = prepared(pressed(begun + (1.0 - begun) * triangles()))
     model = replace(MODEL, gain=1.5, relaxing_share=share)
-    precision = nuisance_precision(session, model, STANDARD)
+    precision = nuisance_precision(session, model)
     held = 1.5 * share * max(float(session.conditions.load[0]), STANDARD.unknown_past)
     assert precision == pytest.approx(np.diag([0.0, held**-2]), rel=1e-6)
 

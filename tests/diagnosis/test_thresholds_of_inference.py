@@ -42,10 +42,12 @@ def _recording(model: ExtendedModel = MODEL, seed: int = 0, peak: float = 1.0, o
     return Recording.from_arrays(time_s=time_s, force_n=800.0 * load, pressure_mbar=140.0 * share, name=f"run_{seed}")
 
 
-def _sessions(runs: list[Recording], held: list[bool]) -> tuple[list[Session], Scale]:
+def _sessions(
+    runs: list[Recording], held: list[bool], thresholds: Thresholds = STANDARD
+) -> tuple[list[Session], Scale]:
     usable = [one.sensor.present for one in runs]
-    scale = full_scale(runs, usable, STANDARD)
-    return prepare(runs, usable, held, scale, [1], STANDARD), scale
+    scale = full_scale(runs, usable, thresholds)
+    return prepare(runs, usable, held, scale, [1], thresholds), scale
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +96,12 @@ def test_memory_is_how_else_a_law_may_follow(curved: Linearised) -> None:
     assert 0.0 < one != decades > 0.0
 
 
-def test_unknown_past_is_what_an_arm_may_remember_of_before(curved: Linearised) -> None:
-    session = curved.sessions[0]
-    little, much = decides("unknown_past", 0.01, 0.1, lambda t: nuisance_precision(session, MODEL, t)[1, 1])
+def test_unknown_past_is_what_an_arm_may_remember_of_before() -> None:
+    def known(thresholds: Thresholds) -> float:
+        (session,), _ = _sessions([_recording()], [False], thresholds)
+        return float(nuisance_precision(session, MODEL)[1, 1])
+
+    little, much = decides("unknown_past", 0.01, 0.1, known)
     assert little == pytest.approx(100.0 * much)
 
 
