@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import smartshoe
-from smartshoe.errors import SmartShoeError, UsageError
+from smartshoe.errors import InputError, SmartShoeError, UsageError
 from smartshoe.identification import Identification
 from smartshoe.models.first_order import simulate
 from smartshoe.recording import Recording
@@ -160,6 +160,8 @@ def test_a_calibration_is_taken_by_its_path_and_several_from_a_folder(
     listed = store.to_dict("2026-06-01")
     assert listed["schema"] == "smartshoe.calibrations/1"
     assert [entry["is_expired"] for unit in listed["units"] for entry in unit["calibrations"]] == [True]
+    with pytest.raises(InputError, match="store is a store: take each unit's calibration out of it"):
+        smartshoe.load_calibrations(tmp_path / "store")
 
 
 @pytest.mark.parametrize(
