@@ -197,7 +197,7 @@ class Calibration:
             raise error if str(error).startswith(read.path) else InputError(f"{read.path}: {error}") from error
 
 
-def _sensor_for(recording: Recording, calibration: Calibration) -> Channel:
+def sensor_for(recording: Recording, calibration: Calibration) -> Channel:
     """The recording's one sensor, or of several the one that carries the calibrated unit's name."""
     sensors = recording.sensors
     if len(sensors) <= 1:
@@ -263,7 +263,7 @@ def compensated(recording: RecordingLike, calibration: Calibration | str | os.Pa
     reading of the unit, `UnitError` where its quantity is not the calibration's.
     """
     recording, calibration = recording_of(recording), calibration_from(calibration)
-    channel = _sensor_for(recording, calibration)
+    channel = sensor_for(recording, calibration)
     if channel.unit != calibration.reading_unit and channel.unit.quantity != calibration.reading_unit.quantity:
         raise UnitError(
             f"{recording.label}: {channel.name} is in {channel.unit.symbol}, the calibration is for"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeAlias, Union
 
 from smartshoe.calibration._calibration import Calibration, calibration_from
+from smartshoe.calibration.store import is_store
 from smartshoe.errors import InputError
 
 CalibrationsLike: TypeAlias = Union[Calibration, str, "os.PathLike[str]"]
@@ -24,7 +25,7 @@ def load_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> l
     Raises
     ------
     InputError
-        For a file that is no calibration, and a folder that holds none.
+        For a file that is no calibration, and a folder that holds none or is a store.
     UsageError
         For anything else, naming its type.
 
@@ -49,6 +50,11 @@ def load_calibrations(given: CalibrationsLike | Iterable[CalibrationsLike]) -> l
 
 
 def _of_folder(folder: Path) -> list[Calibration]:
+    if is_store(folder):  # which may hold a unit several times, for different days
+        raise InputError(
+            f"{folder} is a store: take each unit's calibration out of it, smartshoe calibrations show UNIT"
+            f" --out C.json --store {folder}"
+        )
     inside = [Calibration.load(file) for file in sorted(folder.glob("*.json"))]
     if not inside:
         raise InputError(f"{folder} holds no calibration: give a folder with .json files that identify wrote")

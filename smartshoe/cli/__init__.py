@@ -160,8 +160,8 @@ def run_command(arguments: Sequence[str]) -> int:
 def _reported(error: Exception) -> int:
     """Print what ended a command as one sentence; the exit status."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
-        click.echo(error.ctx.get_help() if error.ctx else "", err=True)
-        return 2
+        click.echo(f"{error.format_message()}\n", err=True)
+        error = click.UsageError("no command is given: name one of these", error.ctx)
     status = 2
     if isinstance(error, click.ClickException):
         command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "smartshoe"

@@ -11,11 +11,14 @@ import numpy as np
 from smartshoe.devices._base import Block, ChannelDescription, Shoe
 from smartshoe.errors import MissingChannelError, UnitError, UsageError
 from smartshoe.files.logs import read
-from smartshoe.recording import Recording
+from smartshoe.recording import SENSOR_NAME, UNITS_OF_A_SHOE, Channel, Recording
 
 
 class ReplayedShoe(Shoe):
-    """A shoe's recording as a stream of blocks; nothing sleeps."""
+    """A shoe's recording as a stream of blocks; nothing sleeps.
+
+    The unit under test of a recording that names its place goes by that, as it does in a shoe and in its calibration.
+    """
 
     def __init__(self, recording: Recording, block_samples: int = 20) -> None:
         super().__init__()
@@ -42,15 +45,19 @@ class ReplayedShoe(Shoe):
     def describe(self) -> tuple[ChannelDescription, ...]:
         """The recording's sensors."""
         return tuple(
-            ChannelDescription(c.name, c.unit.quantity, c.unit, c.range_, c.resolution, self.sample_rate_hz)
+            ChannelDescription(self._name_of(c), c.unit.quantity, c.unit, c.range_, c.resolution, self.sample_rate_hz)
             for c in self.recording.sensors
         )
+
+    def _name_of(self, sensor: Channel) -> str:
+        place = self.recording.unit
+        return place if place in UNITS_OF_A_SHOE and sensor.name == SENSOR_NAME else sensor.name
 
     def _blocks_internal(self) -> Iterator[Block]:
         sensors = self.recording.sensors
         readings = np.column_stack([channel.values for channel in sensors])
         missing = np.column_stack([~channel.present for channel in sensors])
-        names = tuple(channel.name for channel in sensors)
+        names = tuple(self._name_of(channel) for channel in sensors)
         for start in range(0, len(self.recording), self.block_samples):
             span = slice(start, start + self.block_samples)
             yield Block(self.recording.time_s[span], readings[span], missing[span], names, sensors[0].unit)

@@ -110,7 +110,8 @@ def prepare(
     factors = [*factors, *[min(factors)] * (len(recordings) - len(factors))]
     made: dict[int, Session] = {}
     left_behind: dict[str, dict[str, float]] = {}
-    for index in _by_continuation(recordings):
+    order = _by_continuation(recordings)
+    for index in order:
         recording = recordings[index]
         before = left_behind.get(recording.metadata.get("continues", ""), {})
         made[index] = _session(recording, index, usable[index], scale, factors[index], before, thresholds)
@@ -121,11 +122,18 @@ def prepare(
             replace(session, held_out=np.full(session.reading.size, out))
             for session, out in zip(sessions, held_out, strict=True)
         ]
-    kept = []
-    count = 0
-    for session in sessions:
-        number = session.cycle + count
-        kept.append(replace(session, held_out=(number + 1) % thresholds.held_out_every == 0))
+    return _with_cycles_held_out(sessions, order, thresholds)
+
+
+def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresholds: Thresholds) -> list[Session]:
+    """``sessions`` of which one load cycle in so many judges, counted on from each to the next in ``order``.
+
+    That is the order in which the unit bore them: which was named first on a command line decides nothing.
+    """
+    count, kept = 0, [*sessions]
+    for index in order:
+        number = sessions[index].cycle + count
+        kept[index] = replace(sessions[index], held_out=(number + 1) % thresholds.held_out_every == 0)
         count = int(number[-1]) + 1
     return kept
 

@@ -85,8 +85,10 @@ def estimate(
         fit = replace(fit, notes=(*fit.notes, f"{concern}: {_WHY[chosen]}"))
     fit = _with_better_start(fit, prefilter_rad_s)
     if chosen in ("command", "cycles"):
-        instrumental = _instrumental(fit, chosen, recordings, limits)
-        if estimator != "auto" or (instrumental.converged and not _is_weak(instrumental, fit)):
+        if estimator != "auto":
+            return _instrumental(fit, chosen, recordings, limits)
+        instrumental = _instrumental_if_strong(fit, chosen, recordings, limits)
+        if instrumental is not None:
             return instrumental
         fit = replace(fit, notes=(*fit.notes[:-1], f"{concern}: {_WHY['errors_in_variables']}"))
     return _errors_in_variables(fit, method, noise, limits)
@@ -253,6 +255,17 @@ def _is_weak(instrumental: ParameterFit, fit: ParameterFit) -> bool:
 def _mean_square(problem: PredictionError, theta: Array) -> float:
     errors = [problem.model_error(theta, index)[mask] for index, mask in enumerate(problem.masks)]
     return sum(float(error @ error) for error in errors) / max(problem.count - problem.size, 1)
+
+
+def _instrumental_if_strong(
+    fit: ParameterFit, source: Source, recordings: Sequence[Recording], limits: Termination
+) -> ParameterFit | None:
+    """The fit by instruments, None where they are too weak: a delay that is held far off leaves them none."""
+    try:
+        found = _instrumental(fit, source, recordings, limits)
+    except NotIdentifiableError:
+        return None
+    return found if found.converged and not _is_weak(found, fit) else None
 
 
 def _instrumental(

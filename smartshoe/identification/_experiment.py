@@ -50,6 +50,13 @@ class Experiment:
         """``signal`` (n,) at the recording's own samples."""
         return signal if self.rows is None else signal[self.rows]
 
+    def is_of(self, recording: Recording, reading_unit: Unit) -> bool:
+        """Whether load and reading, in ``reading_unit``, are those of ``recording``, whatever either is called."""
+        if recording.sensor.unit.quantity != reading_unit.quantity:
+            return False
+        held = (self.of_recording(self.load_n), self.of_recording(self.reading))
+        return all(map(np.array_equal, held, _bridged_signals(recording, reading_unit)))
+
     def decimated(self, factor: int) -> Experiment:
         """Means of ``factor`` neighbours: a start for a fit, at a fraction of its cost."""
         blocks = self.time_s.size // factor
@@ -113,8 +120,7 @@ def prepare(
             raise UsageError(f"counted names {name!r}, which is no recording here: use {', '.join(names)}")
     experiments = []
     for recording, name in zip(recordings, names, strict=True):
-        load, sensor = recording.load, recording.sensor
-        present = load.present & sensor.present
+        present = recording.load.present & recording.sensor.present
         mask = present
         if name in masks:
             given = np.asarray(masks[name], dtype=bool)
@@ -126,8 +132,7 @@ def prepare(
             name,
             recording.time_s - recording.time_s[0],
             steps(recording.time_s),
-            bridged(recording.time_s, load.si, load.present),
-            bridged(recording.time_s, sensor.in_unit(reading_unit), sensor.present),
+            *_bridged_signals(recording, reading_unit),
             mask,
             int(np.count_nonzero(~present)),
             None if command_n is None else np.array(command_n, dtype=float),
@@ -135,6 +140,15 @@ def prepare(
         experiments.append(_on_one_step(experiment) if on_one_step else experiment)
     _require_identifiable(experiments, recordings)
     return experiments, reading_unit
+
+
+def _bridged_signals(recording: Recording, reading_unit: Unit) -> tuple[Array, Array]:
+    """(n,) the load in N and the reading, straight lines where either is missing."""
+    load, sensor = recording.load, recording.sensor
+    return (
+        bridged(recording.time_s, load.si, load.present),
+        bridged(recording.time_s, sensor.in_unit(reading_unit), sensor.present),
+    )
 
 
 def _on_one_step(experiment: Experiment) -> Experiment:

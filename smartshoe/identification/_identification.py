@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from smartshoe.calibration import Calibration, Compensator
 from smartshoe.calibration.provenance import sha256_of
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import RefusedError, UsageError
+from smartshoe.files.logs.accepted import RecordingLike, recording_of
 from smartshoe.identification._consistency import ConsistencyTest, consistency_test
 from smartshoe.identification._estimator import ParameterFit
 from smartshoe.identification._experiment import Direction
@@ -21,7 +23,6 @@ from smartshoe.identification._residual_tests import ResidualTest, residual_test
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models import Parameter, StandardLinearSolid, discretise
 from smartshoe.models.parameter import finite_or_none
-from smartshoe.recording import Recording
 from smartshoe.units import Unit
 
 if TYPE_CHECKING:
@@ -80,13 +81,13 @@ class Identification(Summarised):
             for index, experiment in enumerate(problem.experiments)
         }
 
-    def predicted(self, recording: str | Recording) -> Array:
+    def predicted(self, recording: RecordingLike) -> Array:
         """What the model says of a recording of this fit.
 
         Parameters
         ----------
         recording
-            Its name, or the recording itself.
+            Its name, or the recording itself: as a `Recording`, a path or a DataFrame.
 
         Returns
         -------
@@ -96,19 +97,23 @@ class Identification(Summarised):
         Raises
         ------
         UsageError
-            Where the fit did not use this recording, or ``recording`` is neither a name nor a `Recording`.
+            Where the fit did not use this recording, or ``recording`` is none.
         """
-        if not isinstance(recording, (str, Recording)):
-            raise UsageError(f"recording is of type {type(recording).__name__}: give its name or the Recording")
-        name = recording if isinstance(recording, str) else recording.name
-        if name not in self.errors:
-            raise UsageError(f"recording {name!r} is not of this fit: use one of {', '.join(self.errors)}")
-        if isinstance(recording, Recording) and len(recording) != self.errors[name].size:
-            raise UsageError(
-                f"recording {name!r} has {len(recording)} samples, the one of that name in this fit"
-                f" {self.errors[name].size}: give the recording that was fitted"
-            )
+        name = self._name_of(recording)
         return self._measured[name][1] + self.errors[name]
+
+    def _name_of(self, recording: RecordingLike) -> str:
+        """What this fit calls a recording: told by its samples, as several may have come with one name."""
+        if isinstance(recording, str) and recording in self.errors:
+            return recording
+        fitted = f"use one of {', '.join(self.errors)}"
+        if isinstance(recording, str) and not Path(recording).is_file():
+            raise UsageError(f"recording {recording!r} is not of this fit: {fitted}")
+        given = recording_of(recording)
+        for experiment in self.fit.problem.experiments:
+            if experiment.is_of(given, self.reading_unit):
+                return experiment.name
+        raise UsageError(f"recording {given.name!r} is not of this fit, in which none has its samples: {fitted}")
 
     @cached_property
     def _measured(self) -> Mapping[str, tuple[Array, Array]]:

@@ -120,16 +120,19 @@ def identify(  # noqa: PLR0913 - a public verb
     form = _form(structure, direction, newtons, fixed, bounds)
     noise = {"load": _sd("load_noise_n", load_noise_n), "reading": _sd("reading_noise", reading_noise)}
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        fit = estimate(
-            PredictionError(experiments, settings, form),
-            several,
-            method,
-            estimator,
-            noise,
-            prefilter_rad_s=prefilter_rad_s,
-            tolerance=tolerance,
-            max_iterations=max_iterations,
-        )
+        try:
+            fit = estimate(
+                PredictionError(experiments, settings, form),
+                several,
+                method,
+                estimator,
+                noise,
+                prefilter_rad_s=prefilter_rad_s,
+                tolerance=tolerance,
+                max_iterations=max_iterations,
+            )
+        except NotIdentifiableError as error:  # a solver knows signals, and not whose
+            raise NotIdentifiableError(f"{several[0].label}: {error}") from error
         if not np.isfinite(fit.theta).all() or not np.isfinite(fit.cost):
             raise NotIdentifiableError(
                 f"{several[0].label}: the fit runs to infinity: record a load that rises and falls at several rates"

@@ -406,6 +406,16 @@ def test_wrong_command_lines_end_in_status_2(words: list[str], capsys: pytest.Ca
     assert capsys.readouterr().err.startswith("error:")
 
 
+@pytest.mark.parametrize("words", [[], ["calibrations"]])
+def test_no_command_at_all_shows_the_commands_and_ends_in_one_sentence(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_command(words) == 2
+    shown, last = capsys.readouterr().err.strip().rsplit("\n", 1)
+    assert "Commands:" in shown
+    assert last == f"error: no command is given: name one of these; see {' '.join(['smartshoe', *words])} --help"
+
+
 @pytest.mark.parametrize("command", _COMMANDS)
 def test_every_command_has_help_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command([command, "--help"]) == 0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import smartshoe
-from smartshoe.errors import SmartShoeError, UsageError
+from smartshoe.errors import InputError, SmartShoeError, UsageError
 from smartshoe.identification import Identification
 from smartshoe.models.first_order import simulate
 from smartshoe.recording import Recording
@@ -72,6 +72,23 @@ def test_a_prediction_of_another_recording_is_refused(recording: Recording, foun
         found.predicted(recording.between(0.0, 5.0))
     with pytest.raises(UsageError, match="of type int"):
         found.predicted(3)  # type: ignore[arg-type]
+
+
+def test_of_recordings_of_one_name_each_has_its_own_prediction(recording: Recording, tmp_path: Path) -> None:
+    """Two of one length, as arrays are that were given no name."""
+    other = recording.with_channel(recording.load.with_values(recording.force_n[::-1] * 0.5))
+    other = other.with_channel(other.sensor.with_values(20.0 + 0.5 * (recording.sensor.values[::-1] - 20.0)))
+    found = smartshoe.identify([recording, other], direction="inverse")
+    assert [*found.errors] == ["triangles", "triangles (2)"]
+    for one, name in ((recording, "triangles"), (other, "triangles (2)")):
+        path = tmp_path / f"{name}.csv"
+        smartshoe.write(one, path)
+        for same in (one, path, str(path), one.to_frame()):
+            assert np.array_equal(found.predicted(same), found.predicted(name))
+    assert not np.array_equal(found.predicted(recording), found.predicted(other))
+    volts = recording.to_frame().rename(columns={"pressure_mbar": "pressure_v"})
+    with pytest.raises(UsageError, match="'recording' is not of this fit, in which none has its samples"):
+        found.predicted(volts)
 
 
 def test_compensation_as_an_array_a_signal_and_a_stream(recording: Recording, found: Identification) -> None:
@@ -143,6 +160,8 @@ def test_a_calibration_is_taken_by_its_path_and_several_from_a_folder(
     listed = store.to_dict("2026-06-01")
     assert listed["schema"] == "smartshoe.calibrations/1"
     assert [entry["is_expired"] for unit in listed["units"] for entry in unit["calibrations"]] == [True]
+    with pytest.raises(InputError, match="store is a store: take each unit's calibration out of it"):
+        smartshoe.load_calibrations(tmp_path / "store")
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,18 @@ def test_a_replay_gives_back_what_was_recorded(tmp_path: Path) -> None:
         np.testing.assert_array_equal(first.values, second.values)
 
 
+@pytest.mark.parametrize(
+    ("unit", "options", "name"),
+    [("left_toe", "", "left_toe"), ("", "?unit=heel", "heel"), ("T7", "", "pressure"), ("", "", "pressure")],
+)
+def test_a_replayed_unit_under_test_goes_by_its_place(tmp_path: Path, unit: str, options: str, name: str) -> None:
+    given = {"time_s": np.arange(40) / 100, "pressure_mbar": np.arange(40.0), "force_n": np.arange(40.0)}
+    write(Recording.from_arrays(**given, unit=unit or None), tmp_path / "check.csv")
+    with open_shoe(f"replay:{tmp_path / 'check.csv'}{options}") as shoe:
+        assert [channel.name for channel in shoe.describe()] == [name]
+        assert next(iter(shoe.blocks())).names == (name,)
+
+
 def test_a_log_cannot_be_run_as_another_protocol(logs: tuple[Path, Path]) -> None:
     with open_machine(f"log:{logs[0]}?daq={logs[1]}") as machine, pytest.raises(DeviceError, match="log of this"):
         machine.run(dynamic_protocol((400.0,), peak_n=400.0))

@@ -18,7 +18,7 @@ from smartshoe.diagnosis._diagnose import _without
 from smartshoe.diagnosis._jittered import jitter_s
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
 from smartshoe.diagnosis._sensitivity import available, logged_channels, nuisance_precision
-from smartshoe.diagnosis._session import Session, at_full_rate, kernel, pastless, smoothed
+from smartshoe.diagnosis._session import Session, at_full_rate, kernel, pastless, prepare, smoothed
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.units import MILLIBAR
 
@@ -356,6 +356,20 @@ def test_a_later_recording_knows_the_load_that_went_before_and_the_one_after_it_
         assert [one.conditions.before for one in again] == [before[k] for k in order]
         assert [one.recording.name for one in again] == [runs[k].name for k in order]
         assert [one.index for one in again] == [0, 1, 2]
+
+
+def test_of_recordings_that_carry_on_the_same_load_cycles_judge_in_any_order() -> None:
+    first, second = (replace(pressed(triangles(cycles)), name=name) for cycles, name in ((7, "a"), (8, "b")))
+    second = replace(second, metadata={"continues": "a"})
+
+    def judging(*runs: Recording) -> dict[str, list[int]]:
+        usable = [one.sensor.present for one in runs]
+        scale = full_scale(runs, usable, STANDARD)
+        sessions = prepare(runs, usable, None, scale, [1], STANDARD)
+        return {one.recording.name: sorted({*one.cycle[one.held_out].tolist()}) for one in sessions}
+
+    # Counted on through both: the third, sixth, ninth, twelfth and fifteenth cycle that the unit bore.
+    assert judging(first, second) == judging(second, first) == {"a": [2, 5], "b": [1, 4, 7]}
 
 
 def test_recordings_that_continue_each_other_are_taken_as_they_are_given() -> None:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from presses import FIXED, TOE, coefficients, press
 
+from smartshoe.errors import NotIdentifiableError
 from smartshoe.identification import identify
 from smartshoe.identification._estimator import (
     MOST_RATIO,
@@ -150,6 +151,15 @@ def test_a_command_is_there_where_every_recording_has_one_that_moves_with_its_lo
         mixed = load + share * noise * np.linalg.norm(load) / np.linalg.norm(noise)
         # 1/sqrt(1 + share^2): 0.894 and 0.905.
         assert bool(_has_command(PredictionError([replace(pressed, command_n=mixed)], PLAIN))) is is_there
+
+
+def test_where_a_delay_held_far_off_leaves_no_instruments_the_noise_of_both_signals_is_allowed_for() -> None:
+    recording = press(load_noise=0.3, reading_noise=0.3, command=True, rates=(50.0, 200.0, 800.0))
+    assert identify(recording).estimator == "command"
+    found = identify(recording, delay=0.1)
+    assert (found.estimator, found.delay_s.value) == ("errors_in_variables", 0.1)
+    with pytest.raises(NotIdentifiableError, match=r"^triangles: the instruments do not determine the model"):
+        identify(recording, delay=0.1, estimator="command")
 
 
 @pytest.mark.parametrize(("times", "is_weak"), [(3.9, False), (4.0, False), (4.1, True)])

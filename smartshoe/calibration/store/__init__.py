@@ -1,6 +1,6 @@
 """Calibrations over the life of units: a folder of plain files, looked up by serial number, place and date."""
 
-from smartshoe.calibration.store._calibration_store import CalibrationStore, default_folder, find
+from smartshoe.calibration.store._calibration_store import CalibrationStore, default_folder, find, is_store
 from smartshoe.calibration.store._entry import Entry, Found, HistoryEvent
 
-__all__ = ["CalibrationStore", "Entry", "HistoryEvent", "Found", "default_folder", "find"]
+__all__ = ["CalibrationStore", "Entry", "HistoryEvent", "Found", "default_folder", "find", "is_store"]

@@ -33,6 +33,11 @@ def default_folder() -> Path:
     return user_data_path("smartshoe", appauthor=False) / "calibrations"
 
 
+def is_store(folder: Path | str) -> bool:
+    """Whether a folder is a store, and no folder of calibration files: its units have folders of their own."""
+    return (Path(folder) / files.UNITS).is_dir()
+
+
 class CalibrationStore:
     """Calibrations in a folder of plain files that are read anew at each question.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Mask
 from smartshoe.calibration import Calibration, compensate
-from smartshoe.calibration._calibration import calibration_from
+from smartshoe.calibration._calibration import calibration_from, sensor_for
 from smartshoe.calibration.validation import _metrics as metrics
 from smartshoe.display import Summarised, SummaryTable, panels, significant
 from smartshoe.errors import InputError
@@ -129,7 +129,7 @@ class Validation(Summarised):
 def validate(
     recordings: RecordingLike | Sequence[RecordingLike], calibration: Calibration | str | os.PathLike[str]
 ) -> Validation:
-    """Judge a calibration on recordings that have a reference load and one sensor each.
+    """Judge a calibration on recordings that have a reference load and a reading of the unit, one or a whole shoe's.
 
     Parameters
     ----------
@@ -154,9 +154,10 @@ def validate(
     if not given:
         raise InputError("there is no recording to validate on: give one at least")
     unit = calibration.reading_unit
-    readings = [recording.sensor.in_unit(unit) for recording in given]
+    sensors = [sensor_for(recording, calibration) for recording in given]
+    readings = [sensor.in_unit(unit) for sensor in sensors]
     loads = [recording.force_n for recording in given]
-    valid = [recording.sensor.present & recording.load.present for recording in given]
+    valid = [sensor.present & recording.load.present for sensor, recording in zip(sensors, given, strict=True)]
     if not any(mask.any() for mask in valid):
         raise InputError(f"{given[0].label}: load and reading are never there together")
     _require_movement(given[0].label, readings, loads, valid)

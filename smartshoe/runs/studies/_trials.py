@@ -94,14 +94,13 @@ def calibrations_for(recording: Recording, place: Path | None, entry: TrialEntry
     """The calibrations of a trial's units, from a folder of files or a store; none where ``place`` is None."""
     if place is None:
         return []
-    if any(place.glob("*.json")) or not place.is_dir():
-        from smartshoe.calibration.folder import load_calibrations
-
-        return load_calibrations(place)
     from smartshoe.calibration import Calibration
-    from smartshoe.calibration.store import CalibrationStore, find
+    from smartshoe.calibration.folder import load_calibrations
+    from smartshoe.calibration.store import CalibrationStore, find, is_store
     from smartshoe.errors import InputError
 
+    if not is_store(place):
+        return load_calibrations(place)
     store = CalibrationStore(place)
     entries = store.entries()
     if not entries:

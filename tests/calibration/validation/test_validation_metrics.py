@@ -63,6 +63,19 @@ def test_a_reading_that_never_moves_is_refused_as_no_usable_data() -> None:
         validate(recording, Calibration(0.2, 2.1, 0.4, reading_unit=MILLIBAR))
 
 
+@pytest.mark.parametrize("unit", ["left_toe", "left_heel"])
+def test_of_a_whole_shoe_the_calibrated_units_reading_is_judged(unit: str) -> None:
+    t = np.arange(0.0, 20.0, 0.01)
+    load = 400.0 * (1.0 - np.abs(t % 4.0 - 2.0) / 2.0)
+    readings = {"left_toe_mbar": load / 5.0, "left_heel_mbar": load**2 / 2000.0}
+    shoe = Recording.from_arrays(time_s=t, force_n=load, **readings)
+    calibration = Calibration(0.2, 5.0, 1.0, MILLIBAR, unit=unit)
+    alone = Recording.from_arrays(time_s=t, force_n=load, pressure_mbar=readings[f"{unit}_mbar"], name=shoe.name)
+    assert validate(shoe, calibration).to_dict() == validate(alone, calibration).to_dict()
+    with pytest.raises(InputError, match="no reading of the calibrated unit 'right_toe'"):
+        validate(shoe, Calibration(0.2, 5.0, 1.0, MILLIBAR, unit="right_toe"))
+
+
 @pytest.mark.parametrize("delay_s", [-0.02, 0.0, 0.03])
 def test_a_delay_is_told_where_the_estimate_follows_the_load_and_not_of_noise(delay_s: float) -> None:
     time_s = np.arange(0.0, 12.0, 0.01)

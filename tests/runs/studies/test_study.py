@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import datetime
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -202,10 +204,19 @@ def test_calibrations_come_from_a_folder_or_a_store(tmp_path: Path) -> None:
     store.add(made, serial_number="T-1", date="2026-01-05", position="left_toe")
     recording = Recording.from_arrays(time_s=np.arange(3.0), left_toe_mbar=np.arange(3.0), name="walk")
     entry = TrialEntry(file="walk.csv", subject="A", condition="x")
-    for place in ("folder", "store"):
+    for place in ("folder", "store", "store"):  # a store that was read before has an index
         (found,) = calibrations_for(recording, tmp_path / place, entry)
         assert (found.unit, found.b1) == ("left_toe", made.b1)
     assert calibrations_for(recording, None, entry) == []
+    store.add(replace(made, b1=2.0 * made.b1), serial_number="T-1", date="2026-03-05", position="left_toe")
+    days = datetime.date(2026, 1, 10), datetime.date(2026, 3, 1), None
+    for day, times in zip(days, (1.0, 2.0, 2.0), strict=True):
+        (found,) = calibrations_for(recording, tmp_path / "store", entry.model_copy(update={"date": day}))
+        assert found.b1 == times * made.b1
+    (tmp_path / "empty" / "units").mkdir(parents=True)
+    for place in ("empty", "empty/units"):
+        with pytest.raises(InputError, match="holds no calibration"):
+            calibrations_for(recording, tmp_path / place, entry)
 
 
 def test_norms_stand_beside_the_subjects_with_their_source(folder: Path, result: dict[str, object]) -> None:
