@@ -37,7 +37,7 @@ def apart_s(
     full_n = max(float(np.max(np.abs(recordings[place].force_n[usable[place]]))) for place in of_use) or 1.0
     runs = {place: _run(recordings[place], usable[place], step_s, full_n, thresholds) for place in of_use}
     late = [place for place in of_use if _later_s(place, runs, thresholds)]
-    told = {}
+    told: dict[int, float] = {}
     for place in sorted(late, key=lambda k: -abs(lags[k].middle_s) if lags[k].at_s.size else 0.0):
         lag_s = _later_s(place, runs, thresholds)
         if lag_s and len(told) + 1 < len(runs):
