@@ -106,6 +106,6 @@ def _weights(runs: Sequence[_Run]) -> Array:
     normal = np.sum([one.made.T @ one.made for one in runs], axis=0)
     pulled = np.sum([one.made.T @ one.read for one in runs], axis=0)
     size = np.sqrt(np.diag(normal)) + 1e-300
-    normal = normal / np.outer(size, size)
+    normal = normal / size / size[:, None]  # one by one: a play that never moves is all noughts
     normal[np.diag_indices_from(normal)] += 1e-6
     return np.asarray(np.linalg.solve(normal, pulled / size) / size)

@@ -69,6 +69,13 @@ def test_what_all_recordings_share_and_what_a_logger_delays_is_of_no_clock() -> 
     assert _apart(_run(0.0, 1), _run(0.1, 2).taken(slice(0, 50))) == {}
 
 
+def test_plays_that_never_move_are_none() -> None:
+    """Loads of a few percent about one that stands."""
+    runs = [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
+    small = [one.with_channel(one.load.with_values(800.0 + 0.02 * one.load.values)) for one in runs]
+    assert set(_apart(*small)) <= {1}
+
+
 def test_nor_is_a_lag_that_does_not_foretell_far_better() -> None:
     """Noise hides it."""
     assert _apart(_run(0.0, 1, noise=20.0), _run(0.1, 2, noise=20.0)) == {}
