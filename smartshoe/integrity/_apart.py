@@ -34,11 +34,15 @@ def apart_s(
     if len(of_use) < 2:
         return {}
     step_s = max(thresholds.echo_s / thresholds.clear, max(recordings[k].duration_s for k in of_use) / thresholds.bins)
-    full_n = max(float(np.max(np.abs(recordings[place].force_n[usable[place]]))) for place in of_use) or 1.0
-    runs = {place: _run(recordings[place], usable[place], step_s, full_n, thresholds) for place in of_use}
-    late = [place for place in of_use if _later_s(place, runs, thresholds)]
+    loads = [recordings[place].force_n[usable[place]] for place in of_use]
+    ends_n = min(float(one.min()) for one in loads), max(float(one.max()) for one in loads)
+    if ends_n[0] == ends_n[1]:
+        return {}
+    runs = {place: _run(recordings[place], usable[place], step_s, ends_n, thresholds) for place in of_use}
+    found = {place: _later_s(place, runs, thresholds) for place in of_use}
+    own = {place: abs(lags[place].middle_s) if lags[place].at_s.size else 0.0 for place in of_use}
     told: dict[int, float] = {}
-    for place in sorted(late, key=lambda k: -abs(lags[k].middle_s) if lags[k].at_s.size else 0.0):
+    for place in sorted((k for k in of_use if found[k]), key=lambda k: (-own[k], -abs(found[k]))):
         lag_s = _later_s(place, runs, thresholds)
         if lag_s and len(told) + 1 < len(runs):
             told[place] = lag_s
@@ -63,7 +67,9 @@ class _Run:
         return replace(self, read=np.interp(self.grid + by_s, self.grid, self.read))
 
 
-def _run(recording: Recording, usable: Mask, step_s: float, full_n: float, thresholds: Thresholds) -> _Run:
+def _run(
+    recording: Recording, usable: Mask, step_s: float, ends_n: tuple[float, float], thresholds: Thresholds
+) -> _Run:
     from scipy.ndimage import gaussian_filter1d
 
     time_s = recording.time_s[usable]
@@ -72,7 +78,7 @@ def _run(recording: Recording, usable: Mask, step_s: float, full_n: float, thres
         binned(time_s, five_point_median(one[usable]), grid, step_s) for one in (recording.force_n, recording.sensor.si)
     )
     smooth = max(thresholds.echo_s / step_s, 1.0)
-    made = made_of(load / full_n, step_s, smooth, thresholds)
+    made = made_of((load - ends_n[0]) / (ends_n[1] - ends_n[0]), step_s, smooth, thresholds)
     return _Run(grid, made, gaussian_filter1d(reading, smooth, order=1), thresholds.few * recording.sample_time_s)
 
 

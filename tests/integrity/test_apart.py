@@ -52,7 +52,7 @@ def test_the_one_that_is_late_is_told_by_how_much(late_s: float, sign: float) ->
 
 def test_two_that_are_late_are_told_each() -> None:
     runs = [_run(lag_s, seed) for seed, lag_s in enumerate((0.0, 0.12, 0.0, 0.0, -0.12, 0.0))]
-    assert _apart(*runs) == {1: pytest.approx(0.12, abs=0.02), 4: pytest.approx(-0.12, abs=0.02)}
+    assert _apart(*runs) == {1: pytest.approx(0.12, abs=0.03), 4: pytest.approx(-0.12, abs=0.03)}
 
 
 def test_of_two_recordings_it_is_the_one_with_the_longer_lag_of_its_own() -> None:
@@ -69,11 +69,12 @@ def test_what_all_recordings_share_and_what_a_logger_delays_is_of_no_clock() -> 
     assert _apart(_run(0.0, 1), _run(0.1, 2).taken(slice(0, 50))) == {}
 
 
-def test_plays_that_never_move_are_none() -> None:
-    """Loads of a few percent about one that stands."""
+def test_loads_of_a_few_percent_about_one_that_stands_tell_as_much() -> None:
     runs = [_run(lag_s, seed) for seed, lag_s in ((1, 0.0), (2, 0.1), (3, 0.0))]
     small = [one.with_channel(one.load.with_values(800.0 + 0.02 * one.load.values)) for one in runs]
-    assert set(_apart(*small)) <= {1}
+    assert _apart(*small) == {1: pytest.approx(0.1, abs=0.01)}
+    still = [one.with_channel(one.load.with_values(np.full(len(one), 5.0))) for one in runs]
+    assert _apart(*still) == {}
 
 
 def test_nor_is_a_lag_that_does_not_foretell_far_better() -> None:
