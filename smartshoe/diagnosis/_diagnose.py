@@ -60,20 +60,23 @@ def diagnose(
     everything, count = [*fitted, *kept_out], len(fitted)
     unit_of(everything, "diagnose")
     decided = decided_by(thresholds, material)
-    integrity = examine(everything, decided)
+    integrity, shared = examine(everything, decided), twins(everything, decided)
     everything = [*integrity.recordings]
     useless = [k for k, mask in enumerate(integrity.usable) if not mask.any()]
-    left_out = twins(everything) | dict(zip(useless, integrity.refusals, strict=True))
+    alone = [mask & ~shared[k].at if k in shared else mask for k, mask in enumerate(integrity.usable)]
+    copies = {k: one.says for k, one in shared.items() if alone[k].sum() < decided.least_samples}
+    left_out = copies | dict(zip(useless, integrity.refusals, strict=True))
     pulled = {k: said for k, one in enumerate(everything) if k not in left_out and (said := _outside(one, decided))}
     if any(k < count for k in pulled):
         return _refused(everything, integrity, [said for k, said in pulled.items() if k < count], decided)
     left_out |= pulled
     if all(k in left_out for k in range(count)):
         return _refused(everything, integrity, list(left_out.values()), decided)
-    usable = tuple(mask & (k not in left_out) for k, mask in enumerate(integrity.usable))
+    usable = tuple(mask & (k not in left_out) for k, mask in enumerate(alone))
     found = diagnosed(everything, count, replace(integrity, usable=usable), decided, progress)
     reasons = tuple(left_out.values())
-    limits = (*(f"left out: {why}" for why in reasons), *_without(everything, count, left_out), *found.limits)
+    why_not = (*reasons, *(one.says for k, one in shared.items() if k not in left_out))
+    limits = (*(f"left out: {why}" for why in why_not), *_without(everything, count, left_out), *found.limits)
     return replace(found, limits=limits, left_out=reasons)
 
 

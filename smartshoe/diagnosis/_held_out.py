@@ -52,6 +52,24 @@ def own_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[Arr
     return found, columns @ found
 
 
+def past_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[float, float]:
+    """What a recording brings along from before it, by all that was fitted of it, and its standard deviation.
+
+    With the prior that it has in every fit; noise counts once each correlation time.
+    """
+    mask = session.fitted
+    columns = nuisances(session, model.pole_per_s, session.reading - residual)
+    left = residual - own_of(session, model, residual)[1]
+    variance = correlated_sd([left], [mask]) ** 2
+    known = variance / past_sd(session, model, session.unknown_past) ** 2
+    prior = a_nuisance_each(session, offset=0.0, past=known, change=variance, gap=variance) + 1e-9 * np.eye(
+        columns.shape[1]
+    )
+    seen = columns[mask]
+    inverse = np.linalg.inv(seen.T @ seen + prior)
+    return float((inverse @ (seen.T @ residual[mask]))[1]), math.sqrt(variance * float(inverse[1, 1]))
+
+
 def _told_by(session: Session, pole_per_s: float) -> Mask:
     """(n,) samples that tell what is the recording's own: a state after a gap is told before it has faded, or never."""
     if not session.fitted.any():

@@ -189,7 +189,8 @@ def _outcome(
 ) -> _Outcome:
     """The verdict, by what is ``left``, and ``off`` at the full rate, (n,) each, and ``won`` on what is held out."""
     fine, known, thresholds = given.fine, left.known, given.thresholds
-    elsewhere = off_elsewhere(fine, off, max(left.within.size, beyond_noise(fine, off, thresholds)), thresholds)
+    within = max(left.within.size, beyond_noise(fine, off, thresholds), known)
+    elsewhere = off_elsewhere(fine, off, within, thresholds)
     unproven = 0.0
     if not (found.can_validate and left.after.is_tested):
         # Beside causes what is left is weighed against what was wrong, tested or not.

@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
-from smartshoe.diagnosis._held_out import own_of
+from smartshoe.diagnosis._held_out import own_of, past_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -53,8 +53,9 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
     """(m, 3) mean load and reading of each fitted recording's rest before its first load, shares of full scale.
 
     Nothing has happened to the unit yet, so that the reading is its zero whatever its model; but for what has drifted
-    by then, which is taken out: the third column is how much that is. A load that begins to rise at once is no rest,
-    nor is one whose reading, on a clock that is early, has begun to rise before it.
+    by then, and what the unit is seen to remember from before the recording, as where a walk was cut: these are taken
+    out, and the third column is how much they are. A load that begins to rise at once is no rest, nor is one whose
+    reading, on a clock that is early, has begun to rise before it.
     """
     found = []
     for session in sessions:
@@ -79,7 +80,10 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         # A single sample of a slow log shows no rest, however long it lasts: the load may be on its way.
         is_rest = lasts > 1 and abs(_risen(load[first][kept])) < thresholds.still_per_s * lasts_s
         if is_rest and lasts_s >= thresholds.settled_s:
-            drifted = float(np.mean(_drifted(session, model)[first][kept]))
+            past, past_sd = past_of(session, model, session.reading - model.simulate(session.conditions))
+            is_seen = abs(past) >= largest_of_noise(1, thresholds) * past_sd
+            moved_by = _drifted(session, model) + is_seen * past * np.exp(-model.pole_per_s * session.conditions.time_s)
+            drifted = float(np.mean(moved_by[first][kept]))
             reading = float(np.mean(session.reading[first][kept])) - drifted
             found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
     return np.array(found).reshape(-1, 3)

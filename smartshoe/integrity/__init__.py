@@ -2,6 +2,6 @@
 
 from smartshoe.integrity._examination import examine
 from smartshoe.integrity._fault import DataFault, Integrity, OneClock
-from smartshoe.integrity._twins import twins
+from smartshoe.integrity._twins import Twin, twins
 
-__all__ = ["DataFault", "Integrity", "OneClock", "examine", "twins"]
+__all__ = ["DataFault", "Integrity", "OneClock", "Twin", "examine", "twins"]

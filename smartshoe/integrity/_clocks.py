@@ -18,11 +18,12 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask
 from smartshoe.integrity._fault import Finding, OneClock
-from smartshoe.integrity._following import of_load
+from smartshoe.integrity._following import of_share
 from smartshoe.integrity._scales import five_point_median
 from smartshoe.integrity._view import Signal, View
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
 from smartshoe.kernels.blas import on_one_thread
+from smartshoe.recording import Recording
 
 # Resolutions: half and twice of each changed no finding in two cases.
 SMOOTHING = (1.0, 3.0, 6.0)  # echoes
@@ -117,12 +118,16 @@ def two_clocks(view: View, bad: Mask) -> Iterator[Finding]:
     first, last = view.offset_s - view.rate * half, view.offset_s + view.rate * half
     drift = abs(last - first) > _least_lag_s(view)
     course = f" (from {first:+.2f} s at the start to {last:+.2f} s at the end)" if drift else ""
-    yield Finding(
+    yield from_two_clocks(view.recording, view.offset_s, "than the unit's relaxation explains", course)
+
+
+def from_two_clocks(recording: Recording, offset_s: float, more: str, course: str = "") -> Finding:
+    """The finding of a reading that is late by ``offset_s``, ``more`` than something; ``course``: from when to when."""
+    return Finding(
         "two_clocks",
-        np.ones(len(view.recording), dtype=bool),
-        f"load and reading come from two clocks: the reading is {abs(view.offset_s):.2f} s"
-        f" {'late' if view.offset_s >= 0 else 'early'}{course}, more than the unit's relaxation explains"
-        " (record both by one clock)",
+        np.ones(len(recording), dtype=bool),
+        f"load and reading come from two clocks: the reading is {abs(offset_s):.2f} s"
+        f" {'late' if offset_s >= 0 else 'early'}{course}, more {more} (record both by one clock)",
     )
 
 
@@ -157,8 +162,8 @@ def _followed(view: View) -> _Followed | None:
     bins = int(min(given.bins, view.time_s.size // 2))
     width_s = duration_s / bins
     grid = view.time_s[0] + (np.arange(bins) + 0.5) * width_s
-    load = _binned(view.time_s, five_point_median(view.load.values), grid, width_s)
-    reading = _binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
+    load = binned(view.time_s, five_point_median(view.load.values), grid, width_s)
+    reading = binned(view.time_s, five_point_median(view.reading.values), grid, width_s)
     if np.ptp(load) == 0.0 or np.ptp(reading) == 0.0 or _is_one_sine(load, given):
         return None
     for echoes in SMOOTHING:  # as little as the noise allows, since smoothing blunts the edges
@@ -247,7 +252,7 @@ def _describes(line: Array, lags: Array, thresholds: Thresholds) -> bool:
     return bool(np.median(np.abs(lags - line)) < thresholds.same * np.max(np.abs(line)))
 
 
-def _binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
+def binned(time_s: Array, values: Array, grid: Array, width_s: float) -> Array:
     """Means over bins, empty ones interpolated."""
     place = np.minimum(((time_s - time_s[0]) / width_s).astype(np.intp), grid.size - 1)
     count = np.bincount(place, minlength=grid.size)
@@ -401,14 +406,21 @@ def _increments(of: _Followed, load: Array, thresholds: Thresholds) -> tuple[Arr
     from scipy.ndimage import gaussian_filter1d
 
     step_s = float(of.grid[1] - of.grid[0])
-    shortest_s, longest_s = thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1]
-    viscous = of_load(load, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
-    rubbed = _play(viscous[:, 0], thresholds.standing * OCTAVES)
     smooth = max(of.smooth_s / step_s, 1.0)
-    made = gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1)
+    made = made_of((load - load.min()) / np.ptp(load), step_s, smooth, thresholds)
     read = gaussian_filter1d(of.reading, smooth, order=1)
     moving = np.abs(made[:, 0]) > thresholds.faulty_share * np.max(np.abs(made[:, 0]))
     return made, _without_jumps(read, moving, thresholds)
+
+
+def made_of(share: Array, step_s: float, smooth: float, thresholds: Thresholds) -> Array:
+    """(b, k) increments of what a unit may make of a ``share`` (b,) of its load, over some bins, its own the first."""
+    from scipy.ndimage import gaussian_filter1d
+
+    shortest_s, longest_s = thresholds.echo_s / thresholds.clear, thresholds.clear * thresholds.memory_s[-1]
+    viscous = of_share(share, step_s, np.geomspace(shortest_s, longest_s, 8))  # two and a half a decade
+    rubbed = _play(share, thresholds.standing * OCTAVES)
+    return np.asarray(gaussian_filter1d(np.concatenate([viscous, rubbed], axis=1), smooth, axis=0, order=1))
 
 
 @on_one_thread

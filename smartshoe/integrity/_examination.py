@@ -10,7 +10,8 @@ import numpy as np
 from smartshoe.arrays import Mask
 from smartshoe.display import first_names
 from smartshoe.errors import InputError
-from smartshoe.integrity._clocks import UNSEEN, Lags, align, one_clock, two_clocks
+from smartshoe.integrity._apart import apart_s
+from smartshoe.integrity._clocks import UNSEEN, Lags, align, from_two_clocks, one_clock, two_clocks
 from smartshoe.integrity._dropouts import dropouts, load_dropouts
 from smartshoe.integrity._fault import DataFault, Finding, Integrity, OneClock
 from smartshoe.integrity._following import does_not_follow_load, wrong_sign
@@ -22,6 +23,7 @@ from smartshoe.integrity._quantisation import quantisation
 from smartshoe.integrity._rails import low_rail, saturation
 from smartshoe.integrity._sampling import gaps, missing_samples, short_recording, uneven_sampling
 from smartshoe.integrity._spikes import spikes
+from smartshoe.integrity._stepped_load import between_steps
 from smartshoe.integrity._view import UNKNOWN_ENDS, Ends, Signal, View
 from smartshoe.integrity._wild import with_missing, without_wild
 from smartshoe.integrity._wrapped import unwrapped
@@ -89,19 +91,25 @@ def examine(recordings: Sequence[Recording], thresholds: Thresholds | None = Non
     decided = decided_by(thresholds)
     tamed = _tamed(recordings, decided)
     examined = _examined_together(tamed, decided)
-    each = list(zip(tamed, examined, strict=True))
-    refused = [_refusal(tame.recording, one, decided) for tame, one in each]
+    refused = [_refusal(tame.recording, one, decided) for tame, one in zip(tamed, examined, strict=True)]
     usable = [one.usable & (why is None) for one, why in zip(examined, refused, strict=True)]
     shared = one_clock([one.lags for one, mask in zip(examined, usable, strict=True) if mask.any()], decided)
+    put_right = [_put_right(*one, decided) for one in zip(tamed, examined, usable, strict=True)]
+    offsets_s = [one.offset_s for one in examined]
+    if not any(one.offset_s or one.rate for one in examined):
+        apart = apart_s([recording for recording, _ in put_right], usable, [one.lags for one in examined], decided)
+        for place, lag_s in apart.items():
+            shared, offsets_s[place] = None, lag_s
+            put_right[place][1].append(from_two_clocks(put_right[place][0], lag_s, "than in the other recordings"))
     return Integrity(
-        tuple(_with_known_load(tame.recording, one.findings) for tame, one in each),
+        tuple(recording for recording, _ in put_right),
         tuple(
-            _fault(number, tame.recording, finding)
-            for number, (tame, one) in enumerate(each)
-            for finding in one.findings
+            _fault(number, recording, finding)
+            for number, (recording, findings) in enumerate(put_right)
+            for finding in findings
         ),
         tuple(usable),
-        tuple(one.offset_s for one in examined),
+        tuple(offsets_s),
         tuple(one.rate for one in examined),
         shared,
         tuple(why for why in refused if why is not None),
@@ -147,6 +155,13 @@ def _tamed(recordings: Sequence[Recording], thresholds: Thresholds) -> list[_Tam
         recording, wild = without_wild(logged, thresholds)
         made.append(_Tamed(logged, recording, (*held, *between, *wrapped, *wild)))
     return made
+
+
+def _put_right(tame: _Tamed, found: _Examined, usable: Mask, thresholds: Thresholds) -> tuple[Recording, list[Finding]]:
+    """A recording with its load as far as it is known, and all findings in it."""
+    recording = _with_known_load(tame.recording, found.findings)
+    between, stepped = between_steps(recording, thresholds) if usable.any() else (recording, [])
+    return between, [*found.findings, *stepped]
 
 
 def _with_known_load(recording: Recording, findings: Sequence[Finding]) -> Recording:

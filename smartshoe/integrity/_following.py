@@ -106,6 +106,10 @@ def _moves_with(load: Array, reading: Array, stride: float, thresholds: Threshol
 
 def of_load(load: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
     """(n, 3 + k) a load (n,) as share of its span, its square and cube, and the share behind k first-order lags."""
-    f = (load - load.min()) / np.ptp(load)
+    return of_share((load - load.min()) / np.ptp(load), step_s, time_constants_s)
+
+
+def of_share(f: Array, step_s: float, time_constants_s: Sequence[float] | Array) -> Array:
+    """(n, 3 + k) a share ``f`` (n,) of a load, its square and cube, and the share behind k first-order lags."""
     lags = [lagged(f, step_s, float(tau_s)) for tau_s in time_constants_s]
     return np.stack([f, f**2, f**3, *lags], axis=1)

@@ -284,3 +284,21 @@ def test_a_zero_that_is_led_back_from_high_loads_is_told_and_one_from_no_load_is
     assert {cause.name, *cause.equivalents} == {"zero_offset", "load_cell_tare"}
     assert cause.parameters["offset"].value == pytest.approx(2.5, rel=0.1)
     assert not any(one.startswith("led back") for one in found.limits)
+
+
+@pytest.mark.parametrize("seed", [20, 22, 25])
+def test_what_a_walk_remembers_from_before_it_was_cut_is_no_offset(seed: int) -> None:
+    """As the foot swings, and as it stands: the wall has borne the steps before."""
+    case = hide({}, protocol="walking", seed=seed)
+    cut = []
+    for place, one in enumerate(case.recordings):
+        load = one.force_n
+        swings = load < 0.02 * load.max()
+        begins = np.flatnonzero(np.diff(swings.astype(int)) == 1) + 4
+        first = int(begins[begins > len(one) // 4 + 137 * place][0])
+        if place % 2:
+            first += int(np.argmax(load[first:] > 0.5 * load.max()))
+        cut.append(one.taken(slice(first, len(one))))
+    found = diagnose(cut, case.hold_out)
+    assert "zero_offset" not in _named(found)
+    assert found.verdict in ("adequate", "explained")

@@ -14,6 +14,7 @@ from scipy.stats import norm
 
 from smartshoe.diagnosis import Thresholds, _zero
 from smartshoe.diagnosis._aligned import _on_one_clock, as_they_follow
+from smartshoe.diagnosis._held_out import past_of
 from smartshoe.diagnosis._noise_kinds import noise_kinds
 from smartshoe.diagnosis._parameters import _scaled, joint_parameters, parameters_of
 from smartshoe.diagnosis._scale import Scale
@@ -33,9 +34,18 @@ SCALE = Scale(800.0, 140.0, MILLIBAR)
 MANY = float(norm.isf(0.5 * STANDARD.false_alarm))
 
 
+@pytest.fixture(autouse=True)
+def _no_past(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is remembered at a rest, but where a test is about it."""
+    if "past" not in request.node.name:
+        monkeypatch.setattr(_zero, "past_of", lambda *given: (0.0, 0.0))
+
+
 # -- zeros that are seen ----------------------------------------------------------------------------------------------
 def _seen(
-    monkeypatch: pytest.MonkeyPatch, rests: list[tuple[float, float, float]], scale: Scale = SCALE
+    monkeypatch: pytest.MonkeyPatch,
+    rests: list[tuple[float, float, float]],
+    scale: Scale = SCALE,
 ) -> dict[str, Any]:
     """By loads, readings and drifts of first rests."""
     monkeypatch.setattr(_zero, "first_rests", lambda *given: np.array(rests).reshape(-1, 3))
@@ -186,6 +196,34 @@ def test_offsets_are_of_what_is_fitted_without_what_a_past_adds() -> None:
         one.reading = MODEL.simulate(one.conditions) + offset + 0.05 * np.exp(-0.22 * time_s)
         sessions.append(one)
     assert offsets(sessions, MODEL) == pytest.approx([0.3, -0.2], abs=2e-3)
+
+
+def test_a_past_is_known_as_well_as_noise_lets_it() -> None:
+    """By least squares under its prior; its standard deviation is that of repeated draws."""
+    time_s = 0.1 * np.arange(600)
+    load, past = np.abs((time_s / 4.0) % 2.0 - 1.0), 0.004
+    one = _session(load)
+    one.held_out, one.usable = ~one.fitted, np.ones(600, dtype=bool)
+    one.judged, one.unknown_past = one.held_out, STANDARD.unknown_past
+    found = []
+    for seed in range(60):
+        noise = 2e-3 * np.random.default_rng(seed).standard_normal(600)
+        found.append(past_of(one, MODEL, noise + 0.3 + past * np.exp(-MODEL.pole_per_s * time_s)))
+    values, sds = np.array(found).T
+    assert np.mean(values) == pytest.approx(past, abs=3.0 * np.std(values) / np.sqrt(60.0) + 0.1 * past)
+    assert np.median(sds) == pytest.approx(np.std(values), rel=0.35)
+    one.reading = 0.3 + 0.01 * np.ones(600)
+    assert past_of(one, MODEL, np.full(600, 0.3))[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = _rested(25)
+    fades = float(np.mean(np.exp(-MODEL.pole_per_s * one.conditions.time_s[:25])))
+    for sd, is_seen in ((0.0999 / MANY, True), (0.1001 / MANY, False)):
+        monkeypatch.setattr(_zero, "past_of", lambda *given, sd=sd: (0.1, sd))
+        (rest,) = first_rests([one], MODEL, STANDARD)
+        gone = 0.1 * fades if is_seen else 0.0
+        assert rest == pytest.approx(np.array([0.0, 0.01 - gone, gone]) / [1.0, 0.8, 0.8])
 
 
 # -- first rests ------------------------------------------------------------------------------------------------------
