@@ -61,7 +61,7 @@ def past_of(session: Session, model: ExtendedModel, residual: Array) -> tuple[fl
     columns = nuisances(session, model.pole_per_s, session.reading - residual)
     left = residual - own_of(session, model, residual)[1]
     variance = correlated_sd([left], [mask]) ** 2
-    known = variance / past_sd(session, model, session.unknown_past) ** 2
+    known = variance / past_sd(session, model) ** 2
     prior = a_nuisance_each(session, offset=0.0, past=known, change=variance, gap=variance) + 1e-9 * np.eye(
         columns.shape[1]
     )

@@ -6,8 +6,9 @@ learnt from the others; a recording that it foretells far better at another mome
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -39,11 +40,13 @@ def apart_s(
     if ends_n[0] == ends_n[1]:
         return {}
     runs = {place: _run(recordings[place], usable[place], step_s, ends_n, thresholds) for place in of_use}
-    found = {place: _later_s(place, runs, thresholds) for place in of_use}
+    foretelling = _of_others([*runs.values()])
+    found = {place: _later_s(runs[place], one, thresholds) for place, one in zip(of_use, foretelling, strict=True)}
     own = {place: abs(lags[place].middle_s) if lags[place].at_s.size else 0.0 for place in of_use}
     told: dict[int, float] = {}
     for place in sorted((k for k in of_use if found[k]), key=lambda k: (-own[k], -abs(found[k]))):
-        lag_s = _later_s(place, runs, thresholds)
+        others = sum(one.products for other, one in runs.items() if other != place)
+        lag_s = _later_s(runs[place], np.asarray(others), thresholds)
         if lag_s and len(told) + 1 < len(runs):
             told[place] = lag_s
             runs[place] = runs[place].earlier(lag_s)
@@ -61,6 +64,11 @@ class _Run:
     made: Array
     read: Array
     least_s: float
+
+    @cached_property
+    def products(self) -> Array:
+        """(k, k + 1) inner products of what is made of the load, with itself and with the reading."""
+        return np.asarray(self.made.T @ np.column_stack([self.made, self.read]))
 
     def earlier(self, by_s: float) -> _Run:
         """The same with its reading earlier."""
@@ -82,13 +90,22 @@ def _run(
     return _Run(grid, made, gaussian_filter1d(reading, smooth, order=1), thresholds.few * recording.sample_time_s)
 
 
-def _later_s(place: int, runs: Mapping[int, _Run], thresholds: Thresholds) -> float:
-    """How much later one reading follows than the others foretell; 0 where it is not foretold far better so.
+def _of_others(runs: Sequence[_Run]) -> list[Array]:
+    """For each of them the sum of all others' products: of those before it and of those after it."""
+    products = np.array([one.products for one in runs])
+    nothing = np.zeros_like(products[:1])
+    before = np.concatenate([nothing, np.cumsum(products[:-1], axis=0)])
+    after = np.concatenate([np.cumsum(products[:0:-1], axis=0)[::-1], nothing])
+    return [*(before + after)]
 
-    At rising and at falling edges alike: load that the unit remembers has a lag for each direction.
+
+def _later_s(run: _Run, others: Array, thresholds: Thresholds) -> float:
+    """How much later one reading follows than the ``others``, by their products, foretell.
+
+    0 where it is not foretold far better so, at rising and at falling edges alike: load that the unit remembers has a
+    lag for each direction.
     """
-    run = runs[place]
-    foretold = run.made @ _weights([one for other, one in runs.items() if other != place])
+    foretold = run.made @ _weights(others)
     rises = (run.made[:, 0] > 0.0).astype(float)
     lag_s, step_s = 0.0, float(run.grid[1] - run.grid[0])
     for _ in range(STEPS):
@@ -107,10 +124,9 @@ def _later_s(place: int, runs: Mapping[int, _Run], thresholds: Thresholds) -> fl
     return lag_s if is_foretold and abs(lag_s) > run.least_s else 0.0
 
 
-def _weights(runs: Sequence[_Run]) -> Array:
+def _weights(products: Array) -> Array:
     """(k,) of what a unit may make of its load, by least squares."""
-    normal = np.sum([one.made.T @ one.made for one in runs], axis=0)
-    pulled = np.sum([one.made.T @ one.read for one in runs], axis=0)
+    normal, pulled = products[:, :-1], products[:, -1]
     size = np.sqrt(np.diag(normal)) + 1e-300
     normal = normal / size / size[:, None]  # one by one: a play that never moves is all noughts
     normal[np.diag_indices_from(normal)] += 1e-6
