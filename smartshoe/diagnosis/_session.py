@@ -128,7 +128,8 @@ def prepare(
 def _with_cycles_held_out(sessions: list[Session], order: Sequence[int], thresholds: Thresholds) -> list[Session]:
     """``sessions`` of which one load cycle in so many judges, counted on from each to the next in ``order``.
 
-    That is the order in which the unit bore them: which was named first on a command line decides nothing.
+    That is the order in which the unit bore them, as far as it is known, and of their names: which was given first
+    decides nothing.
     """
     count, kept = 0, [*sessions]
     for index in order:
@@ -150,14 +151,14 @@ def _on_one_scale(sessions: Sequence[Session]) -> list[Session]:
 
 
 def _by_continuation(recordings: Sequence[Recording]) -> list[int]:
-    """Places of the recordings in their order, but each after the one that it continues."""
+    """Places of the recordings by their names, but each after the one that it continues, in whatever order they are."""
     order: list[int] = []
-    waiting = list(range(len(recordings)))
+    waiting = sorted(range(len(recordings)), key=lambda k: recordings[k].name)
     while waiting:
         names: Counter[str | None] = Counter(recordings[k].name for k in waiting)
         ready = [k for k in waiting if names[_before(recordings[k])] <= continues(recordings[k], recordings[k])]
         placed = {*(ready or waiting)}  # of those that continue each other in a ring none is the first
-        order += sorted(placed)
+        order += [k for k in waiting if k in placed]
         waiting = [k for k in waiting if k not in placed]
     return order
 

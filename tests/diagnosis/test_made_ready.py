@@ -358,9 +358,10 @@ def test_a_later_recording_knows_the_load_that_went_before_and_the_one_after_it_
         assert [one.index for one in again] == [0, 1, 2]
 
 
-def test_of_recordings_that_carry_on_the_same_load_cycles_judge_in_any_order() -> None:
+@pytest.mark.parametrize("metadata", [{"continues": "a"}, {}])
+def test_the_same_load_cycles_judge_in_whatever_order_recordings_are_given(metadata: dict[str, str]) -> None:
     first, second = (replace(pressed(triangles(cycles)), name=name) for cycles, name in ((7, "a"), (8, "b")))
-    second = replace(second, metadata={"continues": "a"})
+    second = replace(second, metadata=metadata)
 
     def judging(*runs: Recording) -> dict[str, list[int]]:
         usable = [one.sensor.present for one in runs]
@@ -368,11 +369,11 @@ def test_of_recordings_that_carry_on_the_same_load_cycles_judge_in_any_order() -
         sessions = prepare(runs, usable, None, scale, [1], STANDARD)
         return {one.recording.name: sorted({*one.cycle[one.held_out].tolist()}) for one in sessions}
 
-    # Counted on through both: the third, sixth, ninth, twelfth and fifteenth cycle that the unit bore.
+    # Counted on through both: the third, sixth, ninth, twelfth and fifteenth cycle.
     assert judging(first, second) == judging(second, first) == {"a": [2, 5], "b": [1, 4, 7]}
 
 
-def test_recordings_that_continue_each_other_are_taken_as_they_are_given() -> None:
+def test_of_recordings_that_continue_each_other_the_first_by_name_comes_first() -> None:
     first, second = (pressed(triangles(6)) for _ in range(2))
     ring = [replace(first, name=one, metadata={"continues": other}) for one, other in (("a", "b"), ("b", "a"))]
     sessions, _ = prepared(*ring)
