@@ -216,14 +216,20 @@ def test_a_past_is_known_as_well_as_noise_lets_it() -> None:
     assert past_of(one, MODEL, np.full(600, 0.3))[0] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("sd", "faded", "is_seen"), [(0.0999, 0.51, True), (0.1001, 1.0, False), (0.0999, 0.49, False)]
+)
+def test_what_a_past_leaves_at_a_rest_is_taken_out_where_it_is_clear_and_fades_there(
+    monkeypatch: pytest.MonkeyPatch, sd: float, faded: float, is_seen: bool
+) -> None:
     one = _rested(25)
-    fades = float(np.mean(np.exp(-MODEL.pole_per_s * one.conditions.time_s[:25])))
-    for sd, is_seen in ((0.0999 / MANY, True), (0.1001 / MANY, False)):
-        monkeypatch.setattr(_zero, "past_of", lambda *given, sd=sd: (0.1, sd))
-        (rest,) = first_rests([one], MODEL, STANDARD)
-        gone = 0.1 * fades if is_seen else 0.0
-        assert rest == pytest.approx(np.array([0.0, 0.01 - gone, gone]) / [1.0, 0.8, 0.8])
+    fading = np.exp(-MODEL.pole_per_s * one.conditions.time_s)
+    one.reading = one.reading + faded * 0.1 * fading
+    monkeypatch.setattr(_zero, "past_of", lambda *given: (0.1, sd / MANY))
+    (rest,) = first_rests([one], MODEL, STANDARD)
+    gone = 0.1 * float(np.mean(fading[:25])) if is_seen else 0.0
+    read = float(np.mean(one.reading[:25]))
+    assert rest == pytest.approx(np.array([0.0, read - gone, gone]) / [1.0, 0.8, 0.8])
 
 
 # -- first rests ------------------------------------------------------------------------------------------------------
