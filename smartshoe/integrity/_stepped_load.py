@@ -30,8 +30,9 @@ def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recordi
     error = UNIFORM_SD * signal.step
     if error <= thresholds.material * span or signal.quiet_noise**2 >= 2.0 * error**2:
         return recording, []
-    load = _through_edges(recording.time_s[there], signal.values, signal.step)
-    gain = _gain(signal.values, load, recording.sensor.values[there])
+    logged = _one_value_a_level(signal.values, signal.step)
+    load = _through_edges(recording.time_s[there], logged, signal.step)
+    gain = _gain(logged, load, recording.sensor.values[there])
     if gain is None:
         return recording, []
     values = channel.with_nan().copy()
@@ -46,6 +47,12 @@ def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recordi
             error=gain * error,
         )
     ]
+
+
+def _one_value_a_level(values: Array, step: float) -> Array:
+    """(n,) values on a grid, all of one level equal: what differs by rounding is no change from one to the next."""
+    _, first, place = np.unique(np.rint((values - values.min()) / step), return_index=True, return_inverse=True)
+    return np.asarray(values[first][place])
 
 
 def _through_edges(time_s: Array, logged: Array, step: float) -> Array:

@@ -10,7 +10,7 @@ from simulators.hidden.recordings import hide
 from smartshoe import Recording, diagnose
 from smartshoe.diagnosis import Thresholds
 from smartshoe.integrity import examine
-from smartshoe.integrity._stepped_load import _through_edges, between_steps
+from smartshoe.integrity._stepped_load import _one_value_a_level, _through_edges, between_steps
 
 Array = NDArray[np.float64]
 
@@ -64,6 +64,17 @@ def test_one_that_stands_lies_in_the_middle_and_one_that_turns_comes_no_farther(
 @pytest.mark.parametrize("logged", [np.zeros(5), np.array([0.0, 0.0, 20.0, 20.0])])
 def test_one_that_hardly_changes_is_as_it_was(logged: Array) -> None:
     assert _through_edges(np.arange(float(logged.size)), logged, 20.0) is logged
+
+
+def test_values_of_one_level_that_differ_by_rounding_are_one() -> None:
+    """As on a grid of a seventh: two of them have no edge between them."""
+    levels = np.array([0, 1, 2, 3, 3, 2, 1, 0, 0, 1, 2, 2, 1, 0])
+    values = 300.0 + 800.0 * levels / 7.0
+    shaken = values + np.where(np.arange(values.size) % 3, 0.0, 1e-12)
+    assert np.unique(shaken).size > 4
+    found = _one_value_a_level(shaken, 800.0 / 7.0)
+    assert np.unique(found).size == 4
+    assert found == pytest.approx(values, abs=1e-9)
 
 
 # -- recordings -------------------------------------------------------------------------------------------------------
