@@ -6,6 +6,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index
 from smartshoe.integrity._fault import Finding
+from smartshoe.integrity._scales import ROUNDING
 from smartshoe.integrity._view import Signal
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.recording import Recording
@@ -31,6 +32,8 @@ def between_steps(recording: Recording, thresholds: Thresholds) -> tuple[Recordi
     if error <= thresholds.material * span or signal.quiet_noise**2 >= 2.0 * error**2:
         return recording, []
     logged = _one_value_a_level(signal.values, signal.step)
+    if np.max(np.abs(logged - signal.values)) > ROUNDING * np.max(np.abs(logged)):
+        return recording, []  # what lies between levels was not logged in steps, as of a slow ramp beside quick ones
     load = _through_edges(recording.time_s[there], logged, signal.step)
     gain = _gain(logged, load, recording.sensor.values[there])
     if gain is None:
