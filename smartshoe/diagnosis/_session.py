@@ -109,11 +109,11 @@ def prepare(
     """
     factors = [*factors, *[min(factors)] * (len(recordings) - len(factors))]
     made: dict[int, Session] = {}
-    left_behind: dict[str, dict[str, float]] = {}
+    left_behind: dict[str | None, dict[str, float]] = {}
     order = _by_continuation(recordings)
     for index in order:
         recording = recordings[index]
-        before = left_behind.get(recording.metadata.get("continues", ""), {})
+        before = left_behind.get(_before(recording), {})
         made[index] = _session(recording, index, usable[index], scale, factors[index], before, thresholds)
         left_behind[recording.name] = _left_behind(made[index].conditions, thresholds)
     sessions = _on_one_scale([made[index] for index in range(len(recordings))])

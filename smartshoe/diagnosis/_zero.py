@@ -80,21 +80,25 @@ def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: T
         # A single sample of a slow log shows no rest, however long it lasts: the load may be on its way.
         is_rest = lasts > 1 and abs(_risen(load[first][kept])) < thresholds.still_per_s * lasts_s
         if is_rest and lasts_s >= thresholds.settled_s:
-            moved_by = _drifted(session, model)
-            moved_by += _remembered(session, model, (session.reading - moved_by)[first][kept], first, thresholds)
+            whole = model.simulate(session.conditions)
+            moved_by = whole - borne
+            rest = (session.reading - moved_by)[first][kept]
+            moved_by += _remembered(session, model, session.reading - whole, rest, first, thresholds)
             drifted = float(np.mean(moved_by[first][kept]))
             reading = float(np.mean(session.reading[first][kept])) - drifted
             found.append((float(np.mean(load[first][kept])), reading / model.gain, drifted / model.gain))
     return np.array(found).reshape(-1, 3)
 
 
-def _remembered(session: Session, model: ExtendedModel, rest: Array, first: slice, thresholds: Thresholds) -> Array:
+def _remembered(
+    session: Session, model: ExtendedModel, residual: Array, rest: Array, first: slice, thresholds: Thresholds
+) -> Array:
     """(n,) what the unit is seen to remember from before the recording; nothing where its ``rest`` (k,) denies it.
 
-    All of the recording tells it, by the model's equations. At rest it fades, and by how much the reading does so there
-    one of the two, it or nothing, is the likelier, whatever the noise is.
+    All of the recording tells it, by what the model leaves of it, ``residual`` (n,). At rest it fades, and by how much
+    the reading does so there one of the two, it or nothing, is the likelier, whatever the noise is.
     """
-    past, past_sd = past_of(session, model, session.reading - model.simulate(session.conditions))
+    past, past_sd = past_of(session, model, residual)
     fading = np.exp(-model.pole_per_s * session.conditions.time_s)
     own = past * fading[first][session.fitted[first]]
     own -= own.mean()
