@@ -52,7 +52,7 @@ def names_of(
       that does most ``alone``. Each is half sure at most.
 
     ``is_clocked``: peak loads grow or fall with time, so that effects that go with it imitate each other, and curves:
-    these are half sure at most, and nothing is named beside another. ``is_unsteady``: zeros change at moments, of which
+    these are half sure at most. ``is_unsteady``: zeros change at moments, of which
     some may not be seen and may imitate any effect: all are half sure at most. A flexible block, and a curve that lies
     where its kind ends, is named by the law that comes nearest.
     """
@@ -66,8 +66,7 @@ def names_of(
     odds = thresholds.equivalent_odds
     possible = [one for one in likely if one.kind_probability > odds * (1.0 - one.kind_probability)]
     if sure := [one for one in likely if one.is_sure]:
-        # Not beside a kind that no law follows, nor where one may do what another does.
-        is_firm = not is_clocked and not all(one.kind_only for one in sure)
+        is_firm = not all(one.kind_only for one in sure)  # not beside a kind that no law follows
         departed = thresholds.departure * math.hypot(*(one.member.size for one in sure))
         beside = [one for one in possible if one.member.size > thresholds.tolerable] if is_firm else []
         beside = [one for one in beside if confidence_of(one, thresholds) > 0.5 or one.member.size > departed]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from smartshoe.diagnosis._arms import arms_of, effect_count, with_arm, with_odds
-from smartshoe.diagnosis._evidence import Posterior
+from smartshoe.diagnosis._evidence import Evidence, Posterior
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
 from smartshoe.diagnosis._search import MOST_MEMBERS, RIVALS, additions
 from smartshoe.diagnosis._sensitivity import Linearised
@@ -26,11 +26,13 @@ ROUND_STEPS = 6  # of a fit that is linearised anew anyway
 def settled(state: State, progress: Progress, known: State | None = None) -> State:
     """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
 
-    In the end an effect's arm is tried in the place of the baseline's: it may be the unit's only one. Where a fit comes
-    upon the path of a state that is ``known``, it would go the same way, and that state is the answer.
+    Of all that were fitted the set with most evidence is taken: a linearisation may promise more than its fit keeps,
+    and the last is but where the search came to its end. Then an effect's arm is tried in the place of the baseline's:
+    it may be the unit's only one. Where a fit comes upon the path of a state that is ``known``, it would go the same
+    way, and that state is the answer.
     """
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
-    path = [state.fit.model]
+    path, best = [state.fit.model], state
     # A set about another fit is another one: of a large effect a rival may have been fitted in its place.
     while state.improved >= state.evidence.odds and (here := _names(state)) not in seen and len(path) <= ROUNDS:
         seen.add(here)
@@ -45,12 +47,21 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
             return known
         path.append(found.model)
         state = state_at(found, state.banned, given)
+        best = state if _is_likelier_by_now(state, best) else best
+    if best is not state:  # what was asked for about it has been tried
+        state = replace(best, best=best.evidence.posterior(best.start))
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood()
         found = fit(likelihood, with_arm(state.fit.model.without(name), arm))
         if _is_simpler(found, state):
             state = state_at(found, state.banned)
     return replace(state, path=tuple(path))
+
+
+def _is_likelier_by_now(state: State, other: State) -> bool:
+    """Whether there is more evidence for the fit of ``state``, each about its own fit, under its noise."""
+    before = Evidence(other.given, state.evidence.noise_sd)
+    return state.evidence.posterior(state.start).score <= before.posterior(other.start).score
 
 
 def better_from(begun: State, state: State, progress: Progress) -> State:

@@ -212,6 +212,40 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
     assert banned == [("z",), ("z",)] * simpler
 
 
+@pytest.mark.parametrize("most", ["first", "second", "third"])
+def test_the_fitted_set_with_most_evidence_settles_wherever_the_search_ends(
+    monkeypatch: pytest.MonkeyPatch, most: str
+) -> None:
+    """The search comes back to a set whose fit kept less than its linearisation had promised."""
+    scores = {"first": 3.0, "second": 2.0, "third": 1.0} | {most: 0.0}
+    steps = iter(["second", "third"])
+
+    def known(name: str, noise_sd: float) -> Any:
+        assert noise_sd in (0.1, 0.2, 0.3)
+        return SimpleNamespace(noise_sd=noise_sd, odds=10.0, posterior=lambda of: SimpleNamespace(score=scores[of]))
+
+    def state(name: str) -> Any:
+        noise_sd = {"first": 0.3, "second": 0.2, "third": 0.1}[name]
+        return SimpleNamespace(
+            given=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), chosen=(), start=name,
+            evidence=known(name, noise_sd), banned=(), improved=0.0 if name == "third" else 20.0, likelihood=lambda: 0,
+        )  # fmt: skip
+
+    monkeypatch.setattr(_settling, "Evidence", known)
+    monkeypatch.setattr(_settling, "_promising", lambda one: ["asked"])
+    monkeypatch.setattr(_settling, "with_members", lambda given, asked, model, likelihood: model)
+    monkeypatch.setattr(_settling, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model))
+    monkeypatch.setattr(_settling, "_best_of", lambda fits, one: (fits[0], None))
+    monkeypatch.setattr(_settling, "state_at", lambda found, banned, given: state(next(steps)))
+    monkeypatch.setattr(_settling, "arms_of", lambda model: [])
+    monkeypatch.setattr(_settling, "replace", lambda one, **given: SimpleNamespace(**{**vars(one), **given}))
+    ended: Any = _settling.settled(state("first"), lambda said: None)
+    assert ended.fit.model.names == (most,)
+    assert len(ended.path) == 3
+    if most != "third":  # what is asked for about it is what was fitted, not what the search tried next
+        assert ended.best.score == 0.0
+
+
 # -- laws -------------------------------------------------------------------------------------------------------------
 def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeypatch: pytest.MonkeyPatch) -> None:
     curve = next(one for family in blocks().values() for one in family if one.is_memoryless)

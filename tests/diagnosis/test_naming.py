@@ -255,7 +255,9 @@ def test_where_loads_go_with_the_clock_what_goes_with_it_is_half_sure_at_most() 
     """A leak or a drift may do what the other does, or a curve; a fast effect is none of these."""
     fast, slow, doubted = member("play_hysteresis"), member("zero_drift"), member("linear_leak", departed=7.5)
     assert [one.member for one in names_of([fast, slow], 0.0, STANDARD)] == [fast, slow]
-    assert [one.member for one in names_of([fast, slow], 0.0, STANDARD, is_clocked=True)] == [fast]
+    beside = names_of([fast, slow], 0.0, STANDARD, is_clocked=True)
+    assert [(one.member, one.is_sure) for one in beside] == [(fast, True), (slow, False)]
+    assert beside[1].kind_probability == 0.5
     told = names_of([slow, doubted], 0.0, STANDARD, is_clocked=True)
     assert [(one.member, one.is_sure) for one in told] == [(slow, False), (doubted, False)]
     assert told[0].kind_probability == 0.5
@@ -302,7 +304,6 @@ def test_beside_a_sure_name_one_less_sure_is_named_if_it_is_large_and_cannot_be_
     assert [(one.member, one.is_sure) for one in told] == [(likely, False), (sure, True)]
     assert told[0].kind_probability == probability_of_kind(likely, 0.03, STANDARD) < STANDARD.least_confidence
     assert only(names_of([less, sure], 0.03, STANDARD)).member is sure
-    assert only(names_of([likely, sure], 0.03, STANDARD, is_clocked=True)).member is sure
     # One that moves no more than a good unit's imperfections do may be another's shadow.
     assert only(names_of([likely, sure], 0.03, replace(STANDARD, tolerable=0.051))).member is sure
     assert len(names_of([likely, sure], 0.03, replace(STANDARD, tolerable=0.049))) == 2
