@@ -77,6 +77,22 @@ def test_what_went_in_comes_back(name: str, seed: int) -> None:
     assert np.max(np.abs(inverse.push(out, given_.time_s) - given_.load)) <= tolerance
 
 
+@pytest.mark.parametrize("name", ["contact_area", "wall_hardening", "gas_compression"])
+@given(shares=st.lists(st.floats(0.0, 1.0), min_size=2, max_size=2))
+@settings(max_examples=30)
+def test_loads_half_beyond_full_scale_rise_on_and_come_back(name: str, shares: list[float]) -> None:
+    """A curve that turned there would have no load for the readings above, and a twin that sheds load."""
+    made = effect(name)
+    values = np.array([p.lower + k * (p.upper - p.lower) for p, k in zip(made.parameters, shares, strict=False)])
+    load = np.linspace(0.0, 1.5, 400)
+    given_ = Conditions(STEP_S * np.arange(load.size), load, STEP_S)
+    out = made.apply(load, given_, values)
+    inverse = made.inverse(values, STEP_S)
+    assert inverse is not None
+    assert np.min(np.diff(out)) > 0.0
+    assert np.max(np.abs(inverse.push(out, given_.time_s) - load)) <= 1e-8  # where it hardly rises, rounding counts more
+
+
 @given(seed=seeds)
 @settings(max_examples=10)
 def test_dead_band_gives_back_every_load_that_it_lets_through(seed: int) -> None:
