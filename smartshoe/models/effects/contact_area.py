@@ -18,7 +18,7 @@ class ContactArea(Effect):
     """f exp(b (1 - f^q)/q): f^(1 - b) for q near 0, f (1 + b)/(1 + b f) in the first order for q = 1.
 
     Zero and full scale stay where they are; loads below zero pass unchanged. Beyond full scale the curve goes on along
-    its tangent: the formula turns where f^q = 1/b, for strong bends a fifth above full scale, and no contact sheds load.
+    its tangent: the formula turns down where f^q = 1/b, for strong bends a fifth above full scale.
     """
 
     name, family, stage, place = "contact_area", "static_curve", "contact", "contact"
