@@ -64,7 +64,8 @@ class WallHardening(Effect):
             within = np.clip(signal, -end, end)
             square = within * within
             load: Array = within * (1.0 + square * (cubic + fifth * square)) / whole
-            return load + steepest * (signal - within)
+            load += steepest * (signal - within)
+            return load
 
         body = f"x *= (1.0 + x * x * ({c_number(cubic)} + {c_number(fifth)} * x * x)) / {c_number(whole)};"
         if np.isfinite(end):
