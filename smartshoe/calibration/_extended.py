@@ -10,7 +10,9 @@ from smartshoe.arrays import Array, require_positive
 from smartshoe.calibration._core_inverse import CoreInverse
 from smartshoe.calibration._filter import ForceFilter
 from smartshoe.calibration._noise_limit import MOST, NoiseLimit, noise_gain
+from smartshoe.display import significant
 from smartshoe.errors import UsageError
+from smartshoe.models.effects import Memoryless
 from smartshoe.models.effects.effect import ChainContext, CStep, Inverse
 from smartshoe.models.elements import Arm
 from smartshoe.models.extended import ExtendedModel, Part
@@ -20,6 +22,7 @@ LEAK_CAUTION = (
     "the air that is gone is summed up from the readings, so that an error of their zero grows with time: reset the"
     " filter at rest"
 )
+HOUR_S = 3600.0
 
 
 class ExtendedCompensator(ForceFilter):
@@ -74,6 +77,13 @@ class ExtendedCompensator(ForceFilter):
             self._passed_over[part.name] = _why_not(part)
             return
         self._blocks.append((part.name, inverse))
+        moved = _moved_by_the_clock(inverse, self.started_s)
+        if moved:
+            self._cautions[part.name] = (
+                "it goes on with the clock from the first reading on, however short the recordings were that it was"
+                f" fitted to: an hour later it moves a full-scale force by {significant(100.0 * moved, 2)} %; reset the"
+                " filter where a session begins"
+            )
         if not part.effect.is_latency:
             return
         raised = noise_gain(inverse)
@@ -130,6 +140,17 @@ class ExtendedCompensator(ForceFilter):
         return tuple(
             (name, inverse.c_single(name) if single else inverse.c_step(name)) for name, inverse in self.blocks
         )
+
+
+def _moved_by_the_clock(inverse: Inverse, started_s: float) -> float:
+    """By what share of full scale a full-scale signal comes out otherwise an hour on, of what looks at the time alone.
+
+    What is summed up from the readings besides has no such share: it goes by them.
+    """
+    if not isinstance(inverse, Memoryless):
+        return 0.0
+    first, last = inverse.push(np.ones(2), np.array([started_s, started_s + HOUR_S])).tolist()
+    return float(last - first)
 
 
 def _why_not(part: Part) -> str:

@@ -224,27 +224,35 @@ class Diagnosis(Summarised):
         """``limits``, but for those that say which recordings were ``left_out``."""
         return self.limits[len(self.left_out) :]
 
-    def calibration(self, *, unit: str = "", sample_rate_hz: float = 100.0, created: str = "") -> Calibration:
+    def calibration(self, *, unit: str = "", sample_rate_hz: float | None = None, created: str = "") -> Calibration:
         """The extended model as a calibration, for `compensate`, `export` and a twin.
 
-        With a ``force_model`` that one compensates, and the extended model is the twin.
+        At ``sample_rate_hz``, the first recording's where none is given. With a ``force_model`` that one compensates,
+        and the extended model is the twin.
         Raises `NotIdentifiableError` where the diagnosis was refused, `UsageError` for a rate that is not positive.
         """
         from smartshoe.calibration import extended_calibration
 
-        sample_rate_hz = require_positive(sample_rate_hz, "sample_rate_hz")
         if self.model is None:
             raise NotIdentifiableError(f"there is no model to calibrate by: {self.says}")
+        rate_hz = self._sample_rate_hz if sample_rate_hz is None else require_positive(sample_rate_hz, "sample_rate_hz")
         made = extended_calibration(
             self.force_model or self.model,
             unit=unit,
             parameters=self.parameters,
             covariance=self.covariance,
             load_range_n=(0.0, self.full_scale_load_n),
-            sample_rate_hz=sample_rate_hz,
+            sample_rate_hz=rate_hz,
             created=created,
         )
         return replace(made, twin=self.model) if self.force_model else made
+
+    @property
+    def _sample_rate_hz(self) -> float:
+        from smartshoe.calibration.provenance import RATE_DIGITS
+
+        steps_s = np.diff(self.traces[0].time_s)
+        return float(f"{1.0 / float(np.median(steps_s)):.{RATE_DIGITS}g}")
 
     def plot(self) -> Figure:
         """A figure: by recording, what the baseline and the extended model leave of the reading over time.

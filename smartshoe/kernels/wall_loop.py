@@ -19,18 +19,33 @@ STEPS = 30
 
 
 @njit(cache=True)
+def inflection(cubic, fifth):  # type: ignore[no-untyped-def]
+    """u at which (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth) is steepest, and its slope; infinite and 0: none."""
+    if fifth >= 0.0:
+        return math.inf, 0.0
+    square = -0.3 * cubic / fifth
+    return math.sqrt(square), (1.0 + square * (3.0 * cubic + 5.0 * fifth * square)) / (1.0 + cubic + fifth)
+
+
+@njit(cache=True)
 def hardened(load, cubic, fifth, share, decay, now, before, out):  # type: ignore[no-untyped-def]
-    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi = (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth)."""
+    """out (n,) = u + kappa (u - q) under ``load`` (n,), phi = (u + cubic u^3 + fifth u^5)/(1 + cubic + fifth).
+
+    Beyond its `inflection` phi is its tangent.
+    """
     whole = 1.0 + cubic + fifth
+    end, steepest = inflection(cubic, fifth)
     arm = held = 0.0
     u, q, known, slope = 0.0, 0.0, 0.0, 1.0 / whole
     for k in range(load.size):
         last, f = u, load[k] + held
         u += (f - known) / slope  # moved along with the load
         for _ in range(STEPS):
-            square = u * u
+            within = min(max(u, -end), end)
+            square = within * within
             slope = (1.0 + square * (3.0 * cubic + 5.0 * fifth * square)) / whole + arm
-            step = (f - u * ((1.0 + square * (cubic + fifth * square)) / whole + arm)) / slope
+            beyond = (steepest + arm) * (u - within)
+            step = (f - within * ((1.0 + square * (cubic + fifth * square)) / whole + arm) - beyond) / slope
             u += step
             if abs(step) <= CLOSE:
                 break

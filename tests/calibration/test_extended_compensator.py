@@ -272,6 +272,18 @@ def test_the_bilinear_form_is_the_papers_filter(share: float, rate: float, seed:
     np.testing.assert_allclose(coarse.apply(readings), paper.apply(readings), rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.parametrize("name", ["gain_drift", "zero_drift", "warm_up", "flexible_gain_drift"])
+def test_what_goes_on_with_the_clock_says_how_far_it_goes_within_an_hour(name: str) -> None:
+    model = BASELINE.with_part(effect(name), effect(name).begun())
+    filter_ = ExtendedCompensator(model, 1.0)
+    said = re.search(r"an hour later it moves a full-scale force by (\S+) %", filter_.cautions[name])
+    assert said is not None
+    force_n = filter_.apply(np.full(3601, filter_.reading_per_share))
+    moved = 100.0 * (force_n[-1] - force_n[0]) / model.full_scale_load_n
+    assert float(said[1].replace("−", "-")) == pytest.approx(moved, rel=0.05)
+    assert not ExtendedCompensator(BASELINE.with_part(effect("contact_area"), [0.1, 0.5])).cautions
+
+
 def test_a_leak_says_that_an_error_of_zero_grows() -> None:
     model = BASELINE.with_part(effect("linear_leak"), np.array([0.01]))
     filter_ = ExtendedCompensator(model, 100.0)

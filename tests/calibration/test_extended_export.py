@@ -127,6 +127,16 @@ def test_the_self_test_in_single_precision_knows_another_strength(tmp_path: Path
     assert _self_test(tmp_path / "moved").returncode == 1
 
 
+@needs_compiler
+def test_time_goes_on_before_the_first_reading_of_a_steep_chain(tmp_path: Path) -> None:
+    """The test vector begins with missing readings; the integers' clock stood still for them."""
+    calibration = extended_calibration(chain_of(["dead_band", "flexible_gain_drift"], 1))
+    write_files(export_files(calibration, "c", precision="float"), tmp_path)
+    assert "int64_t" in (tmp_path / "smartshoe_filter.c").read_text()
+    done = _self_test(tmp_path)
+    assert done.returncode == 0, done.stdout
+
+
 def test_sums_over_a_session_carry_what_single_precision_rounds_away() -> None:
     # 0.1 N/s of leak at 1 kHz, an hour long: each increment is below half the spacing of a float at its end.
     step = CStep({"lost": 0.0}, "f->lost += 1e-07 * x;\nx += f->lost;")

@@ -225,12 +225,13 @@ def test_dir_shows_verbs_and_classes_only() -> None:
 def test_a_rate_that_is_none_is_a_wrong_argument(recording: Recording, found: Identification, rate_hz: Any) -> None:
     """Of whichever call, as the command line's exit status 2 has it, and not a fault of any file."""
     diagnosis = smartshoe.diagnose(recording)
-    calls: list[Callable[[], object]] = [
-        lambda: found.compensator(sample_rate_hz=rate_hz),
-        lambda: diagnosis.calibration(sample_rate_hz=rate_hz),
-    ]
+    calls: list[Callable[[], object]] = [lambda: found.compensator(sample_rate_hz=rate_hz)]
     if rate_hz is not None:  # where it is left away, the data's own
-        calls += [lambda: found.discrete(rate_hz), lambda: diagnosis.calibration().compensator(rate_hz)]
+        calls += [
+            lambda: found.discrete(rate_hz),
+            lambda: diagnosis.calibration(sample_rate_hz=rate_hz),
+            lambda: diagnosis.calibration().compensator(rate_hz),
+        ]
     for call in calls:
         with pytest.raises(UsageError, match=r"^sample_rate_hz is .*: give a positive number$"):
             call()

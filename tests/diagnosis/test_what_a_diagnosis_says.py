@@ -101,6 +101,13 @@ def test_a_calibration_is_of_the_load_that_was_seen() -> None:
     assert (made.unit, made.created, made.load_range_n) == ("heel", "2026-01-02", (0.0, 800.0))
 
 
+def test_a_calibration_runs_at_the_rate_of_the_recordings_where_no_other_is_given() -> None:
+    recorded_hz = 1.0 / float(TIME_S[1] - TIME_S[0])
+    assert FOUND.calibration().sample_rate_hz == FOUND.calibration().compensator().sample_rate_hz
+    assert FOUND.calibration().sample_rate_hz == pytest.approx(recorded_hz, rel=1e-8)
+    assert FOUND.calibration(sample_rate_hz=250.0).sample_rate_hz == 250.0
+
+
 def test_a_figure_shows_what_both_models_leave_where_the_reading_counts() -> None:
     pytest.importorskip("matplotlib")
     from matplotlib import pyplot

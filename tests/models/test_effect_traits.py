@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -10,7 +11,7 @@ from importlib.metadata import EntryPoint
 from itertools import combinations
 from pathlib import Path
 from types import ModuleType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ catalogue_module = import_module("smartshoe.models.effects.catalogue")  # the pa
 BASELINE = ExtendedModel(0.9, 0.15, 0.3, 800.0, 180.0, "mbar")
 EVERY = (*catalogue().values(), *(one for family in blocks().values() for one in family))
 ROOT = Path(__file__).resolve().parents[2] / "smartshoe"
+GUIDE = ROOT.parent / "docs" / "extending.md"
 
 
 def typical(one: Effect) -> Array:
@@ -311,3 +313,19 @@ def test_an_entry_point_to_nowhere_is_refused(installed: ModuleType, monkeypatch
     monkeypatch.setattr(catalogue_module, "entry_points", lambda group: (gone,))
     with pytest.raises(UsageError, match="'gone' cannot be loaded"):
         catalogue()
+
+
+def test_every_curve_says_that_it_is_one() -> None:
+    """Else it is not weighed against the others; the guide's own effect, which others begin from, is among them."""
+    found: dict[str, Any] = {}
+    exec(re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)[0], found)
+    curves = {one.family for one in catalogue().values() if one.is_memoryless}
+    shuffled = np.random.default_rng(1).permutation(200)
+    for one in (*catalogue().values(), found["CreasedTube"]()):
+        if one.family not in curves or not one.is_physical:
+            continue
+        load, values = np.linspace(0.0, 1.0, 200), one.begun()
+        reading, other = (
+            one.apply(of, Conditions(0.01 * np.arange(200), of, 0.01), values) for of in (load, load[shuffled])
+        )
+        assert one.is_memoryless == np.allclose(reading[shuffled], other, rtol=0.0, atol=1e-9), one.name

@@ -77,6 +77,25 @@ def test_what_went_in_comes_back(name: str, seed: int) -> None:
     assert np.max(np.abs(inverse.push(out, given_.time_s) - given_.load)) <= tolerance
 
 
+@pytest.mark.parametrize("name", ["contact_area", "wall_hardening", "gas_compression"])
+@given(shares=st.lists(st.floats(0.0, 1.0), min_size=2, max_size=2))
+@settings(max_examples=30)
+def test_loads_beyond_full_scale_rise_on_and_come_back(name: str, shares: list[float]) -> None:
+    """A curve that turned there would have no load for the readings above, and a twin that sheds load."""
+    made = effect(name)
+    values = np.array([p.lower + k * (p.upper - p.lower) for p, k in zip(made.parameters, shares, strict=False)])
+    load = np.linspace(0.0, 5.0, 1000)
+    given_ = Conditions(STEP_S * np.arange(load.size), load, STEP_S)
+    out = made.apply(load, given_, values)
+    inverse = made.inverse(values, STEP_S)
+    assert inverse is not None
+    assert np.min(np.diff(out)) > 0.0
+    if made.bends_beside_arm:  # beside an arm that relaxes as well
+        assert np.min(np.diff(made.apply(load, given_.within(0.1, 0.3), values))) > 0.0
+    back = inverse.push(out, given_.time_s)
+    assert np.max(np.abs(back - load)) <= 1e-8  # where it hardly rises, rounding counts more
+
+
 @given(seed=seeds)
 @settings(max_examples=10)
 def test_dead_band_gives_back_every_load_that_it_lets_through(seed: int) -> None:
@@ -196,8 +215,11 @@ def test_the_linear_network_is_inverted_as_a_whole() -> None:
 def test_c_agrees_with_push() -> None:
     cases = {name: drawn(effect(name), 11) for name in INVERTED}
     cases["rate_gain"] = np.array([-0.5, 2.0])  # the fastest ramps meet its bound
+    cases["wall_hardening"] = np.array([0.1, -0.3])  # a fifth power that would turn it down
     given_ = loading(7)
     outs = {name: effect(name).apply(given_.load, given_, values) for name, values in cases.items()}
+    for name in ("contact_area", "wall_hardening"):
+        outs[name] = 2.5 * outs[name] - 0.5  # also beyond full scale
     source = ["#include <math.h>"]
     for name, values in cases.items():
         inverse = effect(name).inverse(values, STEP_S)

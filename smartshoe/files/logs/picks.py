@@ -11,6 +11,8 @@ from smartshoe.errors import InputError, MissingChannelError, UnitError
 from smartshoe.files.logs._sheet import Column, Sheet
 from smartshoe.units import Unit, declared, find_unit
 
+# Of each option, for a person whose unit is not known.
+_USUAL = {"--time": "s, ms, us or min", "--force": "N, kN, kgf (kg), gf (of grams) or lbf"}
 _CHOICE = re.compile(r"(?P<base>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*", re.DOTALL)
 
 
@@ -65,12 +67,7 @@ def pick(sheet: Sheet, choice: str, option: str) -> Pick:
     base, said = choice.strip(), None
     found = _titled(columns, base)
     if not found and bracket:
-        base, said = bracket["base"].strip(), find_unit(bracket["unit"])
-        if said is None:
-            raise UnitError(
-                f"{sheet.path}: unit {bracket['unit']!r} in {option} {choice!r} is not known: use one such as s, N,"
-                " kN, mbar, bar, V, counts, ohm or mm"
-            )
+        base, said = bracket["base"].strip(), _said_unit(sheet, bracket["unit"], choice, option)
         found = _titled(columns, base)
         if len(found) > 1:
             found = [i for i in found if unit_in_file(columns[i]) == said] or found
@@ -86,6 +83,19 @@ def pick(sheet: Sheet, choice: str, option: str) -> Pick:
             f" or by number from 1 to {len(columns)}"
         )
     return _united(sheet, found[0], said, option)
+
+
+def _said_unit(sheet: Sheet, text: str, choice: str, option: str) -> Unit:
+    """The unit that a user's brackets say; of a sensor any, as in a header: its gain is identified, not assumed."""
+    found = find_unit(text)
+    if found is None and option == "--sensor" and text.strip():
+        found = declared(text.strip())
+    if found is None:
+        raise UnitError(
+            f"{sheet.path}: unit {text!r} in {option} {choice!r} is not known: use one such as"
+            f" {_USUAL.get(option, 'mbar, V, counts, ohm or mm')}"
+        )
+    return found
 
 
 def _united(sheet: Sheet, index: int, said: Unit | None, option: str) -> Pick:

@@ -17,7 +17,8 @@ NEWTON_STEPS = 12
 class ContactArea(Effect):
     """f exp(b (1 - f^q)/q): f^(1 - b) for q near 0, f (1 + b)/(1 + b f) in the first order for q = 1.
 
-    Zero and full scale stay where they are; loads below zero pass unchanged.
+    Zero and full scale stay where they are; loads below zero pass unchanged. Beyond full scale the curve goes on along
+    its tangent: the formula turns down where f^q = 1/b, for strong bends a fifth above full scale.
     """
 
     name, family, stage, place = "contact_area", "static_curve", "contact", "contact"
@@ -43,8 +44,9 @@ class ContactArea(Effect):
         if values[0] == 0.0:
             return signal.copy()
         b, q = self._bend(values)
-        size = np.maximum(signal, 1e-300)
-        return np.where(signal > 0.0, size * np.exp((b / q) * (1.0 - np.exp(q * np.log(size)))), signal)
+        size = np.clip(signal, 1e-300, 1.0)
+        bent = size * np.exp((b / q) * (1.0 - np.exp(q * np.log(size)))) + (1.0 - b) * np.maximum(signal - 1.0, 0.0)
+        return np.where(signal > 0.0, bent, signal)
 
     @staticmethod
     def _bend(values: Array) -> tuple[float, float]:
@@ -52,18 +54,20 @@ class ContactArea(Effect):
         return math.log1p(2.0 * bow) * q / (1.0 - 0.5**q), q
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
-        """Newton in ln f."""
+        """Newton in ln f, and the tangent beyond full scale."""
         b, q = self._bend(values)
 
         def undo(signal: Array, time_s: Array) -> Array:
-            target = np.log(np.maximum(signal, 1e-300))
+            target = np.log(np.clip(signal, 1e-300, 1.0))
             v = target.copy()
             for _ in range(NEWTON_STEPS):
                 bent = b * np.exp(q * v)
                 v -= (v + (b - bent) / q - target) / (1.0 - bent)
-            return np.where(signal > 0.0, np.exp(v), signal)
+            return np.where(signal > 0.0, np.exp(v) + np.maximum(signal - 1.0, 0.0) / (1.0 - b), signal)
 
-        body = f"""if (x > 0.0) {{
+        body = f"""if (x > 1.0) {{
+    x = 1.0 + (x - 1.0) / {c_number(1.0 - b)};
+}} else if (x > 0.0) {{
     const double target = log(x);
     double v = target;
     int k;

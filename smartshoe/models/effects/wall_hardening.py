@@ -16,6 +16,7 @@ class WallHardening(Effect):
     """(1 + h) f = u + h [(1 - s) u^3 + s u^5]: k1 grows with strain, the gas takes less and less of the load.
 
     An odd curve, from k1 (1 + beta u^2) to beyond the sinh of long chains; zero and full scale stay where they are.
+    Where s < 0 the fifth power would turn it down: beyond its inflection, above full scale, it goes on as its tangent.
     """
 
     name, family, stage, place = "wall_hardening", "static_curve", "wall", "wall"
@@ -53,15 +54,28 @@ class WallHardening(Effect):
 
     def inverse(self, values: Array, step_s: float) -> Inverse:
         """f (static) from u, in closed form."""
+        from smartshoe.kernels.wall_loop import inflection
+
         cubic, fifth = _coefficients(values)
         whole = 1.0 + cubic + fifth
+        end, steepest = inflection(cubic, fifth)
 
         def undo(signal: Array, time_s: Array) -> Array:
-            square = signal * signal
-            load: Array = signal * (1.0 + square * (cubic + fifth * square)) / whole
+            within = np.clip(signal, -end, end)
+            square = within * within
+            load: Array = within * (1.0 + square * (cubic + fifth * square)) / whole
+            load += steepest * (signal - within)
             return load
 
         body = f"x *= (1.0 + x * x * ({c_number(cubic)} + {c_number(fifth)} * x * x)) / {c_number(whole)};"
+        if np.isfinite(end):
+            most = c_number(end)
+            body = f"""{{
+    const double beyond = x > {most} ? x - {most} : (x < -{most} ? x + {most} : 0.0);
+    x -= beyond;
+    {body}
+    x += {c_number(steepest)} * beyond;
+}}"""
         return Memoryless(undo, body)
 
 

@@ -60,6 +60,14 @@ def test_a_sensor_of_any_unit_by_name_or_number(choice: str) -> None:
     assert found["Other"].role == "auxiliary"
 
 
+def test_a_sensors_unit_may_be_any_as_in_a_header_and_a_loads_is_one_that_is_known() -> None:
+    log = sheet("t|s", "load|", "grating|")
+    found = recording_from(log, force="load[gf]", sensors=["grating[pm]"])
+    assert found.sensor.unit.symbol == "pm"
+    with pytest.raises(UnitError, match=r"'gram' in --force .* use one such as N, .*gf \(of grams\)"):
+        recording_from(log, force="load[gram]", sensors=["grating[pm]"])
+
+
 def test_a_header_name_wins_over_a_number() -> None:
     found = recording_from(sheet("time|s", "3|V", "Pin|V"), sensors=["3"])
     assert found.sensor.name == "3"

@@ -14,7 +14,7 @@ import smartshoe
 from smartshoe.errors import FormatError, InputError, MissingChannelError, UnitError, UsageError
 from smartshoe.files.logs.accepted import recording_of
 from smartshoe.recording import Channel, Recording
-from smartshoe.units import unit
+from smartshoe.units import declared, unit
 
 finite = st.floats(-1e30, 1e30)  # beyond it a number is no measurement and is refused
 texts = st.text(st.characters(codec="utf-8", exclude_categories=("Cs", "Cc")), max_size=12)  # a terminal obeys Cc
@@ -35,12 +35,15 @@ def recordings(draw: st.DrawFn) -> Recording:
         values = np.array(draw(st.lists(finite, min_size=count, max_size=count)))
         missing = np.array(draw(st.lists(st.booleans(), min_size=count, max_size=count)))
         missing[draw(st.integers(0, count - 1))] = False
-        symbol = draw(st.sampled_from(["N", "kN", "mbar", "V", "mm", "°C", "counts"]))
+        in_unit = draw(
+            st.sampled_from(["N", "kN", "mbar", "V", "mm", "°C", "counts"]).map(unit)
+            | st.sampled_from(["fF", "Lux", "lux / s", "a_n"]).map(declared)  # as a header or `--sensor 'C[fF]'` has it
+        )
         role = draw(st.sampled_from(["load", "sensor", "command", "auxiliary"]))
         if role == "load" and any(channel.role == "load" for channel in channels.values()):
             role = "auxiliary"
         if name != "time":
-            channels[name] = Channel.from_values(name, np.where(missing, np.nan, values), unit(symbol), role)
+            channels[name] = Channel.from_values(name, np.where(missing, np.nan, values), in_unit, role)
     return Recording(
         time_s,
         channels,

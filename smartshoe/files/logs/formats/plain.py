@@ -20,7 +20,8 @@ from smartshoe.files.logs._numbers import is_missing, numbers_of
 from smartshoe.files.logs._sheet import Column, Format, Sheet
 from smartshoe.files.logs._text import head_lines, is_text, plain_title, read_lines
 from smartshoe.files.logs.columns import roles_of
-from smartshoe.recording import Recording, Role, column_name, split_column
+from smartshoe.recording import Channel, Recording, Role, column_name, split_column
+from smartshoe.units import declared, find_unit
 
 _KEY_VALUE = re.compile(r'#\s*("(?:[^"\\]|\\.)*"|[^:]*?)\s*:\s*(.*?)\s*')
 _ROLES: dict[str, Role] = {"load": "load", "sensor": "sensor", "command": "command", "auxiliary": "auxiliary"}
@@ -187,14 +188,20 @@ def read(path: Path) -> Sheet:
     for column, role in roles.items():
         if role not in _ROLES or column not in header:
             raise FormatError(f"{path}: remark 'role {column}: {role}' names no column or role: correct it")
+    units = {cell: said[f"unit {cell}"][0] for cell in header if f"unit {cell}" in said}
     metadata = {
         key: "\n".join(texts)
         for key, texts in said.items()
-        if key not in ("name", "unit", "note") and not key.startswith("role ")
+        if key not in ("name", "unit", "note")
+        and not key.startswith("role ")
+        and key.removeprefix("unit ") not in units
     }
     columns = []
     for index, cell in enumerate(header):
         name, unit = plain_title(cell)
+        if cell in units:
+            unit = units[cell]
+            name = cell.removesuffix(f"_{(find_unit(unit) or declared(unit)).suffix}")
         role_of_column = _ROLES[roles[cell]] if cell in roles else None
         columns.append(Column(name, unit, values[:, index], role_of_column, label=cell))
     return Sheet(
@@ -210,6 +217,11 @@ def read(path: Path) -> Sheet:
     )
 
 
+def _is_foreign(channel: Channel) -> bool:
+    """Whether its column's ending does not say its unit, as of one that the table of units does not know."""
+    return bool(channel.unit.symbol) and split_column(column_name(channel))[1] != channel.unit
+
+
 def write(recording: Recording, path: Path) -> None:
     """Write ``recording`` with every number in its shortest exact form and missing samples as empty cells."""
     import pandas as pd
@@ -219,8 +231,9 @@ def write(recording: Recording, path: Path) -> None:
         lines.append(("unit", recording.unit))
     lines += [(key, value) for key, value in recording.metadata.items() if key not in ("name", "unit")]
     channels = list(recording.channels.values())
-    # The reader tells roles from the names as they will stand in the header.
-    split = [split_column(column_name(channel)) for channel in channels]
+    # The reader tells roles and units from the names as they will stand in the header.
+    split = [(c.name, c.unit) if _is_foreign(c) else split_column(column_name(c)) for c in channels]
+    lines += [(f"unit {column_name(channel)}", channel.unit.symbol) for channel in channels if _is_foreign(channel)]
     roles = roles_of([name for name, _ in split], [unit for _, unit in split])
     lines += [
         (f"role {column_name(channel)}", channel.role)
