@@ -52,9 +52,9 @@ def names_of(
       that does most ``alone``. Each is half sure at most.
 
     ``is_clocked``: peak loads grow or fall with time, so that effects that go with it imitate each other, and curves:
-    these are half sure at most. ``is_unsteady``: zeros change at moments, of which
-    some may not be seen and may imitate any effect: all are half sure at most. A flexible block, and a curve that lies
-    where its kind ends, is named by the law that comes nearest.
+    these are half sure at most. ``is_unsteady``: zeros change at moments, of which some may not be seen and may imitate
+    any effect: all are half sure at most. A flexible block, and a curve that lies where its kind ends, is named by the
+    law that comes nearest.
     """
     likely = [_named(one, left, thresholds) for one in members if one.size >= thresholds.material]
     likely = [_with_untold(name, thresholds) for name in likely]
