@@ -11,6 +11,7 @@ import numpy as np
 
 from smartshoe.arrays import Array, require_positive
 from smartshoe.diagnosis._baseline import USUAL
+from smartshoe.diagnosis._experiments import run_on
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._scale import Scale, thinning
 from smartshoe.diagnosis._sensitivity import Linearised, linearised
@@ -18,10 +19,8 @@ from smartshoe.diagnosis._session import prepare
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
-from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
 USUAL_NOISE_PERCENT = 0.1  # of full scale, where no unit states its own
@@ -117,7 +116,7 @@ def design(
         raise UsageError(
             f"no load is put on in {', '.join(one.name for one in protocols)}: give a protocol that presses"
         )
-    recordings = [_commanded(protocol, unit, peak_n, sample_rate_hz) for protocol in protocols]
+    recordings = [run_on(unit, protocol, peak_n, 1.0 / sample_rate_hz) for protocol in protocols]
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     usable = [np.ones(len(one), dtype=bool) for one in recordings]
     factors = thinning(recordings, scale, limits)
@@ -126,13 +125,6 @@ def design(
     # The mean of neighbours that thinning takes has less noise than a sample.
     sd = 0.01 * noise_percent / math.sqrt(min(factors))
     return _compared(columns, sd, 0.01 * strength_percent, limits)
-
-
-def _commanded(protocol: Protocol, unit: ExtendedModel, peak_n: float, sample_rate_hz: float) -> Recording:
-    time_s = np.arange(0.0, protocol.duration_s, 1.0 / sample_rate_hz)
-    load_n = protocol.load_at(time_s)
-    reading = unit.reading(Conditions(time_s, load_n / peak_n, 1.0 / sample_rate_hz))
-    return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name=protocol.name)
 
 
 def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:
