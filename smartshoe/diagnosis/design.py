@@ -14,7 +14,7 @@ from smartshoe.diagnosis._baseline import USUAL
 from smartshoe.diagnosis._experiments import run_on
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._scale import Scale, thinning
-from smartshoe.diagnosis._sensitivity import Linearised, linearised
+from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
 from smartshoe.diagnosis._session import prepare
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
@@ -136,25 +136,39 @@ def _compared(columns: Linearised, sd: float, strength: float, limits: Threshold
     count = sum(int(session.fitted.sum()) for session in columns.sessions)
     shown = 2.0 * math.log(len(names) / limits.false_name)  # the prior odds against an effect
     least, unlike = np.full(len(names), np.inf), np.ones((len(names), len(names)))
-    of = {name: [[c - 1 for c in one.columns] for one in laws if one.name == name] for name in names}
+    firsts = np.array([one.columns[0] - 1 for one in laws])
+    powers = np.diag(left)[firsts]
+    seen = powers > 1e-9 * np.diag(gram)[firsts]
+    missed = np.array([_not_followed(left, rival, laws, powers) for rival in laws])
+    of = {name: np.array([one.name == name for one in laws]) for name in names}
     for i, name in enumerate(names):
-        at = max(of[name], key=lambda shape: left[shape[0], shape[0]])
-        x = left[at[0], at[0]]
-        if x <= 1e-9 * gram[at[0], at[0]]:
+        shapes = of[name] & seen
+        if not shapes.any():
             unlike[i] = 0.0
             continue
         # Of what the baseline does not follow it must also be material.
+        x = float(powers[shapes].max())
         least[i] = max(math.sqrt(shown / x), limits.material / (sd * math.sqrt(x / count)))
         for j, other in enumerate(names):
-            if j == i:
-                unlike[i, j] = 0.0
-                continue
-            unlike[i, j] = min(_not_followed(left, at[0], shape, x) for shape in of[other])
+            unlike[i, j] = missed[np.ix_(of[other], shapes)].min() if j != i else 0.0
     return Design(names, least, unlike, strength, count * (strength / sd) ** 2, limits)
 
 
-def _not_followed(left: Array, target: int, shape: Sequence[int], power: float) -> float:
-    """Share of a column's square that the columns ``shape`` leave."""
-    inner = left[np.ix_(shape, shape)]
-    found = np.linalg.pinv(inner, rcond=1e-9, hermitian=True) @ left[shape, target]
-    return float(np.clip(1.0 - found @ left[shape, target] / power, 0.0, 1.0))
+def _not_followed(left: Array, rival: Candidate, targets: Sequence[Candidate], powers: Array) -> Array:
+    """(m,) the share of the square of each target's first column that a rival leaves, with a sign that physics allows.
+
+    Of several strengths a fit minds the bounds, and no sign is asked for here. ``powers`` (m,): the squares.
+    """
+    at, firsts = [column - 1 for column in rival.columns], [one.columns[0] - 1 for one in targets]
+    across = left[np.ix_(at, firsts)]
+    found = np.linalg.pinv(left[np.ix_(at, at)], rcond=1e-9, hermitian=True) @ across
+    shares = np.clip(1.0 - np.sum(found * across, axis=0) / np.maximum(powers, 1e-300), 0.0, 1.0)
+    if len(at) == 1:
+        shares[[not _may_follow(rival, one, found[:, k]) for k, one in enumerate(targets)]] = 1.0
+    return np.asarray(shares)
+
+
+def _may_follow(rival: Candidate, target: Candidate, strength: Array) -> bool:
+    """Whether physics allows a rival's ``strength`` (1,) beside a target's first of one, or both turned over."""
+    first = np.eye(1, len(target.columns))[0]
+    return any(target.has_sign_of(sign * first) and rival.has_sign_of(sign * strength) for sign in (1.0, -1.0))

@@ -25,13 +25,27 @@ def triangles() -> Design:
     return design([dynamic_protocol((100, 200, 400, 800))])
 
 
-def test_no_waveform_tells_the_static_curves_apart(triangles: Design) -> None:
-    for name in CURVES:
-        assert set(triangles.cannot_be_told(name)) >= CURVES - {name}
+def test_no_waveform_tells_curves_apart_that_bend_the_same_way(triangles: Design) -> None:
+    """The sensor's bends either way; gas makes a unit stiffer with load, contact and wall softer and stiffer alike."""
+    assert set(triangles.cannot_be_told("sensor_nonlinearity")) >= CURVES - {"sensor_nonlinearity"}
+    for name in CURVES - {"sensor_nonlinearity"}:
+        assert "sensor_nonlinearity" in triangles.cannot_be_told(name)
+    assert "wall_hardening" in triangles.cannot_be_told("contact_area")
+    assert "contact_area" in triangles.cannot_be_told("wall_hardening")
+
+
+def test_what_bends_the_other_way_is_told(triangles: Design) -> None:
+    """Physics allows a gas that is compressed no other sign, nor a wall that hardens."""
+    assert not {"contact_area", "wall_hardening"} & {*triangles.cannot_be_told("gas_compression")}
+    place = triangles.names.index("gas_compression"), triangles.names.index("wall_hardening")
+    assert triangles.unlike[place] > 0.9
 
 
 def test_triangles_alone_leave_a_leak_a_set_and_a_drift_open_and_holds_tell_a_creep(triangles: Design) -> None:
-    assert {"permanent_set", "zero_drift"} <= set(triangles.cannot_be_told("linear_leak"))
+    """A drift goes either way, a leak takes the reading down, a set leaves it up."""
+    assert {"orifice_leak", "zero_drift"} <= set(triangles.cannot_be_told("linear_leak"))
+    assert "zero_drift" in triangles.cannot_be_told("permanent_set")
+    assert "permanent_set" not in triangles.cannot_be_told("linear_leak")
     both = design([dynamic_protocol((100, 200, 400, 800)), static_protocol()])
     assert len(both.cannot_be_told("clock_drift")) < len(triangles.cannot_be_told("clock_drift"))
 

@@ -34,11 +34,19 @@ MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
 
 
 # -- designs ----------------------------------------------------------------------------------------------------------
+SIGNED = {"grows", "grows_too"}  # effects of one sign
+
+
 def _columns(matrix: Array, candidates: list[tuple[str, tuple[int, ...], bool]], own: int = 2) -> Any:
     """A linearisation of one session with a target and such columns."""
     wide = np.column_stack([np.zeros(matrix.shape[0]), matrix])
     made = [
-        SimpleNamespace(name=name, columns=columns, effect=SimpleNamespace(is_flexible=flexible))
+        SimpleNamespace(
+            name=name,
+            columns=columns,
+            effect=SimpleNamespace(is_flexible=flexible),
+            has_sign_of=lambda strengths, name=name: name not in SIGNED or strengths[0] >= 0.0,
+        )
         for name, columns, flexible in candidates
     ]
     session = SimpleNamespace(fitted=np.ones(matrix.shape[0], dtype=bool))
@@ -69,8 +77,10 @@ def test_what_shows_and_what_is_alike_is_of_what_the_baseline_does_not_follow() 
         material = STANDARD.material / (0.01 * math.sqrt(power / 60))
         assert found.least[i] == pytest.approx(max(math.sqrt(shown / power), material))
     assert math.isinf(found.least[2])
-    followed = _left(left[best], np.column_stack([left[4], left[6]]))
-    assert found.unlike[0, 1] == pytest.approx(float(followed @ followed) / float(left[best] @ left[best]))
+    # None knows which shape it has: the one that is followed best.
+    followed = {k: _left(left[k], np.column_stack([left[4], left[6]])) for k in (2, 3)}
+    expected = min(float(rest @ rest) / float(left[k] @ left[k]) for k, rest in followed.items())
+    assert found.unlike[0, 1] == pytest.approx(expected)
     shares = []
     for k in (2, 3):
         rest = _left(left[4], left[k][:, None])
@@ -87,10 +97,29 @@ def test_what_shows_and_what_is_alike_is_of_what_the_baseline_does_not_follow() 
 
 def test_what_columns_leave_of_a_square_is_a_share() -> None:
     left = np.array([[4.0, 2.0, 0.0], [2.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
-    assert _not_followed(left, 0, [1], 4.0) == pytest.approx(0.5)
-    assert _not_followed(left, 0, [2], 4.0) == pytest.approx(1.0)
-    assert _not_followed(left, 0, [0, 2], 4.0) == pytest.approx(0.0, abs=1e-12)
-    assert _not_followed(left, 0, [1], 1.0) == 0.0
+
+    def missed(*columns: int, power: float = 4.0) -> float:
+        rival: Any = SimpleNamespace(columns=columns, has_sign_of=lambda strengths: True)
+        target: Any = SimpleNamespace(columns=(1,), has_sign_of=lambda strengths: True)
+        return float(_not_followed(left, rival, [target], np.array([power]))[0])
+
+    assert missed(2) == pytest.approx(0.5)
+    assert missed(3) == pytest.approx(1.0)
+    assert missed(1, 3) == pytest.approx(0.0, abs=1e-12)
+    assert missed(2, power=1.0) == 0.0
+
+
+def test_an_effect_is_followed_with_the_sign_that_physics_allows_only() -> None:
+    rng = np.random.default_rng(3)
+    x = rng.standard_normal((80, 3))
+    x[:, 2] = -x[:, 1] + 0.01 * x[:, 2]
+    x[:, 1:] = np.column_stack([_left(x[:, k], x[:, :1]) for k in (1, 2)])
+    for one, other, is_told in (
+        ("grows", "grows_too", True), ("grows", "either", False), ("either", "grows", False), ("either", "any", False),
+    ):  # fmt: skip
+        found = _compared(_columns(x, [(one, (2,), False), (other, (3,), False)], own=1), 0.01, 0.003, STANDARD)
+        for share in (found.unlike[0, 1], found.unlike[1, 0]):
+            assert share == 1.0 if is_told else share < 0.01
 
 
 def _design(evidence: float = 100.0) -> Design:
