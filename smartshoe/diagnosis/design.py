@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from smartshoe.arrays import Array, require_positive
 from smartshoe.diagnosis._baseline import USUAL
+from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._experiments import run_on
+from smartshoe.diagnosis._inference import can_validate
+from smartshoe.diagnosis._limits import ONE_CYCLE
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._scale import Scale, thinning
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
@@ -23,7 +26,7 @@ from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 from smartshoe.units import MILLIBAR
 
-USUAL_NOISE_PERCENT = 0.1  # of full scale, where no unit states its own
+USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # of full scale; of a log: where no unit states its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +36,8 @@ class Design:
     ``least`` (n,): size from which on each of the effects ``names`` shows, rms share of full scale of all it does to
     the reading, infinite where the baseline follows it whole. ``unlike`` (n, n): the share of an effect's evidence that
     another one in its place cannot follow. ``evidence``: -2 log of an effect that leaves ``strength`` (rms share of
-    full scale) beyond what the baseline follows, for which `cannot_be_told` answers.
+    full scale) beyond what the baseline follows, for which `cannot_be_told` answers. ``limits``: what a diagnosis of
+    such recordings would say that they lack, whatever is in them.
     """
 
     names: tuple[str, ...]
@@ -42,6 +46,7 @@ class Design:
     strength: float
     evidence: float
     thresholds: Thresholds
+    limits: tuple[str, ...] = ()
 
     def cannot_be_told(self, name: str) -> tuple[str, ...]:
         """The effects that this protocol would not tell from ``name``, most alike first.
@@ -72,6 +77,7 @@ class Design:
                 for j, b in enumerate(self.names)
                 if i != j
             ],
+            "limits": list(self.limits),
         }
 
 
@@ -81,7 +87,7 @@ def design(
     *,
     noise_percent: float = USUAL_NOISE_PERCENT,
     strength_percent: float = 0.3,
-    sample_rate_hz: float = 100.0,
+    sample_rate_hz: float = USUAL_RATE_HZ,
     unit: ExtendedModel = USUAL,
     thresholds: Thresholds | None = None,
 ) -> Design:
@@ -124,7 +130,10 @@ def design(
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.
     sd = 0.01 * noise_percent / math.sqrt(min(factors))
-    return _compared(columns, sd, 0.01 * strength_percent, limits)
+    # Of one load cycle no cause is named, whatever its columns tell.
+    lacking = [] if can_validate(sessions, limits) else [ONE_CYCLE]
+    lacking += replace(excitation_of(sessions, limits), is_judged=True).limits()
+    return replace(_compared(columns, sd, 0.01 * strength_percent, limits), limits=tuple(lacking))
 
 
 def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:

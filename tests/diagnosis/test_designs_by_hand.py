@@ -157,14 +157,14 @@ def test_a_design_is_of_commanded_loads_at_the_logs_rate_and_noise(monkeypatch: 
         seen["given"] = unit, sessions, limits
         return "columns"
 
-    def compared(columns: Any, sd: float, strength: float, limits: Any) -> str:
+    def compared(columns: Any, sd: float, strength: float, limits: Any) -> Design:
         seen["compared"] = columns, sd, strength, limits
-        return "found"
+        return _design(7.0)
 
     monkeypatch.setattr(design_module, "linearised", columns)
     monkeypatch.setattr(design_module, "_compared", compared)
     answer: Any = design(protocols, noise_percent=0.2, strength_percent=0.5, sample_rate_hz=200.0, unit=MODEL)
-    assert answer == "found"
+    assert answer.evidence == 7.0
     unit, sessions, limits = seen["given"]
     assert (unit, limits) == (MODEL, STANDARD)
     assert [one.fitted.all() for one in sessions] == [True, True]
