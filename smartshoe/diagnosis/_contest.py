@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,16 +39,21 @@ class Contest:
         fall = self.without.cost - self.cause.cost
         return -math.log(max(float(odds_of_law(self.margin, fall, self.cause.likelihood.thresholds)), 1e-300))
 
+    def settled(self) -> Contest:
+        """The same, the rival fitted on, as `after` does: so far only as a comparison of many asks for."""
+        return replace(self, rival=fit(self.cause.likelihood, self.rival.model, FEW_STEPS))
+
     def after(self, protocol: Protocol, sample_time_s: float) -> Contest:
         """The same were the protocol run once, logged every ``sample_time_s``, and the cause as it was fitted true.
 
-        The others are fitted anew to this data and that, the new recording's own offset and past free.
+        The rival is fitted on to this data and that, the new recording's own offset and past free; what is without
+        either begins from the cause, as in a diagnosis.
         """
-        known = self.cause.likelihood
-        session = _run_once(self.cause.model, protocol, sample_time_s, known.thresholds)
-        both = Likelihood((*known.sessions, session), known.noise_sd, self.cause.model, known.thresholds)
-        others = (fit(both, one.model, FEW_STEPS) for one in (self.rival, self.without))
-        return Contest(weighed(both, self.cause.model), *others)
+        known, model = self.cause.likelihood, self.cause.model
+        session = _run_once(model, protocol, sample_time_s, known.thresholds)
+        both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
+        less = replace(model, parts=tuple(one for one in model.parts if one.name in self.without.model.names))
+        return Contest(weighed(both, model), fit(both, self.rival.model, FEW_STEPS), fit(both, less, FEW_STEPS))
 
 
 def _run_once(model: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:

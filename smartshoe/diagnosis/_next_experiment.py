@@ -89,11 +89,14 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     made = [make(peak_n) for make in EXPERIMENTS.values()]
     held = now.cause.likelihood.sessions
     left = [one for one in made if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
+    no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
     foretold: list[tuple[Protocol, Contest]] = []
     for protocol in sorted(left, key=lambda one: one.duration_s):
-        foretold.append((protocol, now.after(protocol, least_s)))
-        if _rules_out(foretold[-1][1], thresholds):
-            break
+        then = now.after(protocol, least_s)
+        if then.margin - now.margin > no_name:
+            foretold.append((protocol, then))
+            if _rules_out(then, thresholds):
+                break
     names, both = (cause.name, *cause.equivalents), listed((cause.name, rival), "and")
     chosen, word = _most_telling(now, foretold, thresholds), _channel(cause.name, rival, sessions)
     channel = None if word is None else in_words(word)
@@ -122,15 +125,13 @@ def _most_telling(
 ) -> tuple[Protocol, Contest] | None:
     """Of what is ``foretold``, shortest first, the last, if it ends the doubt; else what tells clearly more than now.
 
-    Of several that tell about as much as the best the shortest. What tells less than a false name's odds is noise.
+    Of several that tell about as much as the best the shortest.
     """
-    no_name = -2.0 * math.log(thresholds.false_name)
     if foretold and _rules_out(foretold[-1][1], thresholds):
         return foretold[-1]
     most = max((then.log_odds for _, then in foretold), default=0.0)
     least = max(thresholds.clear * now.log_odds, most / thresholds.clear)
-    telling = (one for one in foretold if one[1].log_odds > least and one[1].margin - now.margin > no_name)
-    return next(telling, None)
+    return next((one for one in foretold if one[1].log_odds > least), None)
 
 
 def _is_of(protocol: Protocol, session: Session, peak_n: float, same: float) -> bool:
@@ -151,7 +152,7 @@ def _contest(found: Inference, cause: Cause, rival: str) -> Contest:
             return found.fit
         return fits.get(name) or _in_place_of(found, member.name, name)
 
-    return Contest(fitted(cause.name), fitted(rival), member.without)
+    return Contest(fitted(cause.name), fitted(rival), member.without).settled()
 
 
 def _again(found: Inference) -> str:

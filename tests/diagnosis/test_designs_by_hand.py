@@ -297,6 +297,11 @@ def test_the_shortest_protocol_that_rules_the_nearest_equivalent_out_is_run(monk
             == f"run the protocol {protocol.replace('_', ' ')}: it should tell {BOTH} apart, which this data does not"
         )
     assert told.expected_margin == 1e4 - 5.0  # what it adds
+    # What adds no more than noise does not count, however its odds come to be.
+    bound = -2.0 * math.log(0.02)
+    for by, protocol in ((0.999 * bound, "rates"), (1.001 * bound, "steps")):
+        contest = _Foretold(1.1, 5.0, {"steps": (1.3, 5.0 + by), "rates": (1.3, 90.0)})
+        assert _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest}).protocol == protocol
 
 
 def test_where_none_ends_the_doubt_the_shortest_that_tells_about_as_much_as_the_best(
@@ -403,6 +408,7 @@ def test_a_contest_is_of_what_was_fitted_and_of_what_is_fitted_in_a_blocks_place
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, part, law: (part, law))
+    monkeypatch.setattr(Contest, "settled", lambda self: self)
     laws = (Alternative("contact_area", 3.0, "fitted contact"), Alternative("dead_band", 4.0, "fitted band"))  # type: ignore[arg-type]
     untold = (Alternative("zero_drift", 5.0, "fitted drift"),)  # type: ignore[arg-type]
     members = [
