@@ -46,9 +46,9 @@ def next_experiment(
     """For the largest doubtful cause that any protocol tells from its nearest equivalent: the shortest such, a channel.
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
-    Where no cause is in doubt, but recordings have gains of their own, one of them again. Where none is, and something
-    is left (``open_``), or a name is not sure, what this data never showed; else None. So too where something is left
-    and neither a protocol nor a channel parts what is in doubt. Where a single load cycle tells no cause, more of them.
+    Where neither parts any, but recordings have gains of their own, one of them again. Where they have not, and
+    something is left (``open_``), or a name is not sure, what this data never showed; else that either may be used of
+    what is in doubt, None where nothing is. Where a single load cycle tells no cause, more of them.
     """
     pair = _pair(causes)
     if worse:
@@ -56,15 +56,13 @@ def next_experiment(
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(pair, "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.part is not None]
-    otherwise = None
+    told: list[NextExperiment] = []
     for cause in sorted(doubtful, key=lambda one: -one.size):
-        apart = _told_apart(found, cause, sessions, excitation.thresholds)
-        if apart.protocol:
-            return apart
-        if otherwise is None and (apart.channel or not open_):
-            otherwise = apart
-    if otherwise is not None:
-        return otherwise
+        told.append(_told_apart(found, cause, sessions, excitation.thresholds))
+        if told[-1].protocol:
+            return told[-1]
+    if by_channel := [one for one in told if one.channel]:
+        return by_channel[0]
     if found.own_gains or found.zero_changes:
         return NextExperiment(pair, "repeat", None, _again(found))
     if not found.can_validate:
@@ -74,8 +72,10 @@ def next_experiment(
         )
         return NextExperiment(pair, "repeat", None, says)
     least = excitation.thresholds.least_confidence
-    is_open = open_ or any(cause.equivalents or cause.confidence < least for cause in causes)
-    return _unseen(found, pair, excitation) if is_open else None
+    is_unsure = any(cause.confidence < least or (cause.equivalents and cause.part is None) for cause in causes)
+    if open_ or is_unsure:
+        return _unseen(found, pair, excitation)
+    return told[0] if told else None
 
 
 def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:

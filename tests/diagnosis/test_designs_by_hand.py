@@ -348,7 +348,9 @@ def test_of_several_doubtful_causes_the_largest_that_a_protocol_tells(monkeypatc
     assert _next(monkeypatch, [small, large], both, channel="temperature").separates[0] == "dead_band"
     both["dead_band"] = _Foretold(0.1, 5.0, no_use)
     assert _next(monkeypatch, [small, large], both).separates[0] == "linear_leak"
-    # "Use either" is no advice where more is left than that.
+    # "Use either" is no advice where more is left than that, or a name is not sure.
+    unsure = _cause("zero_drift", 0.001, (), confidence=0.74)
+    assert _next(monkeypatch, [small, large, unsure], both) == "unseen"
     assert _next(monkeypatch, [small, large], both, open_=True) == "unseen"
     assert _next(monkeypatch, [small, large], both, open_=True, channel="temperature").channel == "temperature"
 
@@ -402,6 +404,9 @@ def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and
     assert slipped.says.endswith("whether the zero changes there each time")
     ends = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (9.0, 90.0)})}
     assert _next(monkeypatch, [_cause(*LEAK)], ends, own_gains=gains).protocol == "steps"
+    no_use = {"linear_leak": _Foretold(0.1, 5.0)}  # "use either" is less than that
+    assert _next(monkeypatch, [_cause(*LEAK)], no_use, own_gains=gains).protocol == "repeat"
+    assert _next(monkeypatch, [_cause(*LEAK)], no_use, own_gains=gains, channel="temperature").channel == "temperature"
 
 
 def test_a_contest_is_of_what_was_fitted_and_of_what_is_fitted_in_a_blocks_place(
