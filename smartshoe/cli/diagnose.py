@@ -166,9 +166,9 @@ def _refuse_beside_design() -> None:
 
 def _design(path: str, json_path: str | None) -> None:
     from smartshoe.cli._output import emit_json, note
-    from smartshoe.diagnosis.design import USUAL_NOISE_PERCENT, design
+    from smartshoe.diagnosis.design import USUAL_NOISE_PERCENT, USUAL_RATE_HZ, design
     from smartshoe.report.diagnosis.terminal import print_design
-    from smartshoe.runs.scenario import load, noise_of, protocols_of
+    from smartshoe.runs.scenario import load, noise_of, protocols_of, sample_rate_of
 
     scenario, source = load(path)
     protocols = tuple(protocols_of(scenario, source).values())
@@ -178,8 +178,9 @@ def _design(path: str, json_path: str | None) -> None:
     said_by = "since no unit of the scenario states any"
     if unit is not None:
         said_by = f"the largest that a unit of the scenario states ({unit})"
-    found = design(protocols, noise_percent=percent)
-    note(f"noise of {percent:g} % of full scale, {said_by}")
+    rate_hz = sample_rate_of(scenario, source) or USUAL_RATE_HZ
+    found = design(protocols, noise_percent=percent, sample_rate_hz=rate_hz)
+    note(f"noise of {percent:g} % of full scale, {said_by}; logged at {rate_hz:g} Hz")
     if not emit_json(found.to_dict(), json_path):
         print_design(found)
 

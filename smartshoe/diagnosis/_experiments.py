@@ -6,7 +6,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from smartshoe.models.effects import Conditions
+from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
+from smartshoe.recording import Recording
 
 STEP_S = 0.1  # in which a machine goes from load to load at once; half and twice as long changed no proposal
 
@@ -93,6 +96,14 @@ EXPERIMENTS: Mapping[str, Callable[[float], Protocol]] = {
         steps, multisine, minor_loops, shuffled_loads, rates, holds_at_several_loads, long_hold, pauses, idle,
     )
 }  # fmt: skip
+
+
+def run_on(unit: ExtendedModel, protocol: Protocol, peak_n: float, sample_time_s: float) -> Recording:
+    """What ``unit``, of which ``peak_n`` is the full scale, would read without noise, were the protocol run once."""
+    time_s = np.arange(0.0, protocol.duration_s, sample_time_s)
+    load_n = protocol.load_at(time_s)
+    reading = unit.reading(Conditions(time_s, load_n / peak_n, sample_time_s))
+    return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name=protocol.name)
 
 
 def _press(load_n: float, hold_s: float, rest_s: float, peak_n: float) -> list[Segment]:

@@ -79,11 +79,10 @@ def infer(
     plain = least_squares(start, sessions, thresholds)
     evidence, best = searched(plain.model, sessions, thresholds)
     screening, likeness = _screening(evidence)
-    # Within one, nothing validates anything.
-    can_validate = independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
-    if not (is_unit and can_validate):
+    is_valid = can_validate(sessions, thresholds)
+    if not (is_unit and is_valid):
         likelihood = Likelihood(sessions, evidence.noise_sd, plain.model, thresholds)
-        return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), can_validate)
+        return Inference(plain, weighed(likelihood, plain.model), (), screening, likeness, (), is_valid)
     begun = State(evidence, best, plain)
     if is_stretched(plain.model):
         begun = simpler(with_a_latency(begun), begun)
@@ -318,6 +317,11 @@ def independent(sessions: Sequence[Session], thresholds: Thresholds) -> int:
     """Recordings that are fitted, or load cycles of a single one: what can be left out and predicted from the rest."""
     fitted = fitted_of(sessions)
     return len(fitted) if len(fitted) > 1 else load_cycles(fitted, thresholds)
+
+
+def can_validate(sessions: Sequence[Session], thresholds: Thresholds) -> bool:
+    """Whether anything can be left out and predicted from the rest: within one load cycle nothing validates."""
+    return independent(sessions, thresholds) > 1 and len(folds_of(sessions)) > 1
 
 
 def _screening(evidence: Evidence) -> tuple[tuple[tuple[str, float], ...], Array]:

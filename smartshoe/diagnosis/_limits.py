@@ -26,6 +26,7 @@ from smartshoe.models.effects import Effect, in_words, listed
 from smartshoe.models.effects.exposure import CHANNELS, LATER_CYCLES, SAYS
 from smartshoe.models.extended import ExtendedModel
 
+ONE_CYCLE = "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
 SAID = 4  # of many of a kind, as changes of a gain, that are told one by one
 
 
@@ -245,9 +246,7 @@ def _when(changes: Sequence[OwnGain | ZeroChange]) -> str:
 def refusals_of(found: Inference) -> list[str]:
     """What is said of effects that are not named for what others do: taken out again, or undone by one another."""
     if not found.can_validate:
-        return [
-            "one load cycle of one recording: nothing in it is independent of the rest, so that no cause can be told"
-        ]
+        return [ONE_CYCLE]
     said = []
     if found.undone:
         said.append(f"these effects largely cancel one another, so that none is named: {listed(found.undone)}")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._excitation import Excitation
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._gains_and_zeros import changes_of
@@ -18,16 +19,16 @@ from smartshoe.diagnosis._sensitivity import logged_channels
 from smartshoe.diagnosis._session import Session
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
-from smartshoe.models.effects import Conditions, effect, in_words, listed, told_apart_by
+from smartshoe.models.effects import effect, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import CHANNELS, SAYS, Exposure
 from smartshoe.protocol import Protocol
 
 SHOWN_BY: dict[Exposure, str] = {
     "rates": "rates",
-    "holds": "long_hold",
+    "holds": "holds_at_several_loads",
     "rests": "idle",
     "minor_loops": "minor_loops",
-    "peaks": "shuffled_loads",
+    "shuffled_loads": "shuffled_loads",
     "pauses": "pauses",
     "steps": "steps",
 }
@@ -42,12 +43,12 @@ def next_experiment(
     open_: bool,
     worse: bool = False,
 ) -> NextExperiment | None:
-    """For the most doubtful cause: the shortest protocol that tells it clearly better than this data, or a channel.
+    """For the largest doubtful cause that any protocol tells from its nearest equivalent: the shortest such, a channel.
 
     Before all else, where the extension is ``worse`` on what is held out: such loads among those that are fitted.
-    Where no cause is in doubt, but recordings have gains of their own, one of them again. Where none is, and something
-    is left (``open_``), or a name is not sure, what this data never showed; else None. Where a single load cycle tells
-    no cause, more of them.
+    Where neither parts any, but recordings have gains of their own, one of them again. Where they have not, and
+    something is left (``open_``), or a name is not sure, what this data never showed; else that either may be used of
+    what is in doubt, None where nothing is. Where a single load cycle tells no cause, more of them.
     """
     pair = _pair(causes)
     if worse:
@@ -55,8 +56,13 @@ def next_experiment(
         says = f"record what {held} holds once more, and fit it too: the extended model does not hold for its loads"
         return NextExperiment(pair, "repeat", None, says)
     doubtful = [cause for cause in causes if cause.equivalents and cause.part is not None]
-    if doubtful:
-        return _told_apart(found, max(doubtful, key=lambda one: one.size), sessions, excitation.thresholds)
+    told: list[NextExperiment] = []
+    for cause in sorted(doubtful, key=lambda one: -one.size):
+        told.append(_told_apart(found, cause, sessions, excitation.thresholds))
+        if told[-1].protocol:
+            return told[-1]
+    if by_channel := [one for one in told if one.channel]:
+        return by_channel[0]
     if found.own_gains or found.zero_changes:
         return NextExperiment(pair, "repeat", None, _again(found))
     if not found.can_validate:
@@ -66,55 +72,87 @@ def next_experiment(
         )
         return NextExperiment(pair, "repeat", None, says)
     least = excitation.thresholds.least_confidence
-    is_open = open_ or any(cause.equivalents or cause.confidence < least for cause in causes)
-    return _unseen(found, pair, excitation) if is_open else None
+    is_unsure = any(cause.confidence < least or (cause.equivalents and cause.part is None) for cause in causes)
+    if open_ or is_unsure:
+        return _unseen(found, pair, excitation)
+    return told[0] if told else None
 
 
 def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thresholds: Thresholds) -> NextExperiment:
-    """The shortest protocol that tells a cause from its nearest equivalent clearly better than this data, or a channel.
+    """The shortest protocol that rules a cause's nearest equivalent out, or tells clearly more than this data.
 
-    Each protocol is simulated with the fitted model, and with the equivalent in the cause's place.
+    Of those that this data does not hold already. Where none rules it out, the channel that would, if there is one.
     """
-    rival, part = cause.equivalents[0], str(cause.part)
-    truth = found.fit if part == cause.name else _in_place_of(found, part, cause.name)
-    other = _in_place_of(found, part, rival)
-    margin = next((one.margin for one in cause.rivals if one.effect == rival), 0.0)
-    peak_n = found.fit.model.full_scale_load_n
-    noise_sd = found.fit.likelihood.noise_sd
-    finest = min(sessions, key=lambda one: one.conditions.step_s)
-    expected = {
-        name: expected_margin(truth, other, made(peak_n), noise_sd, finest) for name, made in EXPERIMENTS.items()
-    }
-    most = max(expected.values())
-    names = (cause.name, *cause.equivalents)
-    both = listed((cause.name, rival), "and")
-    channel = _channel(cause.name, rival, sessions)
+    rival = cause.equivalents[0]
+    now = _contest(found, cause, rival)
+    peak_n, least_s = found.fit.model.full_scale_load_n, min(one.recording.sample_time_s for one in sessions)
+    made = [make(peak_n) for make in EXPERIMENTS.values()]
+    held = now.cause.likelihood.sessions
+    left = [one for one in made if not any(_is_of(one, session, peak_n, thresholds.same) for session in held)]
     no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
-    if most < no_name:
-        instead = f"log the {channel} too" if channel else "use either, both predict the same reading"
-        says = f"no load history that a machine can run tells {both} apart: {instead}"
+    foretold: list[tuple[Protocol, Contest]] = []
+    for protocol in sorted(left, key=lambda one: one.duration_s):
+        then = now.after(protocol, least_s)
+        if then.margin - now.margin > no_name:
+            foretold.append((protocol, then))
+            if _rules_out(then, thresholds):
+                break
+    names, both = (cause.name, *cause.equivalents), listed((cause.name, rival), "and")
+    chosen, word = _most_telling(now, foretold, thresholds), _channel(cause.name, rival, sessions)
+    channel = None if word is None else in_words(word)
+    if chosen is None or (word is not None and not _rules_out(chosen[1], thresholds)):
+        most = max((then.margin - now.margin for _, then in foretold), default=0.0)
+        instead = "use either, they read too nearly alike" if word is None else f"what would is {SAYS[word]}"
+        says = f"no protocol is expected to rule out either of {both}: {instead}"
         return NextExperiment(names, None, channel, says, most)
-    telling = {
-        name: EXPERIMENTS[name](peak_n) for name, by in expected.items() if by > max(margin, most / thresholds.clear)
-    }
-    if not telling:
-        instead = f"log the {channel} too" if channel else f"{in_words(cause.name)} follows better"
+    protocol, then = chosen
+    says = f"run the protocol {in_words(protocol.name)}: it should tell {both} apart, which this data does not"
+    if not _rules_out(then, thresholds):
         says = (
-            f"none of the {len(expected)} protocols is expected to tell {both} apart better than this data already"
-            f" does: {instead}"
+            f"run the protocol {in_words(protocol.name)}: it should tell more of {both} than this data does, though no"
+            " protocol is expected to rule out either"
         )
-        return NextExperiment(names, None, channel, says, most)
-    chosen = min(telling, key=lambda name: telling[name].duration_s)
-    better = "which this data does not"
-    if margin > no_name:
-        times = expected[chosen] / margin
-        better = f"{times:.2g} times as well as this data does"
-        if times < 1.0 + thresholds.same:
-            better = "little better than this data does"
-        elif times > thresholds.extrapolates:
-            better = "far better than this data does"
-    says = f"run the protocol {in_words(chosen)}: it should tell {both} apart, {better}"
-    return NextExperiment(names, chosen, channel, says, expected[chosen], telling[chosen])
+    return NextExperiment(names, protocol.name, channel, says, then.margin - now.margin, protocol)
+
+
+def _rules_out(contest: Contest, thresholds: Thresholds) -> bool:
+    """Whether the rival would be no equivalent any more."""
+    return contest.log_odds >= -math.log(thresholds.equivalent_odds)
+
+
+def _most_telling(
+    now: Contest, foretold: Sequence[tuple[Protocol, Contest]], thresholds: Thresholds
+) -> tuple[Protocol, Contest] | None:
+    """Of what is ``foretold``, shortest first, the last, if it ends the doubt; else what tells clearly more than now.
+
+    Of several that tell about as much as the best the shortest.
+    """
+    if foretold and _rules_out(foretold[-1][1], thresholds):
+        return foretold[-1]
+    most = max((then.log_odds for _, then in foretold), default=0.0)
+    least = max(thresholds.clear * now.log_odds, most / thresholds.clear)
+    return next((one for one in foretold if one[1].log_odds > least), None)
+
+
+def _is_of(protocol: Protocol, session: Session, peak_n: float, same: float) -> bool:
+    """Whether a recording is of this protocol, but for its end, and for how exactly a machine follows and is logged."""
+    time_s = session.conditions.time_s
+    asked = protocol.load_at(time_s) / peak_n
+    off = float(np.std(session.conditions.load - asked))
+    return time_s[-1] > (1.0 - same) * protocol.duration_s and off < same * float(np.std(asked))
+
+
+def _contest(found: Inference, cause: Cause, rival: str) -> Contest:
+    """A cause and its rival as they were fitted, or, of those that were not, as they are fitted now."""
+    (member,) = (one for one in found.members if one.name == cause.part)
+    fits = {one.effect: one.fit for one in (*member.laws, *member.untold)}
+
+    def fitted(name: str) -> Fit:
+        if name == member.name:
+            return found.fit
+        return fits.get(name) or _in_place_of(found, member.name, name)
+
+    return Contest(fitted(cause.name), fitted(rival), member.without).settled()
 
 
 def _again(found: Inference) -> str:
@@ -147,41 +185,19 @@ def _pair(causes: Sequence[Cause]) -> tuple[str, ...]:
 def _unseen(found: Inference, names: tuple[str, ...], excitation: Excitation) -> NextExperiment:
     """The first protocol that holds what this data lacks; the same again where it lacks nothing."""
     peak_n = found.fit.model.full_scale_load_n
-    for word, protocol in SHOWN_BY.items():
-        if word not in excitation.present:
-            says = f"run the protocol {in_words(protocol)}: this data lacks {SAYS[word]}, by which kinds differ"
-            return NextExperiment(names, protocol, None, says, None, EXPERIMENTS[protocol](peak_n))
+    lacking = [word for word in SHOWN_BY if word not in excitation.present]
+    if excitation.goes_with_the_clock:  # which by itself leaves every cause half sure
+        lacking.sort(key=lambda word: word != "shuffled_loads")
+    if lacking:
+        name = SHOWN_BY[lacking[0]]
+        says = f"run the protocol {in_words(name)}: this data lacks {SAYS[lacking[0]]}, by which kinds differ"
+        return NextExperiment(names, name, None, says, None, EXPERIMENTS[name](peak_n))
     says = "run the same protocol again, twice: what repeats in all three is the unit's, what does not is the session's"
     return NextExperiment(names, "repeat", None, says)
 
 
-def expected_margin(truth: Fit, rival: Fit, protocol: Protocol, noise_sd: float, like: Session) -> float:
-    """By how much -2 log likelihood would be worse with the rival, were ``truth`` true and the protocol run once.
-
-    The rival may move its parameters as far as the data so far lets it: min over d of |yA - yB - J d|^2 + d' H d in
-    standard deviations of the noise, H the information that it was fitted with.
-    """
-    step_s = like.conditions.step_s
-    time_s = np.arange(0.0, protocol.duration_s, step_s)
-    full_n = truth.model.full_scale_load_n
-    conditions = Conditions(time_s, protocol.load_at(time_s) / full_n, step_s, like.conditions.load_noise)
-    reading, slopes = rival.model.sensitivities(conditions)
-    difference = (truth.model.simulate(conditions) - reading) / noise_sd
-    J = slopes / noise_sd
-    information = np.linalg.pinv(rival.covariance, rcond=1e-12, hermitian=True)
-    unseen = np.diag(rival.covariance) == 0
-    scale = np.sqrt(np.sum(J**2, axis=0) + np.diag(information))
-    good = (scale > 0) & ~unseen
-    if not good.any():
-        return float(difference @ difference)
-    Js, H = J[:, good] / scale[good], information[np.ix_(good, good)] / np.outer(scale[good], scale[good])
-    moved = np.linalg.lstsq(Js.T @ Js + H, Js.T @ difference, rcond=1e-12)[0]
-    left = difference - Js @ moved
-    return float(left @ left + moved @ H @ moved)
-
-
-def _channel(name: str, rival: str, sessions: Sequence[Session]) -> str | None:
+def _channel(name: str, rival: str, sessions: Sequence[Session]) -> Exposure | None:
     """The channel that the catalogue says would tell them apart, if it was not logged already."""
     columns = set.intersection(*({*one.recording.channels} for one in sessions))
     lacking = (told_apart_by(effect(name), effect(rival)) & CHANNELS) - logged_channels(sessions) - columns
-    return in_words(min(lacking)) if lacking else None
+    return min(lacking, default=None)

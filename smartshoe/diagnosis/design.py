@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from smartshoe.arrays import Array, require_positive
 from smartshoe.diagnosis._baseline import USUAL
+from smartshoe.diagnosis._excitation import excitation_of
+from smartshoe.diagnosis._experiments import run_on
+from smartshoe.diagnosis._inference import can_validate
+from smartshoe.diagnosis._limits import ONE_CYCLE
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._scale import Scale, thinning
-from smartshoe.diagnosis._sensitivity import Linearised, linearised
+from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
 from smartshoe.diagnosis._session import prepare
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
-from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
-from smartshoe.recording import Recording
 from smartshoe.units import MILLIBAR
 
-USUAL_NOISE_PERCENT = 0.1  # of full scale, where no unit states its own
+USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # of full scale; of a log: where no unit states its own
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,8 @@ class Design:
     ``least`` (n,): size from which on each of the effects ``names`` shows, rms share of full scale of all it does to
     the reading, infinite where the baseline follows it whole. ``unlike`` (n, n): the share of an effect's evidence that
     another one in its place cannot follow. ``evidence``: -2 log of an effect that leaves ``strength`` (rms share of
-    full scale) beyond what the baseline follows, for which `cannot_be_told` answers.
+    full scale) beyond what the baseline follows, for which `cannot_be_told` answers. ``limits``: what a diagnosis of
+    such recordings would say that they lack, whatever is in them.
     """
 
     names: tuple[str, ...]
@@ -43,6 +46,7 @@ class Design:
     strength: float
     evidence: float
     thresholds: Thresholds
+    limits: tuple[str, ...] = ()
 
     def cannot_be_told(self, name: str) -> tuple[str, ...]:
         """The effects that this protocol would not tell from ``name``, most alike first.
@@ -73,6 +77,7 @@ class Design:
                 for j, b in enumerate(self.names)
                 if i != j
             ],
+            "limits": list(self.limits),
         }
 
 
@@ -82,7 +87,7 @@ def design(
     *,
     noise_percent: float = USUAL_NOISE_PERCENT,
     strength_percent: float = 0.3,
-    sample_rate_hz: float = 100.0,
+    sample_rate_hz: float = USUAL_RATE_HZ,
     unit: ExtendedModel = USUAL,
     thresholds: Thresholds | None = None,
 ) -> Design:
@@ -117,7 +122,7 @@ def design(
         raise UsageError(
             f"no load is put on in {', '.join(one.name for one in protocols)}: give a protocol that presses"
         )
-    recordings = [_commanded(protocol, unit, peak_n, sample_rate_hz) for protocol in protocols]
+    recordings = [run_on(unit, protocol, peak_n, 1.0 / sample_rate_hz) for protocol in protocols]
     scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
     usable = [np.ones(len(one), dtype=bool) for one in recordings]
     factors = thinning(recordings, scale, limits)
@@ -125,14 +130,10 @@ def design(
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.
     sd = 0.01 * noise_percent / math.sqrt(min(factors))
-    return _compared(columns, sd, 0.01 * strength_percent, limits)
-
-
-def _commanded(protocol: Protocol, unit: ExtendedModel, peak_n: float, sample_rate_hz: float) -> Recording:
-    time_s = np.arange(0.0, protocol.duration_s, 1.0 / sample_rate_hz)
-    load_n = protocol.load_at(time_s)
-    reading = unit.reading(Conditions(time_s, load_n / peak_n, 1.0 / sample_rate_hz))
-    return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name=protocol.name)
+    # Of one load cycle no cause is named, whatever its columns tell.
+    lacking = [] if can_validate(sessions, limits) else [ONE_CYCLE]
+    lacking += replace(excitation_of(sessions, limits), is_judged=True).limits()
+    return replace(_compared(columns, sd, 0.01 * strength_percent, limits), limits=tuple(lacking))
 
 
 def _compared(columns: Linearised, sd: float, strength: float, limits: Thresholds) -> Design:
@@ -144,25 +145,39 @@ def _compared(columns: Linearised, sd: float, strength: float, limits: Threshold
     count = sum(int(session.fitted.sum()) for session in columns.sessions)
     shown = 2.0 * math.log(len(names) / limits.false_name)  # the prior odds against an effect
     least, unlike = np.full(len(names), np.inf), np.ones((len(names), len(names)))
-    of = {name: [[c - 1 for c in one.columns] for one in laws if one.name == name] for name in names}
+    firsts = np.array([one.columns[0] - 1 for one in laws])
+    powers = np.diag(left)[firsts]
+    seen = powers > 1e-9 * np.diag(gram)[firsts]
+    missed = np.array([_not_followed(left, rival, laws, powers) for rival in laws])
+    of = {name: np.array([one.name == name for one in laws]) for name in names}
     for i, name in enumerate(names):
-        at = max(of[name], key=lambda shape: left[shape[0], shape[0]])
-        x = left[at[0], at[0]]
-        if x <= 1e-9 * gram[at[0], at[0]]:
+        shapes = of[name] & seen
+        if not shapes.any():
             unlike[i] = 0.0
             continue
         # Of what the baseline does not follow it must also be material.
+        x = float(powers[shapes].max())
         least[i] = max(math.sqrt(shown / x), limits.material / (sd * math.sqrt(x / count)))
         for j, other in enumerate(names):
-            if j == i:
-                unlike[i, j] = 0.0
-                continue
-            unlike[i, j] = min(_not_followed(left, at[0], shape, x) for shape in of[other])
+            unlike[i, j] = missed[np.ix_(of[other], shapes)].min() if j != i else 0.0
     return Design(names, least, unlike, strength, count * (strength / sd) ** 2, limits)
 
 
-def _not_followed(left: Array, target: int, shape: Sequence[int], power: float) -> float:
-    """Share of a column's square that the columns ``shape`` leave."""
-    inner = left[np.ix_(shape, shape)]
-    found = np.linalg.pinv(inner, rcond=1e-9, hermitian=True) @ left[shape, target]
-    return float(np.clip(1.0 - found @ left[shape, target] / power, 0.0, 1.0))
+def _not_followed(left: Array, rival: Candidate, targets: Sequence[Candidate], powers: Array) -> Array:
+    """(m,) the share of the square of each target's first column that a rival leaves, with a sign that physics allows.
+
+    Of several strengths a fit minds the bounds, and no sign is asked for here. ``powers`` (m,): the squares.
+    """
+    at, firsts = [column - 1 for column in rival.columns], [one.columns[0] - 1 for one in targets]
+    across = left[np.ix_(at, firsts)]
+    found = np.linalg.pinv(left[np.ix_(at, at)], rcond=1e-9, hermitian=True) @ across
+    shares = np.clip(1.0 - np.sum(found * across, axis=0) / np.maximum(powers, 1e-300), 0.0, 1.0)
+    if len(at) == 1:
+        shares[[not _may_follow(rival, one, found[:, k]) for k, one in enumerate(targets)]] = 1.0
+    return np.asarray(shares)
+
+
+def _may_follow(rival: Candidate, target: Candidate, strength: Array) -> bool:
+    """Whether physics allows a rival's ``strength`` (1,) beside a target's first of one, or both turned over."""
+    first = np.eye(1, len(target.columns))[0]
+    return any(target.has_sign_of(sign * first) and rival.has_sign_of(sign * strength) for sign in (1.0, -1.0))

@@ -25,13 +25,27 @@ def triangles() -> Design:
     return design([dynamic_protocol((100, 200, 400, 800))])
 
 
-def test_no_waveform_tells_the_static_curves_apart(triangles: Design) -> None:
-    for name in CURVES:
-        assert set(triangles.cannot_be_told(name)) >= CURVES - {name}
+def test_no_waveform_tells_curves_apart_that_bend_the_same_way(triangles: Design) -> None:
+    """The sensor's bends either way; gas makes a unit stiffer with load, contact and wall softer and stiffer alike."""
+    assert set(triangles.cannot_be_told("sensor_nonlinearity")) >= CURVES - {"sensor_nonlinearity"}
+    for name in CURVES - {"sensor_nonlinearity"}:
+        assert "sensor_nonlinearity" in triangles.cannot_be_told(name)
+    assert "wall_hardening" in triangles.cannot_be_told("contact_area")
+    assert "contact_area" in triangles.cannot_be_told("wall_hardening")
+
+
+def test_what_bends_the_other_way_is_told(triangles: Design) -> None:
+    """Physics allows a gas that is compressed no other sign, nor a wall that hardens."""
+    assert not {"contact_area", "wall_hardening"} & {*triangles.cannot_be_told("gas_compression")}
+    place = triangles.names.index("gas_compression"), triangles.names.index("wall_hardening")
+    assert triangles.unlike[place] > 0.9
 
 
 def test_triangles_alone_leave_a_leak_a_set_and_a_drift_open_and_holds_tell_a_creep(triangles: Design) -> None:
-    assert {"permanent_set", "zero_drift"} <= set(triangles.cannot_be_told("linear_leak"))
+    """A drift goes either way, a leak takes the reading down, a set leaves it up."""
+    assert {"orifice_leak", "zero_drift"} <= set(triangles.cannot_be_told("linear_leak"))
+    assert "zero_drift" in triangles.cannot_be_told("permanent_set")
+    assert "permanent_set" not in triangles.cannot_be_told("linear_leak")
     both = design([dynamic_protocol((100, 200, 400, 800)), static_protocol()])
     assert len(both.cannot_be_told("clock_drift")) < len(triangles.cannot_be_told("clock_drift"))
 
@@ -133,6 +147,39 @@ def test_the_command_takes_the_largest_noise_of_the_scenarios_units(
     wrong = units.replace("2.0", "-2.0")
     assert run_command(_asked(tmp_path, "[protocol.dynamic]\n" + wrong)) != 0
     assert "unit.1.sensor.noise_percent" in capsys.readouterr().err
+
+
+def test_the_command_takes_the_lowest_rate_that_a_unit_is_logged_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    protocol, machine = "[protocol.dynamic]\nrates_n_per_s = [200.0]\n", "[machine]\ndaq = {sample_rate_hz = 50}\n"
+    units = '[[unit]]\nname = "a"\n[[unit]]\nname = "b"\ndaq = {sample_rate_hz = 20}\n'
+    assert run_command(_asked(tmp_path, protocol + machine + units)) == 0
+    assert "logged at 20 Hz" in capsys.readouterr().err
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told == design([dynamic_protocol((200.0,))], sample_rate_hz=20.0).to_dict()
+    assert run_command(_asked(tmp_path, protocol + '[[unit]]\nname = "a"\n')) == 0
+    assert "logged at 100 Hz" in capsys.readouterr().err
+    for wrong in ("-5", '"often"', "true"):
+        assert run_command(_asked(tmp_path, protocol + units.replace("20", wrong))) != 0
+        assert "unit.1.daq.sample_rate_hz" in capsys.readouterr().err
+
+
+def test_a_design_says_what_a_diagnosis_of_such_recordings_would_lack(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    once = Protocol("once", (Segment("rest", 0.0, 5.0), Segment("ramp", 800.0, 5.0), Segment("ramp", 0.0, 5.0)))
+    assert design([once]).limits[0].startswith("one load cycle of one recording")
+    for protocols in ([once, once], [dynamic_protocol((200,), repeats=3)]):
+        assert not any(said.startswith("one load cycle of one recording") for said in design(protocols).limits)
+    assert not any("held out" in said for said in design([once]).limits)  # which is asked of no design
+    assert any("one loading rate only" in said for said in design([once, once]).limits)
+    assert design([EXPERIMENTS["rates"](800.0), EXPERIMENTS["holds_at_several_loads"](800.0)]).limits == ()
+    assert (
+        run_command(_asked(tmp_path, '[protocol.t]\nkind = "static"\nloads_n = [800]\n[[unit]]\nname = "toe"\n')[:3])
+        == 0
+    )
+    assert "limits of these protocols" in capsys.readouterr().out
 
 
 def test_the_command_names_the_file_and_key_where_there_is_no_protocol(

@@ -13,13 +13,16 @@ import pytest
 from numpy.typing import NDArray
 
 from smartshoe.diagnosis import Thresholds, _next_experiment
+from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._excitation import Excitation
+from smartshoe.diagnosis._experiments import run_on
 from smartshoe.diagnosis._gains_and_zeros import OwnGain, ZeroChange
 from smartshoe.diagnosis._members import Alternative
 from smartshoe.diagnosis._naming import names_of, probability_of_kind, probability_of_law
-from smartshoe.diagnosis._next_experiment import _in_place_of, expected_margin, next_experiment
-from smartshoe.diagnosis.design import Design, _commanded, _compared, _not_followed, design
+from smartshoe.diagnosis._next_experiment import _contest, _in_place_of, _is_of, next_experiment
+from smartshoe.diagnosis.design import Design, _compared, _not_followed, design
 from smartshoe.models.effects import Conditions, effect
+from smartshoe.models.effects.exposure import SAYS
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol, Segment
 
@@ -31,11 +34,19 @@ MODEL = ExtendedModel(1.1, 0.1, 0.3, 800.0, 140.0, "mbar")
 
 
 # -- designs ----------------------------------------------------------------------------------------------------------
+SIGNED = {"grows", "grows_too"}  # effects of one sign
+
+
 def _columns(matrix: Array, candidates: list[tuple[str, tuple[int, ...], bool]], own: int = 2) -> Any:
     """A linearisation of one session with a target and such columns."""
     wide = np.column_stack([np.zeros(matrix.shape[0]), matrix])
     made = [
-        SimpleNamespace(name=name, columns=columns, effect=SimpleNamespace(is_flexible=flexible))
+        SimpleNamespace(
+            name=name,
+            columns=columns,
+            effect=SimpleNamespace(is_flexible=flexible),
+            has_sign_of=lambda strengths, name=name: name not in SIGNED or strengths[0] >= 0.0,
+        )
         for name, columns, flexible in candidates
     ]
     session = SimpleNamespace(fitted=np.ones(matrix.shape[0], dtype=bool))
@@ -66,8 +77,10 @@ def test_what_shows_and_what_is_alike_is_of_what_the_baseline_does_not_follow() 
         material = STANDARD.material / (0.01 * math.sqrt(power / 60))
         assert found.least[i] == pytest.approx(max(math.sqrt(shown / power), material))
     assert math.isinf(found.least[2])
-    followed = _left(left[best], np.column_stack([left[4], left[6]]))
-    assert found.unlike[0, 1] == pytest.approx(float(followed @ followed) / float(left[best] @ left[best]))
+    # None knows which shape it has: the one that is followed best.
+    followed = {k: _left(left[k], np.column_stack([left[4], left[6]])) for k in (2, 3)}
+    expected = min(float(rest @ rest) / float(left[k] @ left[k]) for k, rest in followed.items())
+    assert found.unlike[0, 1] == pytest.approx(expected)
     shares = []
     for k in (2, 3):
         rest = _left(left[4], left[k][:, None])
@@ -84,10 +97,29 @@ def test_what_shows_and_what_is_alike_is_of_what_the_baseline_does_not_follow() 
 
 def test_what_columns_leave_of_a_square_is_a_share() -> None:
     left = np.array([[4.0, 2.0, 0.0], [2.0, 2.0, 0.0], [0.0, 0.0, 1.0]])
-    assert _not_followed(left, 0, [1], 4.0) == pytest.approx(0.5)
-    assert _not_followed(left, 0, [2], 4.0) == pytest.approx(1.0)
-    assert _not_followed(left, 0, [0, 2], 4.0) == pytest.approx(0.0, abs=1e-12)
-    assert _not_followed(left, 0, [1], 1.0) == 0.0
+
+    def missed(*columns: int, power: float = 4.0) -> float:
+        rival: Any = SimpleNamespace(columns=columns, has_sign_of=lambda strengths: True)
+        target: Any = SimpleNamespace(columns=(1,), has_sign_of=lambda strengths: True)
+        return float(_not_followed(left, rival, [target], np.array([power]))[0])
+
+    assert missed(2) == pytest.approx(0.5)
+    assert missed(3) == pytest.approx(1.0)
+    assert missed(1, 3) == pytest.approx(0.0, abs=1e-12)
+    assert missed(2, power=1.0) == 0.0
+
+
+def test_an_effect_is_followed_with_the_sign_that_physics_allows_only() -> None:
+    rng = np.random.default_rng(3)
+    x = rng.standard_normal((80, 3))
+    x[:, 2] = -x[:, 1] + 0.01 * x[:, 2]
+    x[:, 1:] = np.column_stack([_left(x[:, k], x[:, :1]) for k in (1, 2)])
+    for one, other, is_told in (
+        ("grows", "grows_too", True), ("grows", "either", False), ("either", "grows", False), ("either", "any", False),
+    ):  # fmt: skip
+        found = _compared(_columns(x, [(one, (2,), False), (other, (3,), False)], own=1), 0.01, 0.003, STANDARD)
+        for share in (found.unlike[0, 1], found.unlike[1, 0]):
+            assert share == 1.0 if is_told else share < 0.01
 
 
 def _design(evidence: float = 100.0) -> Design:
@@ -125,14 +157,14 @@ def test_a_design_is_of_commanded_loads_at_the_logs_rate_and_noise(monkeypatch: 
         seen["given"] = unit, sessions, limits
         return "columns"
 
-    def compared(columns: Any, sd: float, strength: float, limits: Any) -> str:
+    def compared(columns: Any, sd: float, strength: float, limits: Any) -> Design:
         seen["compared"] = columns, sd, strength, limits
-        return "found"
+        return _design(7.0)
 
     monkeypatch.setattr(design_module, "linearised", columns)
     monkeypatch.setattr(design_module, "_compared", compared)
     answer: Any = design(protocols, noise_percent=0.2, strength_percent=0.5, sample_rate_hz=200.0, unit=MODEL)
-    assert answer == "found"
+    assert answer.evidence == 7.0
     unit, sessions, limits = seen["given"]
     assert (unit, limits) == (MODEL, STANDARD)
     assert [one.fitted.all() for one in sessions] == [True, True]
@@ -146,7 +178,7 @@ def test_a_design_is_of_commanded_loads_at_the_logs_rate_and_noise(monkeypatch: 
 
 def test_a_commanded_reading_is_the_units_at_each_sample() -> None:
     protocol = Protocol("ramp", (Segment("ramp", 400.0, 2.0), Segment("hold", 400.0, 1.0)))
-    run = _commanded(protocol, MODEL, 800.0, 50.0)
+    run = run_on(MODEL, protocol, 800.0, 0.02)
     assert run.time_s == pytest.approx(0.02 * np.arange(150))
     load_n = np.minimum(200.0 * run.time_s, 400.0)
     assert run.force_n == pytest.approx(load_n)
@@ -155,38 +187,20 @@ def test_a_commanded_reading_is_the_units_at_each_sample() -> None:
     assert (run.name, run.sensor.unit.symbol) == ("ramp", "mbar")
 
 
-# -- expected margins -------------------------------------------------------------------------------------------------
-class _Linear:
-    """A model that is linear in two numbers, the second without any part in the reading."""
-
-    full_scale_load_n = 400.0
-
-    def __init__(self, gain: float) -> None:
-        self.gain = gain
-
-    def simulate(self, at: Conditions) -> Array:
-        return np.asarray(self.gain * at.load + 0.1 * at.load**2 * (self.gain > 1.0))
-
-    def sensitivities(self, at: Conditions) -> tuple[Array, Array]:
-        return self.simulate(at), np.column_stack([at.load, 0.0 * at.load])
+# -- contests ---------------------------------------------------------------------------------------------------------
+def _contested(cause: float, rival: float, without: float) -> Contest:
+    likelihood: Any = SimpleNamespace(thresholds=STANDARD)
+    fits: list[Any] = [SimpleNamespace(cost=cost, likelihood=likelihood) for cost in (cause, rival, without)]
+    return Contest(*fits)
 
 
-@pytest.mark.parametrize(("variance", "other"), [(1e-6, 0.0), (1e-2, 0.0), (0.0, 0.0), (1e-2, 1e-20)])
-def test_a_margin_is_what_a_rival_cannot_make_up_within_what_it_was_fitted_to(variance: float, other: float) -> None:
-    """A parameter that moves nothing, and of which nothing is known beside the others, has no part in it."""
-    truth: Any = SimpleNamespace(model=_Linear(1.2))
-    rival: Any = SimpleNamespace(model=_Linear(0.9), covariance=np.diag([variance, other]))
-    protocol = Protocol("ramp", (Segment("ramp", 400.0, 2.0), Segment("ramp", 0.0, 1.0)))
-    like: Any = SimpleNamespace(conditions=SimpleNamespace(step_s=0.1, load_noise=0.0))
-    load = protocol.load_at(0.1 * np.arange(30)) / 400.0
-    off = (0.3 * load + 0.1 * load**2) / 0.05
-    column = load / 0.05
-    if variance:
-        moved = float(column @ off) / (float(column @ column) + 1.0 / variance)
-        expected = float(np.sum((off - moved * column) ** 2)) + moved**2 / variance
-    else:
-        expected = float(off @ off)
-    assert expected_margin(truth, rival, protocol, 0.05, like) == pytest.approx(expected, rel=1e-6)
+def test_a_contest_is_weighed_as_laws_are() -> None:
+    """Margin over 2 (1 + departure^2 fall), nothing where the rival follows better; never without an end."""
+    one = _contested(100.0, 350.0, 1100.0)
+    assert one.margin == 250.0
+    assert one.log_odds == pytest.approx(250.0 / (2.0 * (1.0 + 0.0625 * 1000.0)))
+    assert _contested(100.0, 50.0, 1100.0).log_odds == 0.0
+    assert math.isfinite(_contested(0.0, 1e9, 1.0).log_odds)
 
 
 def test_a_rival_begins_at_the_likeliest_of_its_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -222,102 +236,141 @@ def _cause(
     return SimpleNamespace(name=name, size=size, equivalents=equivalents, rivals=told, part=part, confidence=confidence)
 
 
+class _Foretold:
+    """A contest of this data, with what each protocol would make of it: log odds and margin."""
+
+    def __init__(self, log_odds: float, margin: float, then: dict[str, tuple[float, float]] | None = None) -> None:
+        self.log_odds, self.margin, self._then = log_odds, margin, then or {}
+        self.cause = SimpleNamespace(likelihood=SimpleNamespace(sessions=()))
+        self.asked: list[str] = []
+
+    def after(self, protocol: Any, sample_time_s: float) -> _Foretold:
+        assert sample_time_s == 0.005  # of the recording that was logged most quickly
+        self.asked.append(protocol.name)
+        return _Foretold(*self._then.get(protocol.name, (self.log_odds, self.margin)))
+
+
+ENDS = -math.log(0.3)  # log odds from which on a rival is no equivalent
+
+
 def _next(
     monkeypatch: pytest.MonkeyPatch,
     causes: list[Any],
-    margins: dict[str, float],
+    contests: dict[str, _Foretold],
     open_: bool = False,
     can_validate: bool = True,
     own_gains: tuple[OwnGain, ...] = (),
     zero_changes: tuple[ZeroChange, ...] = (),
+    channel: str | None = None,
 ) -> Any:
-    def margin(truth: Any, rival: Any, protocol: Any, noise_sd: float, like: Any) -> float:
-        assert (truth.model.names, rival, noise_sd, like.name) == (("linear_leak", "dead_band"), "other", 0.01, "fine")
-        return margins.get(protocol.name, 0.0)
-
-    monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, name, rival: "other")
-    monkeypatch.setattr(_next_experiment, "expected_margin", margin)
-    monkeypatch.setattr(_next_experiment, "_channel", lambda name, rival, sessions: "temperature" if margins else None)
-    lasting = {"long_hold": 600.0, "steps": 50.0}
+    monkeypatch.setattr(_next_experiment, "_contest", lambda found, cause, rival: contests[cause.name])
+    monkeypatch.setattr(_next_experiment, "_channel", lambda name, rival, sessions: channel)
+    lasting = {"long_hold": 600.0, "steps": 50.0, "rates": 200.0}
     made = {name: (lambda peak_n, name=name: SimpleNamespace(name=name, duration_s=lasting[name])) for name in lasting}
     monkeypatch.setattr(_next_experiment, "EXPERIMENTS", made)
     monkeypatch.setattr(_next_experiment, "_unseen", lambda *given: "unseen")
-    model = MODEL.with_part("linear_leak").with_part("dead_band")
     found: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=model, likelihood=SimpleNamespace(noise_sd=0.01)), can_validate=can_validate,
-        own_gains=own_gains, zero_changes=zero_changes,
-    )  # fmt: skip
+        fit=SimpleNamespace(model=MODEL), can_validate=can_validate, own_gains=own_gains, zero_changes=zero_changes
+    )
     excitation = Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD)
     sessions: list[Any] = [
-        SimpleNamespace(name=name, conditions=SimpleNamespace(step_s=step_s))
-        for name, step_s in (("coarse", 0.05), ("fine", 0.02), ("coarser", 0.1))
+        SimpleNamespace(recording=SimpleNamespace(sample_time_s=step_s)) for step_s in (0.05, 0.005, 0.1)
     ]
     return next_experiment(found, causes, sessions, excitation, open_=open_)
 
 
-def test_the_largest_doubtful_cause_is_parted_by_what_parts_it_best(monkeypatch: pytest.MonkeyPatch) -> None:
-    small = _cause("dead_band", 0.01, ("contact_area",))
-    large = _cause("linear_leak", 0.02, ("orifice_leak", "zero_drift"), (("other", 3.0), ("orifice_leak", 5.0)))
-    sure = _cause("dead_band", 0.09, ())
-    told = _next(monkeypatch, [sure, small, large], {"steps": 20.0, "long_hold": 60.0})
-    assert told.separates == ("linear_leak", "orifice_leak", "zero_drift")
-    assert (told.protocol, told.channel, told.expected_margin, told.steps.name) == (
-        "long_hold", "temperature", 60.0, "long_hold",
-    )  # fmt: skip
-    apart = "it should tell linear leak and orifice leak apart"
-    assert told.says == f"run the protocol long hold: {apart}, which this data does not"
-    better = replace_margin(large, -3.0)
-    not_yet = f"run the protocol steps: {apart}, which this data does not"
-    assert _next(monkeypatch, [better], {"steps": 40.0}).says == not_yet
-    unknown = _cause("linear_leak", 0.02, ("orifice_leak",))
-    assert _next(monkeypatch, [unknown], {"steps": 40.0}).says == not_yet
-    # What tells more than the odds of a false name, -2 log of 0.02, does tell them apart, so many times less well.
+LEAK = ("linear_leak", 0.02, ("orifice_leak", "zero_drift"))
+BOTH = "linear leak and orifice leak"
+
+
+def test_the_shortest_protocol_that_rules_the_nearest_equivalent_out_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    for odds, protocol, asked in (
+        (1.001 * ENDS, "rates", ["steps", "rates"]), (0.999 * ENDS, "long_hold", ["steps", "rates", "long_hold"]),
+    ):  # fmt: skip
+        contest = _Foretold(0.1, 5.0, {"steps": (0.9, 90.0), "rates": (odds, 60.0), "long_hold": (9.0, 1e4)})
+        told = _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest}, channel="temperature")
+        assert contest.asked == asked  # those after it are not asked
+        assert told.separates == ("linear_leak", "orifice_leak", "zero_drift")
+        assert (told.protocol, told.channel, told.steps.name) == (protocol, "temperature", protocol)
+        assert (
+            told.says
+            == f"run the protocol {protocol.replace('_', ' ')}: it should tell {BOTH} apart, which this data does not"
+        )
+    assert told.expected_margin == 1e4 - 5.0  # what it adds
+    # What adds no more than noise does not count, however its odds come to be.
     bound = -2.0 * math.log(0.02)
-    for margin, by, said in (
-        (0.999 * bound, 60.0, "which this data does not"),
-        (1.001 * bound, 60.0, "7.7 times as well as this data does"),
-        (8.0, 60.0, "7.5 times as well as this data does"),
-        (8.0, 79.9, "10 times as well as this data does"),
-        (8.0, 80.1, "far better than this data does"),
-        (20.0, 2e7, "far better than this data does"),
+    for by, protocol in ((0.999 * bound, "rates"), (1.001 * bound, "steps")):
+        contest = _Foretold(1.1, 5.0, {"steps": (1.3, 5.0 + by), "rates": (1.3, 90.0)})
+        assert _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest}).protocol == protocol
+
+
+def test_where_none_ends_the_doubt_the_shortest_that_tells_about_as_much_as_the_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At least half of the best, twice what this data tells, and more than noise does."""
+    bound = -2.0 * math.log(0.02)
+    for now, steps, rates, protocol in (
+        ((0.1, 5.0), (0.401, 90.0), (0.8, 90.0), "steps"),
+        ((0.1, 5.0), (0.399, 90.0), (0.8, 90.0), "rates"),
+        ((0.1, 5.0), (0.201, 90.0), (0.21, 90.0), "steps"),
+        ((0.1, 5.0), (0.199, 90.0), (0.21, 90.0), "rates"),
+        ((0.0, -90.0), (0.2, bound - 90.1), (0.21, bound - 89.9), "rates"),
     ):
-        told = _next(monkeypatch, [replace_margin(large, margin)], {"long_hold": by})
-        assert told.says == f"run the protocol long hold: {apart}, {said}"
-
-
-def test_of_protocols_that_tell_about_as_much_the_shortest_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At least half of what the best does, and more than this data."""
-    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), (("orifice_leak", 35.0),))]
-    for by, protocol in ((40.1, "steps"), (39.9, "long_hold")):
-        told = _next(monkeypatch, doubtful, {"steps": by, "long_hold": 80.0})
+        contest = _Foretold(*now, {"steps": steps, "rates": rates})
+        told = _next(monkeypatch, [_cause(*LEAK)], {"linear_leak": contest})
         assert (told.protocol, told.steps.name) == (protocol, protocol)
-    assert _next(monkeypatch, doubtful, {"steps": 34.9, "long_hold": 60.0}).protocol == "long_hold"
+        assert told.says.startswith(f"run the protocol {protocol}: it should tell more of {BOTH} than this data does")
+        assert told.says.endswith("no protocol is expected to rule out either")
 
 
-def test_no_protocol_is_run_that_tells_no_more_than_this_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), (("orifice_leak", 60.0),))]
-    assert _next(monkeypatch, doubtful, {"long_hold": 60.1}).protocol == "long_hold"
-    told = _next(monkeypatch, doubtful, {"steps": 40.0, "long_hold": 60.0})
-    assert (told.protocol, told.channel, told.expected_margin, told.steps) == (None, "temperature", 60.0, None)
-    assert told.says == (
-        "none of the 2 protocols is expected to tell linear leak and orifice leak apart better than this data already"
-        " does: log the temperature too"
-    )
+def test_what_no_protocol_tells_better_asks_for_a_channel_or_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    contests = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (0.199, 90.0), "rates": (0.1, 40.0)})}
+    told = _next(monkeypatch, [_cause(*LEAK)], contests)
+    assert (told.protocol, told.channel, told.expected_margin, told.steps) == (None, None, 85.0, None)
+    no_use = f"no protocol is expected to rule out either of {BOTH}: "
+    assert told.says == no_use + "use either, they read too nearly alike"
+    told = _next(monkeypatch, [_cause(*LEAK)], contests, channel="pressure_reference")
+    assert (told.protocol, told.channel) == (None, "pressure reference")
+    assert told.says == no_use + f"what would is {SAYS['pressure_reference']}"
+    # What tells a little more by no means rules out: a channel that the catalogue knows does.
+    contests = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (0.9, 90.0)})}
+    assert _next(monkeypatch, [_cause(*LEAK)], contests).protocol == "steps"
+    assert _next(monkeypatch, [_cause(*LEAK)], contests, channel="temperature").protocol is None
 
 
-def replace_margin(cause: Any, margin: float) -> Any:
-    return SimpleNamespace(**{**vars(cause), "rivals": (SimpleNamespace(effect="orifice_leak", margin=margin),)})
+def test_of_several_doubtful_causes_the_largest_that_a_protocol_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    small, large = _cause("dead_band", 0.01, ("contact_area",)), _cause(*LEAK)
+    ends, no_use = {"steps": (9.0, 90.0)}, {"steps": (0.1, 9.0)}
+    both = {"linear_leak": _Foretold(0.1, 5.0, ends), "dead_band": _Foretold(0.1, 5.0, ends)}
+    assert _next(monkeypatch, [small, large], both).separates[0] == "linear_leak"
+    both["linear_leak"] = _Foretold(0.1, 5.0, no_use)
+    assert _next(monkeypatch, [small, large], both).separates[0] == "dead_band"
+    assert _next(monkeypatch, [small, large], both, channel="temperature").separates[0] == "dead_band"
+    both["dead_band"] = _Foretold(0.1, 5.0, no_use)
+    assert _next(monkeypatch, [small, large], both).separates[0] == "linear_leak"
+    # "Use either" is no advice where more is left than that, or a name is not sure.
+    unsure = _cause("zero_drift", 0.001, (), confidence=0.74)
+    assert _next(monkeypatch, [small, large, unsure], both) == "unseen"
+    assert _next(monkeypatch, [small, large], both, open_=True) == "unseen"
+    assert _next(monkeypatch, [small, large], both, open_=True, channel="temperature").channel == "temperature"
 
 
-def test_what_no_load_history_parts_asks_for_a_channel_or_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Less than the odds of a false name, -2 log of 0.02."""
-    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",))]
-    bound = -2.0 * math.log(0.02)
-    below = _next(monkeypatch, doubtful, {"steps": 0.999 * bound})
-    assert (below.protocol, below.channel, below.steps) == (None, "temperature", None)
-    assert below.says.endswith("tells linear leak and orifice leak apart: log the temperature too")
-    assert _next(monkeypatch, doubtful, {"steps": 1.001 * bound}).protocol == "steps"
-    assert _next(monkeypatch, doubtful, {}).says.endswith(": use either, both predict the same reading")
+def test_a_protocol_that_the_data_holds_is_of_one_shape_and_length() -> None:
+    protocol = Protocol("ramps", (Segment("ramp", 400.0, 4.0), Segment("ramp", 0.0, 4.0)) * 3)
+    time_s = np.arange(0.0, protocol.duration_s, 0.1)
+
+    def held(load: Array, upto_s: float = 24.0) -> bool:
+        kept = time_s < upto_s
+        session: Any = SimpleNamespace(conditions=SimpleNamespace(time_s=time_s[kept], load=load[kept]))
+        return _is_of(protocol, session, 400.0, STANDARD.same)
+
+    asked = protocol.load_at(time_s) / 400.0
+    assert held(asked)
+    assert held(0.9 * protocol.load_at(time_s - 0.2) / 400.0 + 0.05)  # late, with a tare, by a machine that falls short
+    assert held(asked, 19.0)
+    assert not held(asked, 17.0)
+    assert not held(protocol.load_at(time_s + 2.0) / 400.0)
+    assert not held(0.5 * asked)
 
 
 def test_where_nothing_is_doubtful_what_was_never_seen_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -349,42 +402,32 @@ def test_where_gains_differ_a_recording_is_made_again_with_the_unit_in_place_and
     slipped = _next(monkeypatch, [sure], {}, zero_changes=(ZeroChange("third", 12.3, 0.02),))
     assert slipped.says.startswith("record third again, and watch unit, cable and logger at 12.3 s")
     assert slipped.says.endswith("whether the zero changes there each time")
-    doubtful = [_cause("linear_leak", 0.02, ("orifice_leak",), rivals=(("orifice_leak", 1.0),))]
-    assert _next(monkeypatch, doubtful, {"steps": 1e3}, own_gains=gains).protocol == "steps"
+    ends = {"linear_leak": _Foretold(0.1, 5.0, {"steps": (9.0, 90.0)})}
+    assert _next(monkeypatch, [_cause(*LEAK)], ends, own_gains=gains).protocol == "steps"
+    no_use = {"linear_leak": _Foretold(0.1, 5.0)}  # "use either" is less than that
+    assert _next(monkeypatch, [_cause(*LEAK)], no_use, own_gains=gains).protocol == "repeat"
+    assert _next(monkeypatch, [_cause(*LEAK)], no_use, own_gains=gains, channel="temperature").channel == "temperature"
 
 
-def test_a_law_that_a_block_stands_for_is_parted_from_its_rival_in_the_blocks_place(
+def test_a_contest_is_of_what_was_fitted_and_of_what_is_fitted_in_a_blocks_place(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    fitted: list[tuple[str, str]] = []
-
-    def in_place(found: Any, part: str, law: str) -> str:
-        fitted.append((part, law))
-        return law
-
-    seen: list[tuple[Any, Any]] = []
-    monkeypatch.setattr(_next_experiment, "_in_place_of", in_place)
-    monkeypatch.setattr(_next_experiment, "expected_margin", lambda *given: seen.append(given[:2]) or 1e3)
-    found: Any = SimpleNamespace(
-        fit=SimpleNamespace(model=MODEL.with_part("flexible_curve"), likelihood=SimpleNamespace(noise_sd=0.01))
-    )
-    for law, rival in (("contact_area", "wall_hardening"), ("dead_band", "saturation")):
-        fitted.clear()
-        seen.clear()
-        told = next_experiment(
-            found, [_cause(law, 0.02, (rival,), part="flexible_curve")],
-            [
-                SimpleNamespace(
-                    recording=SimpleNamespace(channels=()),
-                    conditions=SimpleNamespace(step_s=0.1, temperature_k=None, neighbour=None),
-                )
-            ],
-            Excitation((0.1,), (1.0,), 1, frozenset(), STANDARD), open_=False,
-        )  # fmt: skip
-        assert told is not None
-        assert told.separates == (law, rival)
-        assert {*fitted} == {("flexible_curve", law), ("flexible_curve", rival)}
-        assert {*seen} == {(law, rival)}
+    monkeypatch.setattr(_next_experiment, "_in_place_of", lambda found, part, law: (part, law))
+    monkeypatch.setattr(Contest, "settled", lambda self: self)
+    laws = (Alternative("contact_area", 3.0, "fitted contact"), Alternative("dead_band", 4.0, "fitted band"))  # type: ignore[arg-type]
+    untold = (Alternative("zero_drift", 5.0, "fitted drift"),)  # type: ignore[arg-type]
+    members = [
+        SimpleNamespace(name=name, laws=laws, untold=untold, without=f"without {name}")
+        for name in ("other", "flexible_curve", "gas_compression")
+    ]
+    found: Any = SimpleNamespace(fit="whole", members=members)
+    for name, part, rival, expected in (
+        ("contact_area", "flexible_curve", "dead_band", ("fitted contact", "fitted band")),
+        ("contact_area", "flexible_curve", "saturation", ("fitted contact", ("flexible_curve", "saturation"))),
+        ("gas_compression", "gas_compression", "zero_drift", ("whole", "fitted drift")),
+    ):
+        contest = _contest(found, _cause(name, 0.02, (rival,), part=part), rival)
+        assert (contest.cause, contest.rival, contest.without) == (*expected, f"without {part}")
 
 
 # -- names ------------------------------------------------------------------------------------------------------------

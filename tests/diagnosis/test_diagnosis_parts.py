@@ -12,13 +12,13 @@ from scipy.signal import lfilter
 from smartshoe import Recording, dynamic_protocol
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._baseline import baseline_of
+from smartshoe.diagnosis._contest import Contest
 from smartshoe.diagnosis._denoise import noise_sd
 from smartshoe.diagnosis._excitation import excitation_of
 from smartshoe.diagnosis._experiments import EXPERIMENTS
 from smartshoe.diagnosis._held_out import errors, gain, residual_of
 from smartshoe.diagnosis._lack_of_fit import repeating, slow
 from smartshoe.diagnosis._likelihood import Likelihood, fit
-from smartshoe.diagnosis._next_experiment import expected_margin
 from smartshoe.diagnosis._noise import correlated_sd
 from smartshoe.diagnosis._scale import Scale, full_scale, thinning
 from smartshoe.diagnosis._session import Session, kernel, prepare, smoothed
@@ -226,7 +226,7 @@ def test_two_equal_models_cannot_be_told_apart_by_any_experiment() -> None:
     plain = baseline_of(sessions, scale)
     found = fit(likelihood_of(sessions, plain), plain)
     for made in EXPERIMENTS.values():
-        assert expected_margin(found, found, made(800.0), 0.001, sessions[0]) == pytest.approx(0.0, abs=1e-6)
+        assert Contest(found, found, found).after(made(800.0), 0.02).margin == pytest.approx(0.0, abs=0.1)
 
 
 def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
@@ -237,10 +237,8 @@ def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     start = fit(likelihood, plain).model
     lag = fit(likelihood, start.with_part(effect("sensor_lag"), np.array([0.02, 0.1])))
     delay = fit(likelihood, start.with_part(effect("delay"), np.array([0.02])))
-    margins = {
-        name: expected_margin(lag, delay, EXPERIMENTS[name](800.0), 0.001, sessions[0])
-        for name in ("steps", "rates", "idle")
-    }
+    now = Contest(lag, delay, fit(likelihood, start))
+    margins = {name: now.after(EXPERIMENTS[name](800.0), 0.02).margin for name in ("steps", "rates", "idle")}
     assert margins["steps"] > 2 * margins["rates"]
     assert margins["steps"] > 2 * margins["idle"]
 

@@ -129,7 +129,7 @@ def test_a_narrow_range_is_told_in_newtons_and_with_its_gain_both_ways() -> None
 
 # -- what to run next ---------------------------------------------------------------------------------------------
 def _lacking(*words: str) -> Excitation:
-    every = {"rates", "holds", "rests", "minor_loops", "peaks", "pauses", "steps"}
+    every = {"rates", "holds", "rests", "minor_loops", "peaks", "shuffled_loads", "pauses", "steps"}
     return Excitation((0.1,), (1.0,), 1, frozenset(every - set(words)), STANDARD)
 
 
@@ -137,10 +137,10 @@ def _lacking(*words: str) -> Excitation:
     ("word", "protocol"),
     [
         ("rates", "rates"),
-        ("holds", "long_hold"),
+        ("holds", "holds_at_several_loads"),
         ("rests", "idle"),
         ("minor_loops", "minor_loops"),
-        ("peaks", "shuffled_loads"),
+        ("shuffled_loads", "shuffled_loads"),
         ("pauses", "pauses"),
         ("steps", "steps"),
     ],
@@ -159,6 +159,13 @@ def test_what_was_never_shown_is_run_next(word: Exposure, protocol: str) -> None
     step_s = 0.01 if word == "steps" else STEP_S
     load = told.steps.load_at(np.arange(0.0, told.steps.duration_s, step_s)) / 800.0
     assert word in _shown(load, step_s).present
+
+
+def test_where_peaks_go_with_the_clock_they_are_shuffled_first() -> None:
+    """That alone leaves every cause half sure; of one peak load it is as good as what else is lacking."""
+    found: Any = type("Found", (), {"fit": type("F", (), {"model": MODEL})})
+    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads")).protocol == "shuffled_loads"
+    assert _unseen(found, (), _lacking("rates", "steps", "shuffled_loads", "peaks")).protocol == "rates"
 
 
 @pytest.mark.parametrize(

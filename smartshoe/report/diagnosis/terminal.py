@@ -80,6 +80,7 @@ def print_design(design: Design) -> None:
         "the last column names what would follow an effect as well in its place; where the row of one that is named"
         " does not name it back, it cannot follow all that the other does",
     )
+    _several(console, "limits of these protocols", design.limits, most=None)
 
 
 def _causes(console: Console, diagnosis: Diagnosis) -> None:

@@ -118,16 +118,30 @@ def noise_of(scenario: Scenario, source: ScenarioText) -> tuple[str, float] | No
 
     Raises `ScenarioError` for one that is no number from 0 on.
     """
+    stated = _stated(scenario, source, "sensor", "noise_percent")
+    largest, name = max(stated, key=lambda one: one[0], default=(0.0, ""))
+    return (name, largest) if largest > 0.0 else None
+
+
+def sample_rate_of(scenario: Scenario, source: ScenarioText) -> float | None:
+    """The lowest ``daq.sample_rate_hz`` above zero that a unit of the scenario states, None where none does."""
+    stated = _stated(scenario, source, "daq", "sample_rate_hz")
+    return min((rate for rate, _ in stated if rate > 0.0), default=None)
+
+
+def _stated(scenario: Scenario, source: ScenarioText, table: str, key: str) -> list[tuple[float, str]]:
+    """What units state under a key of a table of their options, or of the machine's, and whose it is."""
     found: list[tuple[float, str]] = []
     for index, unit in enumerate(scenario.unit):
-        sensor = {**scenario.machine.options, **unit.options}.get("sensor")
-        given = sensor.get("noise_percent", 0.0) if isinstance(sensor, dict) else 0.0
+        options = {**scenario.machine.options, **unit.options}.get(table)
+        given = options.get(key) if isinstance(options, dict) else None
+        if given is None:
+            continue
         if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 <= given < math.inf:
-            at = ("unit", index) if "sensor" in unit.options else ("machine",)
-            raise source.error((*at, "sensor", "noise_percent"), f"is {given!r}: give a number from 0 on")
+            at = ("unit", index) if table in unit.options else ("machine",)
+            raise source.error((*at, table, key), f"is {given!r}: give a number from 0 on")
         found.append((float(given), unit.name))
-    largest, name = max(found, key=lambda one: one[0])
-    return (name, largest) if largest > 0.0 else None
+    return found
 
 
 def _record(

@@ -1,0 +1,65 @@
+"""What an experiment is foretold to tell of a cause and its rival: both fitted to what it would read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smartshoe.diagnosis._experiments import run_on
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
+from smartshoe.diagnosis._naming import odds_of_law
+from smartshoe.diagnosis._scale import Scale, thinning
+from smartshoe.diagnosis._session import Session, prepare
+from smartshoe.integrity.thresholds import Thresholds
+from smartshoe.models.extended import ExtendedModel
+from smartshoe.protocol import Protocol
+from smartshoe.units import MILLIBAR
+
+
+@dataclass(frozen=True, eq=False)
+class Contest:
+    """The ``cause`` as it is fitted, a ``rival`` in its place, and the model ``without`` either, all to the same data.
+
+    ``margin``: of -2 log likelihood, by which the rival follows worse. ``log_odds`` of the cause against the rival, as
+    a diagnosis weighs laws: no law is exact, and one that lacks less than laws usually depart by is as good.
+    """
+
+    cause: Fit
+    rival: Fit
+    without: Fit
+
+    @property
+    def margin(self) -> float:
+        return self.rival.cost - self.cause.cost
+
+    @property
+    def log_odds(self) -> float:
+        fall = self.without.cost - self.cause.cost
+        return -math.log(max(float(odds_of_law(self.margin, fall, self.cause.likelihood.thresholds)), 1e-300))
+
+    def settled(self) -> Contest:
+        """The same, the rival fitted on, as `after` does: so far only as a comparison of many asks for."""
+        return replace(self, rival=fit(self.cause.likelihood, self.rival.model, FEW_STEPS))
+
+    def after(self, protocol: Protocol, sample_time_s: float) -> Contest:
+        """The same were the protocol run once, logged every ``sample_time_s``, and the cause as it was fitted true.
+
+        The rival is fitted on to this data and that, the new recording's own offset and past free; what is without
+        either begins from the cause, as in a diagnosis.
+        """
+        known, model = self.cause.likelihood, self.cause.model
+        session = _run_once(model, protocol, sample_time_s, known.thresholds)
+        both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
+        less = replace(model, parts=tuple(one for one in model.parts if one.name in self.without.model.names))
+        return Contest(weighed(both, model), fit(both, self.rival.model, FEW_STEPS), fit(both, less, FEW_STEPS))
+
+
+def _run_once(model: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:
+    peak_n = model.full_scale_load_n
+    recording = run_on(model, protocol, peak_n, sample_time_s)
+    scale = Scale(peak_n, model.full_scale_reading, MILLIBAR)
+    factors = thinning([recording], scale, thresholds)
+    (session,) = prepare([recording], [np.ones(len(recording), dtype=bool)], [False], scale, factors, thresholds)
+    return session
