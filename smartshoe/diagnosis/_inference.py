@@ -144,6 +144,9 @@ def _sought(begun: State, progress: Progress) -> State:
     if any(isinstance(one.effect, CoreEffect) for one in state.chosen):
         progress("trying other relaxation rates of the baseline")
         state = better_from(with_another_pole(state), state, progress)
+    if is_stretched(state.fit.model):
+        progress("trying what delays a reading in the place of an arm that is at its bounds")
+        state = better_from(with_a_latency(begun), state, progress)
     if state.fit.model.relaxing_share < 0.0:
         state = better_from(with_an_arm_that_creeps(state), state, progress)
     return better_from_one(begun, state, progress)

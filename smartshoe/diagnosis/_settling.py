@@ -47,7 +47,7 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
             return known
         path.append(found.model)
         state = state_at(found, state.banned, given)
-        best = state if _is_likelier_by_now(state, best) else best
+        best = state if _has_as_much_evidence(state, best) else best
     if best is not state:  # what was asked for about it has been tried
         state = replace(best, best=best.evidence.posterior(best.start))
     for name, arm in arms_of(state.fit.model):
@@ -58,10 +58,14 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
     return replace(state, path=tuple(path))
 
 
-def _is_likelier_by_now(state: State, other: State) -> bool:
-    """Whether there is more evidence for the fit of ``state``, each about its own fit, under its noise."""
-    before = Evidence(other.given, state.evidence.noise_sd)
-    return state.evidence.posterior(state.start).score <= before.posterior(other.start).score
+def _has_as_much_evidence(state: State, other: State) -> bool:
+    """Whether there is as much evidence for the fit of ``state``, each about its own, under the lower of their noises.
+
+    What no column of a linearisation reaches counts as noise in it.
+    """
+    noise_sd = min(state.evidence.noise_sd, other.evidence.noise_sd)
+    new, old = (Evidence(one.given, noise_sd).posterior(one.start).score for one in (state, other))
+    return new <= old
 
 
 def better_from(begun: State, state: State, progress: Progress) -> State:

@@ -218,20 +218,23 @@ def test_the_fitted_set_with_most_evidence_settles_wherever_the_search_ends(
 ) -> None:
     """The search comes back to a set whose fit kept less than its linearisation had promised."""
     scores = {"first": 3.0, "second": 2.0, "third": 1.0} | {most: 0.0}
-    steps = iter(["second", "third"])
+    steps, noises = iter(["second", "third"]), []
 
     def known(name: str, noise_sd: float) -> Any:
-        assert noise_sd in (0.1, 0.2, 0.3)
         return SimpleNamespace(noise_sd=noise_sd, odds=10.0, posterior=lambda of: SimpleNamespace(score=scores[of]))
 
     def state(name: str) -> Any:
-        noise_sd = {"first": 0.3, "second": 0.2, "third": 0.1}[name]
+        noise_sd = {"first": 0.3, "second": 0.1, "third": 0.05}[name]
         return SimpleNamespace(
             given=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), chosen=(), start=name,
             evidence=known(name, noise_sd), banned=(), improved=0.0 if name == "third" else 20.0, likelihood=lambda: 0,
         )  # fmt: skip
 
-    monkeypatch.setattr(_settling, "Evidence", known)
+    def weighed(name: str, noise_sd: float) -> Any:
+        noises.append(noise_sd)
+        return known(name, noise_sd)
+
+    monkeypatch.setattr(_settling, "Evidence", weighed)
     monkeypatch.setattr(_settling, "_promising", lambda one: ["asked"])
     monkeypatch.setattr(_settling, "with_members", lambda given, asked, model, likelihood: model)
     monkeypatch.setattr(_settling, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model))
@@ -242,6 +245,7 @@ def test_the_fitted_set_with_most_evidence_settles_wherever_the_search_ends(
     ended: Any = _settling.settled(state("first"), lambda said: None)
     assert ended.fit.model.names == (most,)
     assert len(ended.path) == 3
+    assert noises == [0.1, 0.1, 0.05, 0.05]  # of two states the lower
     if most != "third":  # what is asked for about it is what was fitted, not what the search tried next
         assert ended.best.score == 0.0
 

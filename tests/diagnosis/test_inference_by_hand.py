@@ -64,7 +64,7 @@ class _Sure(float):
 @pytest.fixture
 def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     told = SimpleNamespace(
-        independent=2, folds=2, stretched=False, beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
+        independent=2, folds=2, stretched=(), beyond=False, share=0.1, chosen=[], changes=[], lawful=None, said=[],
         unlikely=(), changeable=[], names={}, refused={}, errors={}, stepped=(), is_law=True, members=(), parts={},
         alone=None, weighed=[],
     )  # fmt: skip
@@ -116,7 +116,9 @@ def flow(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(_inference, "folds_of", lambda *given: ["fold"] * told.folds)
     monkeypatch.setattr(_inference, "Likelihood", lambda *given: "likelihood")
     monkeypatch.setattr(_inference, "weighed", lambda *given: plain)
-    monkeypatch.setattr(_inference, "is_stretched", lambda model: told.stretched)
+    monkeypatch.setattr(
+        _inference, "is_stretched", lambda model: ("first" if model is plain.model else "last") in told.stretched
+    )
     monkeypatch.setattr(_inference, "is_beyond_memory", lambda model, thresholds: told.beyond)
     monkeypatch.setattr(_inference, "State", lambda *given: state("first"))
     monkeypatch.setattr(_inference, "settled", settled)
@@ -278,12 +280,15 @@ def test_recordings_that_are_told_gains_of_their_own_are_gone_through_with_them(
 
 
 def test_what_the_first_fits_look_like_decides_what_else_is_tried(flow: Any) -> None:
-    flow.stretched = True
+    flow.stretched = ("last",)
+    assert flow.infer().fit.model == "(settled late first or settled first)"
+    assert "trying what delays a reading in the place of an arm that is at its bounds" in flow.said
+    flow.stretched = ("first",)
     assert flow.infer().fit.model == "settled (late first or first)"
     flow.beyond = True  # from what the search began with
     assert flow.infer().fit.model == "(settled usual (late first or first) or settled (late first or first))"
     assert "beginning anew from arms as units have" in flow.said
-    flow.stretched = False
+    flow.stretched = ()
     assert flow.infer().fit.model == "(settled usual first or settled first)"
     flow.beyond = False
     flow.chosen = [SimpleNamespace(effect=effect("dead_band"))]
