@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from smartshoe.arrays import Array
 from smartshoe.diagnosis._experiments import run_on
-from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, weighed
+from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, weighed, within_bounds
 from smartshoe.diagnosis._naming import odds_of_law
 from smartshoe.diagnosis._scale import Scale, thinning
 from smartshoe.diagnosis._session import Session, prepare
@@ -43,17 +45,41 @@ class Contest:
         """The same, the rival fitted on, as `after` does: so far only as a comparison of many asks for."""
         return replace(self, rival=fit(self.cause.likelihood, self.rival.model, FEW_STEPS))
 
-    def after(self, protocol: Protocol, sample_time_s: float) -> Contest:
+    def after(self, protocol: Protocol, sample_time_s: float, least: float = -math.inf) -> Contest | None:
         """The same were the protocol run once, logged every ``sample_time_s``, and the cause as it was fitted true.
 
         The rival is fitted on to this data and that, the new recording's own offset and past free; what is without
-        either begins from the cause, as in a diagnosis.
+        either begins from the cause, as in a diagnosis. None where the margin grows by no more than ``least``: by what
+        the rival misses of that recording as it is it cannot, however it is fitted on.
         """
         known, model = self.cause.likelihood, self.cause.model
         session = _run_once(model, protocol, sample_time_s, known.thresholds)
+        if Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model) <= least:
+            return None
         both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
-        less = replace(model, parts=tuple(one for one in model.parts if one.name in self.without.model.names))
-        return Contest(weighed(both, model), fit(both, self.rival.model, FEW_STEPS), fit(both, less, FEW_STEPS))
+        cause = weighed(both, model)
+
+        def fitted(start: ExtendedModel, rows: list[Array]) -> Fit:
+            return fit(both, start, FEW_STEPS, [*rows, rows_of(start, session)], beside=cause.cost)
+
+        rival = fitted(*self._of_rival)
+        if rival.cost - cause.cost - self.margin <= least:
+            return None
+        return Contest(cause, rival, fitted(*self._of_less))
+
+    @cached_property
+    def _of_rival(self) -> tuple[ExtendedModel, list[Array]]:
+        return self._begun(self.rival.model)
+
+    @cached_property
+    def _of_less(self) -> tuple[ExtendedModel, list[Array]]:
+        model, kept = self.cause.model, self.without.model.names
+        return self._begun(replace(model, parts=tuple(one for one in model.parts if one.name in kept)))
+
+    def _begun(self, model: ExtendedModel) -> tuple[ExtendedModel, list[Array]]:
+        """Where a fit begins, whatever protocol is run, and what it begins with of this data."""
+        start = within_bounds(model)
+        return start, [rows_of(start, one) for one in self.cause.likelihood.sessions]
 
 
 def _run_once(model: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:

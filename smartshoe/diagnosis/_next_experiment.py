@@ -92,8 +92,8 @@ def _told_apart(found: Inference, cause: Cause, sessions: Sequence[Session], thr
     no_name = -2.0 * math.log(thresholds.false_name)  # less tells nothing apart
     foretold: list[tuple[Protocol, Contest]] = []
     for protocol in sorted(left, key=lambda one: one.duration_s):
-        then = now.after(protocol, least_s)
-        if then.margin - now.margin > no_name:
+        then = now.after(protocol, least_s, no_name)
+        if then is not None:
             foretold.append((protocol, then))
             if _rules_out(then, thresholds):
                 break

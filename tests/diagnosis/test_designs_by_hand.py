@@ -244,10 +244,11 @@ class _Foretold:
         self.cause = SimpleNamespace(likelihood=SimpleNamespace(sessions=()))
         self.asked: list[str] = []
 
-    def after(self, protocol: Any, sample_time_s: float) -> _Foretold:
+    def after(self, protocol: Any, sample_time_s: float, least: float) -> _Foretold | None:
         assert sample_time_s == 0.005  # of the recording that was logged most quickly
         self.asked.append(protocol.name)
-        return _Foretold(*self._then.get(protocol.name, (self.log_odds, self.margin)))
+        then = _Foretold(*self._then.get(protocol.name, (self.log_odds, self.margin)))
+        return then if then.margin - self.margin > least else None
 
 
 ENDS = -math.log(0.3)  # log odds from which on a rival is no equivalent

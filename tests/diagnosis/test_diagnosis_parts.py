@@ -241,6 +241,13 @@ def test_steps_tell_a_lag_from_a_delay_better_than_triangles_do() -> None:
     margins = {name: now.after(EXPERIMENTS[name](800.0), 0.02).margin for name in ("steps", "rates", "idle")}
     assert margins["steps"] > 2 * margins["rates"]
     assert margins["steps"] > 2 * margins["idle"]
+    for name, margin in margins.items():  # whether it is asked for or not, it grows by as much
+        grown = margin - now.margin
+        assert now.after(EXPERIMENTS[name](800.0), 0.02, 1.01 * grown) is None
+        assert now.after(EXPERIMENTS[name](800.0), 0.02, 0.99 * grown).margin == margin
+    for name in ("steps", "idle"):  # whatever the rival were fitted to, it cannot miss more than it does as it is
+        before = Contest(lag, lag, now.without).after(EXPERIMENTS[name](800.0), 0.02, 1.0)
+        assert before is None
 
 
 def test_units_of_the_scale_are_the_readings() -> None:
