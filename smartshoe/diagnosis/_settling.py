@@ -26,10 +26,10 @@ ROUND_STEPS = 6  # of a fit that is linearised anew anyway
 def settled(state: State, progress: Progress, known: State | None = None) -> State:
     """Fit, linearise and search in turn until nothing is worth another fit, or a set comes back.
 
-    Of all that were fitted the set with most evidence is taken: a linearisation may promise more than its fit keeps,
-    and the last is but where the search came to its end. Then an effect's arm is tried in the place of the baseline's:
-    it may be the unit's only one. Where a fit comes upon the path of a state that is ``known``, it would go the same
-    way, and that state is the answer.
+    Where it goes round without an end, a linearisation promises more than its fit keeps: of all that were fitted the
+    set with most evidence is taken. Then an effect's arm is tried in the place of the baseline's: it may be the unit's
+    only one. Where a fit comes upon the path of a state that is ``known``, it would go the same way, and that state is
+    the answer.
     """
     seen: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
     path, best = [state.fit.model], state
@@ -48,7 +48,7 @@ def settled(state: State, progress: Progress, known: State | None = None) -> Sta
         path.append(found.model)
         state = state_at(found, state.banned, given)
         best = state if _has_as_much_evidence(state, best) else best
-    if best is not state:  # what was asked for about it has been tried
+    if best is not state and state.improved >= state.evidence.odds:  # what was asked for about it has been tried
         state = replace(best, best=best.evidence.posterior(best.start))
     for name, arm in arms_of(state.fit.model):
         likelihood = state.likelihood()

@@ -14,7 +14,6 @@ from smartshoe import Recording, dynamic_protocol
 from smartshoe.diagnosis import Thresholds
 from smartshoe.diagnosis._evidence import Evidence
 from smartshoe.diagnosis._likelihood import Fit, Likelihood, fit
-from smartshoe.diagnosis._next_experiment import expected_margin
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._search import additions, allowed, search, step
 from smartshoe.diagnosis._sensitivity import Linearised, departures, linearised, nuisance_precision, nuisances
@@ -23,7 +22,6 @@ from smartshoe.diagnosis._state import searched, state_at, with_members
 from smartshoe.diagnosis._validation import apart, error_of
 from smartshoe.models.effects import Conditions, effect
 from smartshoe.models.extended import ExtendedModel
-from smartshoe.protocol import Protocol, Segment
 from smartshoe.units import MILLIBAR
 
 Array = NDArray[np.float64]
@@ -471,25 +469,3 @@ def test_two_models_are_apart_by_what_they_read_differently(sessions: list[Sessi
     assert apart(sessions, MODEL, higher) == pytest.approx(0.01 * float(np.std(load)), rel=0.1)
     assert apart(sessions, MODEL, MODEL) == 0.0
     assert error_of(sessions, TRUTH) < SD < error_of(sessions, MODEL)
-
-
-# -- experiments ----------------------------------------------------------------------------------------------------
-def test_an_expected_margin_is_what_the_rival_cannot_make_up_for(sessions: list[Session]) -> None:
-    """By hand: the rival's linear step weighs the new data's misfit against its misfit of the old."""
-    likelihood = Likelihood(sessions, SD, MODEL, STANDARD)
-    truth, rival = fit(likelihood, TRUTH), fit(likelihood, MODEL.with_part(effect("rate_gain"), np.array([0.02, 1.0])))
-    up, down = Segment("ramp", 800.0, 3.0), Segment("ramp", 0.0, 1.5)  # from its first moment on
-    protocol = Protocol("at once", (up, down, up, down))
-    at = sessions[0].conditions
-    time_s = np.arange(0.0, protocol.duration_s, at.step_s)
-    conditions = Conditions(time_s, protocol.load_at(time_s) / 800.0, at.step_s)
-    reading, slopes = rival.model.sensitivities(conditions)
-    off = (truth.model.simulate(conditions) - reading) / SD
-    known = np.linalg.inv(rival.covariance)
-    root = np.linalg.cholesky(known).T
-    wide, target = np.concatenate([slopes / SD, root]), np.concatenate([off, np.zeros(root.shape[0])])
-    left = target - wide @ np.linalg.lstsq(wide, target, rcond=None)[0]
-    found = expected_margin(truth, rival, protocol, SD, sessions[0])
-    assert found == pytest.approx(float(left @ left), rel=1e-3)
-    # A protocol twice tells twice as much at most; half the noise four times.
-    assert expected_margin(truth, rival, protocol, 0.5 * SD, sessions[0]) == pytest.approx(4.0 * found, rel=0.6)

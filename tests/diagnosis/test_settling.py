@@ -71,6 +71,7 @@ def _ends(
     monkeypatch.setattr(_settling, "fit", fitted)
     monkeypatch.setattr(_settling, "apart", lambda *given: apart)
     monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
+    monkeypatch.setattr(_settling, "_has_as_much_evidence", lambda state, other: True)  # the last, wherever it ends
     return _settling.settled(first, lambda said: None, known), len(fits)  # type: ignore[arg-type]
 
 
@@ -277,6 +278,7 @@ def test_of_as_many_strengths_the_likeliest_is_taken_and_more_of_them_where_the_
 
     monkeypatch.setattr(_settling, "state_at", stated)
     monkeypatch.setattr(_settling, "replace", lambda one, **given: one)
+    monkeypatch.setattr(_settling, "_has_as_much_evidence", lambda state, other: True)
     said: list[str] = []
     assert _settling.settled(state("first", 50.0), said.append).name == "next"  # type: ignore[attr-defined]
     assert (taken, said) == ([(chosen, 6, ("z",), f"about {chosen}")], ["fitting a, b c"])
