@@ -304,7 +304,7 @@ class TestSensors:
     def test_of_rates_farther_apart_the_curve_is_told_and_one_cause_beside_it_at_most(
         self, measured: Path, seed: int
     ) -> None:
-        """What relaxes in 22 of 32 draws; a set in six and friction in three of the others, which are wrong."""
+        """What relaxes in 23 of 32 draws; a set in five and friction in three of the others, which are wrong."""
         files = _shaken(_files(measured, "vhb_0d0[15]", "position_mm"), seed)
         found = diagnose(files, hold_out=_shaken(_files(measured, "vhb_0d03", "position_mm"), seed + 10))
         families = [cause.effect.family for cause in found.causes]
