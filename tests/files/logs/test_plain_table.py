@@ -223,3 +223,13 @@ def test_a_time_that_is_a_date_is_refused_where_seconds_are_promised(tmp_path: P
     (tmp_path / "a.csv").write_text("time_s,force_n\n2024-01-01T10:00:00,1\n2024-01-01T10:00:01,2\n")
     with pytest.raises(FormatError, match="line 2"):
         smartshoe.read(tmp_path / "a.csv")
+
+
+def test_a_remark_that_is_called_as_a_column_of_a_foreign_unit_is_kept(tmp_path: Path) -> None:
+    time_s = 0.01 * np.arange(5)
+    capacitance = Channel.from_values("cap", np.arange(5.0), declared("fF"), "sensor")
+    written = Recording(time_s, {"cap": capacitance}, "a", metadata={"cap_ff": "of plates"})
+    smartshoe.write(written, tmp_path / "a.csv")
+    found = smartshoe.read(tmp_path / "a.csv")
+    assert (found.metadata["cap_ff"], found["cap"].unit.symbol) == ("of plates", "fF")
+    assert "unit cap_ff" not in found.metadata

@@ -188,13 +188,11 @@ def read(path: Path) -> Sheet:
     for column, role in roles.items():
         if role not in _ROLES or column not in header:
             raise FormatError(f"{path}: remark 'role {column}: {role}' names no column or role: correct it")
-    units = {cell: said[f"unit {cell}"][0] for cell in header if f"unit {cell}" in said}
+    units = {cell: said.pop(f"unit {cell}")[0] for cell in header if f"unit {cell}" in said}
     metadata = {
         key: "\n".join(texts)
         for key, texts in said.items()
-        if key not in ("name", "unit", "note")
-        and not key.startswith("role ")
-        and key.removeprefix("unit ") not in units
+        if key not in ("name", "unit", "note") and not key.startswith("role ")
     }
     columns = []
     for index, cell in enumerate(header):
