@@ -18,6 +18,11 @@ RATE_DIGITS = 9
 """Of a sampling rate, which is one over a step read from a file: 100 Hz, not 100.00000000000213."""
 
 
+def without_rounding(rate_hz: float) -> float:
+    """A sampling rate to ``RATE_DIGITS``."""
+    return float(f"{rate_hz:.{RATE_DIGITS}g}")
+
+
 def sha256_of(source: str) -> str | None:
     """The SHA-256 of the file ``source`` in hex digits; None where there is no such file."""
     path = Path(source)
@@ -39,6 +44,6 @@ def calibrated_on(calibration: Calibration, recordings: Sequence[Recording]) -> 
         calibration,
         load_range_n=(min(float(load.min()) for load in loads), max(float(load.max()) for load in loads)),
         rate_range_n_per_s=rate_range((one.time_s, load) for one, load in zip(recordings, loads, strict=True)),
-        sample_rate_hz=float(f"{recordings[0].sample_rate_hz:.{RATE_DIGITS}g}"),
+        sample_rate_hz=without_rounding(recordings[0].sample_rate_hz),
         sources=tuple({"name": source, "sha256": sha256_of(source)} for source in sources),
     )

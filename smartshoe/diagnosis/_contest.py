@@ -6,18 +6,12 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._experiments import run_on
+from smartshoe.diagnosis._experiments import sessions_on
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, weighed, within_bounds
 from smartshoe.diagnosis._naming import odds_of_law
-from smartshoe.diagnosis._scale import Scale, thinning
-from smartshoe.diagnosis._session import Session, prepare
-from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
-from smartshoe.units import MILLIBAR
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +47,7 @@ class Contest:
         the rival misses of that recording as it is it cannot, however it is fitted on.
         """
         known, model = self.cause.likelihood, self.cause.model
-        session = _run_once(model, protocol, sample_time_s, known.thresholds)
+        (session,), _ = sessions_on(model, [protocol], model.full_scale_load_n, sample_time_s, known.thresholds)
         if Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model) <= least:
             return None
         both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
@@ -80,12 +74,3 @@ class Contest:
         """Where a fit begins, whatever protocol is run, and what it begins with of this data."""
         start = within_bounds(model)
         return start, [rows_of(start, one) for one in self.cause.likelihood.sessions]
-
-
-def _run_once(model: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:
-    peak_n = model.full_scale_load_n
-    recording = run_on(model, protocol, peak_n, sample_time_s)
-    scale = Scale(peak_n, model.full_scale_reading, MILLIBAR)
-    factors = thinning([recording], scale, thresholds)
-    (session,) = prepare([recording], [np.ones(len(recording), dtype=bool)], [False], scale, factors, thresholds)
-    return session

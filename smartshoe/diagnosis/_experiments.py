@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from smartshoe.diagnosis._scale import Scale, thinning
+from smartshoe.diagnosis._session import Session, prepare
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.effects import Conditions
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol, Segment, dynamic_protocol
 from smartshoe.recording import Recording
+from smartshoe.units import MILLIBAR
 
 STEP_S = 0.1  # in which a machine goes from load to load at once; half and twice as long changed no proposal
 
@@ -104,6 +108,17 @@ def run_on(unit: ExtendedModel, protocol: Protocol, peak_n: float, sample_time_s
     load_n = protocol.load_at(time_s)
     reading = unit.reading(Conditions(time_s, load_n / peak_n, sample_time_s))
     return Recording.from_arrays(time_s=time_s, force_n=load_n, pressure_mbar=reading, name=protocol.name)
+
+
+def sessions_on(
+    unit: ExtendedModel, protocols: Sequence[Protocol], peak_n: float, sample_time_s: float, thresholds: Thresholds
+) -> tuple[list[Session], list[int]]:
+    """What `run_on` gives for each protocol, as a diagnosis prepares it, and by how much each was thinned."""
+    recordings = [run_on(unit, one, peak_n, sample_time_s) for one in protocols]
+    scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
+    factors = thinning(recordings, scale, thresholds)
+    usable = [np.ones(len(one), dtype=bool) for one in recordings]
+    return prepare(recordings, usable, [False] * len(recordings), scale, factors, thresholds), factors
 
 
 def _press(load_n: float, hold_s: float, rest_s: float, peak_n: float) -> list[Segment]:

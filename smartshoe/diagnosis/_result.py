@@ -249,10 +249,9 @@ class Diagnosis(Summarised):
 
     @property
     def _sample_rate_hz(self) -> float:
-        from smartshoe.calibration.provenance import RATE_DIGITS
+        from smartshoe.calibration.provenance import without_rounding
 
-        steps_s = np.diff(self.traces[0].time_s)
-        return float(f"{1.0 / float(np.median(steps_s)):.{RATE_DIGITS}g}")
+        return without_rounding(1.0 / float(np.median(np.diff(self.traces[0].time_s))))
 
     def plot(self) -> Figure:
         """A figure: by recording, what the baseline and the extended model leave of the reading over time.

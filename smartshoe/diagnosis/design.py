@@ -12,19 +12,16 @@ import numpy as np
 from smartshoe.arrays import Array, require_positive
 from smartshoe.diagnosis._baseline import USUAL
 from smartshoe.diagnosis._excitation import excitation_of
-from smartshoe.diagnosis._experiments import run_on
+from smartshoe.diagnosis._experiments import sessions_on
 from smartshoe.diagnosis._inference import can_validate
 from smartshoe.diagnosis._limits import ONE_CYCLE
 from smartshoe.diagnosis._naming import odds_of_law
-from smartshoe.diagnosis._scale import Scale, thinning
 from smartshoe.diagnosis._sensitivity import Candidate, Linearised, linearised
-from smartshoe.diagnosis._session import prepare
 from smartshoe.errors import UsageError
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
-from smartshoe.units import MILLIBAR
 
 USUAL_NOISE_PERCENT, USUAL_RATE_HZ = 0.1, 100.0  # of full scale; of a log: where no unit states its own
 
@@ -122,11 +119,7 @@ def design(
         raise UsageError(
             f"no load is put on in {', '.join(one.name for one in protocols)}: give a protocol that presses"
         )
-    recordings = [run_on(unit, protocol, peak_n, 1.0 / sample_rate_hz) for protocol in protocols]
-    scale = Scale(peak_n, unit.full_scale_reading, MILLIBAR)
-    usable = [np.ones(len(one), dtype=bool) for one in recordings]
-    factors = thinning(recordings, scale, limits)
-    sessions = prepare(recordings, usable, [False] * len(recordings), scale, factors, limits)
+    sessions, factors = sessions_on(unit, protocols, peak_n, 1.0 / sample_rate_hz, limits)
     columns = linearised(unit, sessions, limits)
     # The mean of neighbours that thinning takes has less noise than a sample.
     sd = 0.01 * noise_percent / math.sqrt(min(factors))

@@ -212,47 +212,6 @@ def test_in_the_end_an_effects_arm_is_tried_in_the_baselines_place(
     assert banned == [("z",), ("z",)] * simpler
 
 
-@pytest.mark.parametrize("settles", [False, True])
-@pytest.mark.parametrize("most", ["first", "second", "third"])
-def test_where_a_search_goes_round_the_fitted_set_with_most_evidence_is_taken(
-    monkeypatch: pytest.MonkeyPatch, most: str, settles: bool
-) -> None:
-    """Linearisations promise more than fits keep; where nothing more is promised, that is the end."""
-    scores = {"first": 3.0, "second": 2.0, "third": 1.0} | {most: 0.0}
-    steps, noises = iter(["second", "third"]), []
-    monkeypatch.setattr(_settling, "ROUNDS", 2)
-
-    def known(name: str, noise_sd: float) -> Any:
-        return SimpleNamespace(noise_sd=noise_sd, odds=10.0, posterior=lambda of: SimpleNamespace(score=scores[of]))
-
-    def state(name: str) -> Any:
-        noise_sd = {"first": 0.3, "second": 0.1, "third": 0.05}[name]
-        return SimpleNamespace(
-            given=name, fit=SimpleNamespace(model=SimpleNamespace(names=(name,), parts=())), chosen=(), start=name,
-            evidence=known(name, noise_sd), banned=(), improved=0.0 if settles and name == "third" else 20.0,
-            likelihood=lambda: 0,
-        )  # fmt: skip
-
-    def weighed(name: str, noise_sd: float) -> Any:
-        noises.append(noise_sd)
-        return known(name, noise_sd)
-
-    monkeypatch.setattr(_settling, "Evidence", weighed)
-    monkeypatch.setattr(_settling, "_promising", lambda one: ["asked"])
-    monkeypatch.setattr(_settling, "with_members", lambda given, asked, model, likelihood: model)
-    monkeypatch.setattr(_settling, "fit", lambda likelihood, model, steps: SimpleNamespace(model=model))
-    monkeypatch.setattr(_settling, "_best_of", lambda fits, one: (fits[0], None))
-    monkeypatch.setattr(_settling, "state_at", lambda found, banned, given: state(next(steps)))
-    monkeypatch.setattr(_settling, "arms_of", lambda model: [])
-    monkeypatch.setattr(_settling, "replace", lambda one, **given: SimpleNamespace(**{**vars(one), **given}))
-    ended: Any = _settling.settled(state("first"), lambda said: None)
-    assert ended.fit.model.names == ("third" if settles else most,)
-    assert len(ended.path) == 3
-    assert noises == [0.1, 0.1, 0.05, 0.05]  # of two states the lower
-    if most != "third" and not settles:  # what is asked for about it is what was fitted, not what the search tried next
-        assert ended.best.score == 0.0
-
-
 # -- laws -------------------------------------------------------------------------------------------------------------
 def test_a_law_takes_its_blocks_place_and_bans_it_where_it_misses_little(monkeypatch: pytest.MonkeyPatch) -> None:
     curve = next(one for family in blocks().values() for one in family if one.is_memoryless)

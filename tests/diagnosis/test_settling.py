@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -26,13 +27,25 @@ class _State:
     found: str
     improved: float
     path: tuple[Any, ...] = ()
+    score: float = 0.0
+    noise_sd: float = 0.1
+    best: Any = None
 
-    given = thresholds = None
+    thresholds = None
     banned = ()
 
     @property
+    def given(self) -> _State:
+        return self
+
+    @property
+    def start(self) -> str:
+        return self.fitted
+
+    @property
     def evidence(self) -> Any:
-        return SimpleNamespace(odds=ODDS)
+        about = {self.fitted: SimpleNamespace(score=self.score)}
+        return SimpleNamespace(odds=ODDS, noise_sd=self.noise_sd, posterior=about.__getitem__)
 
     @property
     def fit(self) -> Any:
@@ -56,7 +69,12 @@ def _model(names: str) -> Any:
 
 
 def _ends(
-    monkeypatch: pytest.MonkeyPatch, first: _State, then: list[_State], known: _State | None = None, apart: float = 0.0
+    monkeypatch: pytest.MonkeyPatch,
+    first: _State,
+    then: list[_State],
+    known: _State | None = None,
+    apart: float = 0.0,
+    weighed: Callable[[_State, float], Any] = lambda given, noise_sd: given.evidence,
 ) -> tuple[Any, int]:
     """The state that it ends in, and how many fits that took; all models of the same effects are ``apart``."""
     coming = iter(then)
@@ -71,7 +89,7 @@ def _ends(
     monkeypatch.setattr(_settling, "fit", fitted)
     monkeypatch.setattr(_settling, "apart", lambda *given: apart)
     monkeypatch.setattr(_settling, "state_at", lambda *given: next(coming))
-    monkeypatch.setattr(_settling, "_has_as_much_evidence", lambda state, other: True)  # the last, wherever it ends
+    monkeypatch.setattr(_settling, "Evidence", weighed)
     return _settling.settled(first, lambda said: None, known), len(fits)  # type: ignore[arg-type]
 
 
@@ -100,6 +118,31 @@ def test_it_ends_in_any_case(monkeypatch: pytest.MonkeyPatch) -> None:
     ever = [_State("ab"[k % 2] * (k + 1), "c", 500.0) for k in range(20)]
     end, fits = _ends(monkeypatch, _State("", "c", 500.0), ever)
     assert (end.itself, fits) == (ever[_settling.ROUNDS - 1].itself, _settling.ROUNDS)
+
+
+@pytest.mark.parametrize("settles", [False, True])
+@pytest.mark.parametrize("most", ["a", "b", "c"])
+def test_where_a_search_goes_round_the_fitted_set_with_most_evidence_is_taken(
+    monkeypatch: pytest.MonkeyPatch, most: str, settles: bool
+) -> None:
+    """Linearisations promise more than fits keep; where nothing more is promised, that is the end."""
+    noises: list[float] = []
+    scores = {"a": 3.0, "b": 2.0, "c": 1.0} | {most: 0.0}
+    noise_sd = {"a": 0.3, "b": 0.1, "c": 0.05}
+    first, *then = (
+        _State(one, "x", 0.0 if settles and one == "c" else 2.0 * ODDS, (), scores[one], noise_sd[one]) for one in "abc"
+    )
+
+    def weighed(given: _State, noise_sd: float) -> Any:
+        noises.append(noise_sd)
+        return given.evidence
+
+    monkeypatch.setattr(_settling, "ROUNDS", 2)
+    end, fits = _ends(monkeypatch, first, then, weighed=weighed)
+    assert (end.fitted, fits, len(end.path)) == ("c" if settles else most, 2, 3)
+    assert noises == [0.1, 0.1, 0.05, 0.05]  # of two states the lower
+    if most != "c" and not settles:  # what is asked for about it is what was fitted, not what the search tried next
+        assert end.best.score == 0.0
 
 
 @pytest.mark.parametrize(
