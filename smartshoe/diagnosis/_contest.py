@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from smartshoe.arrays import Array
-from smartshoe.diagnosis._experiments import sessions_on
+from smartshoe.diagnosis._experiments import EXPERIMENTS, sessions_on
 from smartshoe.diagnosis._likelihood import FEW_STEPS, Fit, Likelihood, fit, rows_of, weighed, within_bounds
 from smartshoe.diagnosis._naming import odds_of_law
+from smartshoe.diagnosis._session import Session
+from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.protocol import Protocol
 
@@ -47,7 +49,7 @@ class Contest:
         the rival misses of that recording as it is it cannot, however it is fitted on.
         """
         known, model = self.cause.likelihood, self.cause.model
-        (session,), _ = sessions_on(model, [protocol], model.full_scale_load_n, sample_time_s, known.thresholds)
+        session = _foretold(model, protocol, sample_time_s, known.thresholds)
         if Likelihood((session,), known.noise_sd, model, known.thresholds).cost(self.rival.model) <= least:
             return None
         both = Likelihood((*known.sessions, session), known.noise_sd, model, known.thresholds)
@@ -74,3 +76,10 @@ class Contest:
         """Where a fit begins, whatever protocol is run, and what it begins with of this data."""
         start = within_bounds(model)
         return start, [rows_of(start, one) for one in self.cause.likelihood.sessions]
+
+
+@lru_cache(maxsize=len(EXPERIMENTS))
+def _foretold(unit: ExtendedModel, protocol: Protocol, sample_time_s: float, thresholds: Thresholds) -> Session:
+    """What the unit would read, prepared; kept, since each of its doubtful causes asks for the same protocols."""
+    (session,), _ = sessions_on(unit, [protocol], unit.full_scale_load_n, sample_time_s, thresholds)
+    return session
