@@ -105,8 +105,7 @@ def law_or_block(lawful: State, state: State) -> State:
     missed = error_of(sessions, lawful.fit.model) ** 2 - error_of(sessions, state.fit.model) ** 2
     if missed <= state.thresholds.tolerable**2 and effect_count(lawful.fit.model) <= effect_count(state.fit.model):
         return lawful
-    by_law = evidence_about(lawful.fit.model, state.evidence)[1]
-    return lawful if by_law.score <= state.evidence.posterior(state.start).score else state
+    return lawful if _has_as_much_evidence(lawful, state) else state
 
 
 def _is_simpler(other: Fit, state: State) -> bool:

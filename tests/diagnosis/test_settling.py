@@ -228,27 +228,42 @@ def test_the_simpler_is_taken_where_two_hardly_read_differently(
 @pytest.mark.parametrize(
     ("law", "near", "far"),
     [
-        (told_fit(99.0, "a"), (True, True, True), (True, True, False)),
-        (told_fit(99.0, "a", "b"), (True, True, False), (True, True, False)),  # a law that needs company
+        (told_fit(99.0, "a"), (True, True), (True, False)),
+        (told_fit(99.0, "a", "b"), (True, False), (True, False)),  # a law that needs company
     ],
 )
 def test_a_block_stays_where_there_is_more_evidence_for_it_than_for_a_law(
     monkeypatch: pytest.MonkeyPatch, law: Any, near: tuple[bool, ...], far: tuple[bool, ...]
 ) -> None:
     """Not where a law with no more effects leaves no more beside it than a good unit's imperfections do."""
-    evidence = SimpleNamespace(posterior=lambda members: SimpleNamespace(score=7.0))
     given = SimpleNamespace(sessions=())
-    state: Any = SimpleNamespace(thresholds=STANDARD, evidence=evidence, fit=told_fit(1.0, "c"), start=(), given=given)
+    state: Any = SimpleNamespace(thresholds=STANDARD, fit=told_fit(1.0, "c"), given=given)
     lawful: Any = SimpleNamespace(fit=law)
     for by, told in ((0.999, near), (1.001, far)):
         left = {law.model.names: np.hypot(0.01, by * STANDARD.tolerable), ("c",): 0.01}
         monkeypatch.setattr(_settling, "error_of", lambda sessions, model, left=left: left[model.names])
-        for score, is_law in zip((6.9, 7.0, 7.1), told, strict=True):
-            monkeypatch.setattr(
-                _settling, "evidence_about", lambda *given, score=score: (None, SimpleNamespace(score=score))
-            )
-            found = _settling.law_or_block(lawful, state)
-            assert (found is lawful) is is_law
+        for has, is_law in zip((True, False), told, strict=True):
+            monkeypatch.setattr(_settling, "_has_as_much_evidence", lambda *of, has=has: has == (of == (lawful, state)))
+            assert (_settling.law_or_block(lawful, state) is lawful) is is_law
+
+
+def test_evidence_is_weighed_under_the_lower_of_two_noises(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores = {("law", 2.0): 9.0, ("block", 2.0): 7.0, ("law", 3.0): 5.0, ("block", 3.0): 7.0}
+    monkeypatch.setattr(
+        _settling,
+        "Evidence",
+        lambda given, sd: SimpleNamespace(
+            posterior=lambda start: SimpleNamespace(score=scores[given, sd] + len(start))
+        ),
+    )
+
+    def state(given: str, noise_sd: float, members: int = 1) -> Any:
+        return SimpleNamespace(given=given, evidence=SimpleNamespace(noise_sd=noise_sd), start=(0,) * members)
+
+    for own, others, is_enough in ((2.0, 3.0, False), (3.0, 2.0, False), (3.0, 3.0, True)):
+        assert _settling._has_as_much_evidence(state("law", own), state("block", others)) is is_enough
+    assert _settling._has_as_much_evidence(state("law", 3.0, 3), state("block", 3.0))  # as much is enough
+    assert not _settling._has_as_much_evidence(state("law", 3.0, 4), state("block", 3.0))
 
 
 def test_rivals_are_fitted_beside_a_set_that_bends() -> None:
