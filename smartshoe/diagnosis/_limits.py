@@ -177,7 +177,10 @@ def worse_of(won: Gain, beyond: str | None) -> str:
 
 def elsewhere_of(off: float, within: float, beyond: str | None) -> str:
     """What is said where recordings that were not fitted are ``off`` by far more than those that were."""
-    why = beyond or "their loads are like the fitted ones: another unit, or a unit that was changed?"
+    why = beyond or (
+        "their loads are neither faster, higher nor longer, so that they are of another unit, or of one that was"
+        " changed, or the model follows the fitted ones for a wrong reason"
+    )
     return f"held-out recordings are off by {100 * off:.2g} % of full scale, fitted ones by {100 * within:.2g} %: {why}"
 
 

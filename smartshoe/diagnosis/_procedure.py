@@ -79,8 +79,7 @@ def diagnosed(
     outcome = _outcome(found, given, left, off, named, causes, won)
     verdict, rest = outcome.verdict, unexplained_of(causes, left.before, left.after)
     of_held_out = left_where_judged(fine, off, thresholds)
-    structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
-    noise_variance = max(best.rmse**2 - structure**2, 0.0)
+    noise_variance = _noise_variance(best, of_held_out, 0.0 if outcome.unproven else extended.noise, left.within.rms)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
         fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
@@ -228,13 +227,23 @@ def _limits(
         *([worse_of(won, ways)] if won.is_loss else []),
         *([elsewhere_of(elsewhere, left.within.size, ways)] if elsewhere and not won.is_loss else []),
         *force_of(force, thresholds),
-        *not_undone_of(force.model, given.fine[0].conditions.step_s),
+        *not_undone_of(extended if force.is_plain else force.model, given.fine[0].conditions.step_s),
         *named.limits,
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),
         *zero_changes_said(found.zero_changes),
         *refusals_of(found),
     )
+
+
+def _noise_variance(best: Errors, beyond_white: float, fitted: float, structure: float) -> float:
+    """How much of the squared error on held-out data is noise, shares of full scale.
+
+    As much as what was ``fitted`` (rms) holds beside its ``structure``: of what a model does not foresee elsewhere
+    nothing is noise for that. What is white where it is judged, all but ``beyond_white``, is in any case.
+    """
+    white, of_fitted = best.rmse**2 - beyond_white**2, fitted**2 - structure**2
+    return min(max(white, of_fitted, 0.0), best.rmse**2)
 
 
 def _left_of_what_was_fitted(
@@ -248,7 +257,7 @@ def _left_of_what_was_fitted(
 
 def _nearest(found: Inference) -> tuple[Rival, ...]:
     """The few effects that take most off by themselves; flexible blocks are none."""
-    return tuple([Rival(name, fall) for name, fall in found.screening if name in catalogue()][:SAID])
+    return tuple([Rival(name, fall, "alone") for name, fall in found.screening if name in catalogue()][:SAID])
 
 
 def _zeros(found: Inference, given: Prepared, left: float, noise: GaussMarkov | None) -> list[Zero]:

@@ -53,12 +53,16 @@ class Rival:
     """Another effect that came near: ``margin`` is by how much less likely it is, in -2 log.
 
     ``by``: of a law of the same kind in its place, the likelihood of a ``fit``; of another kind, the ``evidence``, in
-    which equations may be inexact. The two are not on one scale.
+    which equations may be inexact. The two are not on one scale. Where no cause is named, what it ``alone`` takes off.
     """
 
     effect: str
     margin: float
-    by: Literal["fit", "evidence"] = "evidence"
+    by: Literal["fit", "evidence", "alone"] = "evidence"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The contract's entry in ``rivals``."""
+        return {"effect": self.effect, "margin": finite_or_none(self.margin), "by": self.by}
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,7 +305,7 @@ class Diagnosis(Summarised):
             "held_out": self.gain.to_dict() if self.gain else None,
             "explainable_percent": finite_or_none(self.explainable_percent),
             "explained_percent": finite_or_none(self.explained_percent),
-            "rivals": [{"effect": rival.effect, "margin": finite_or_none(rival.margin)} for rival in self.rivals],
+            "rivals": [rival.to_dict() for rival in self.rivals],
             "next_experiment": self.next_experiment.to_dict() if self.next_experiment else None,
             "limits": list(self.limits),
             "leftover": self.leftover,

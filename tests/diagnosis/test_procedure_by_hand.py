@@ -326,7 +326,8 @@ def test_a_causes_evidence_is_what_it_brings_and_its_nearest_rivals_margin(monke
     assert rival.says == "orifice leak, the nearest other, is less likely by 7 of -2 log likelihood, by its fit"
     cause = _told(monkeypatch, exposed, laws=(("orifice_leak", 95.0),))  # of another kind there is the evidence alone
     assert cause.rivals == (Rival("delay", 90.0, "evidence"), Rival("orifice_leak", 95.0, "fit"))
-    assert cause.evidence[-1].says == "delay, the nearest other, is less likely by 90 of -2 log evidence"
+    beside = "beside what cannot be ruled out"  # an orifice, by its fit
+    assert cause.evidence[-1].says == f"delay, the nearest other {beside}, is less likely by 90 of -2 log evidence"
 
 
 def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -341,8 +342,8 @@ def test_what_would_show_a_cause_best_is_said_where_it_lacks(monkeypatch: pytest
     kind = _told(monkeypatch, exposed, kind_only=True).evidence[-1]
     assert (kind.statistic, kind.value, kind.threshold) == ("kind", 0.9, STANDARD.least_confidence)
     assert kind.says == (
-        "the kind is sure, the law is not: no equation of it fits better than others, and it may be of a kind that the"
-        " catalogue does not have"
+        "what it does to the reading is sure, by which law it does so is not: no equation of its kind fits better than"
+        " others, and it may be an effect that the catalogue does not have"
     )
     doubt = _told(monkeypatch, exposed, kind_only=True, is_sure=False).evidence[-1]
     assert (doubt.statistic, doubt.value) == ("confidence of its kind", 0.9)
@@ -394,7 +395,8 @@ def test_no_rival_is_a_block_of_free_form(monkeypatch: pytest.MonkeyPatch) -> No
     near = (SimpleNamespace(effect="flexible_lag", margin=3.0), SimpleNamespace(effect="dead_band", margin=70.0))
     cause = _told(monkeypatch, exposed, laws=(("flexible_leak", 1.0),), alternatives=near)
     assert cause.rivals == (Rival("dead_band", 70.0, "evidence"), Rival("delay", 90.0, "evidence"))
-    assert cause.evidence[-1].says == "dead band, the nearest other, is less likely by 70 of -2 log evidence"
+    beside = "beside what cannot be ruled out"  # an orifice, by its fit
+    assert cause.evidence[-1].says == f"dead band, the nearest other {beside}, is less likely by 70 of -2 log evidence"
 
 
 @pytest.mark.parametrize(

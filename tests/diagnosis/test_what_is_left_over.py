@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import Any
@@ -351,6 +352,8 @@ def test_the_structure_is_the_largest_of_what_stands_out() -> None:
 
     assert (left(repeated, wandering).rms, left(repeated, wandering).how) == (0.003, "repeats")
     assert (left(wandering, repeated).rms, left(wandering, repeated).how) == (0.003, "changes slowly")
+    swings = left(quiet, quiet, _memory(rms=0.003, tau_s=math.inf))  # as a resonance does, within less than a block
+    assert (swings.rms, swings.how) == (0.003, "is correlated over time")
     assert (left(quiet, quiet).rms, left(quiet, quiet).significant) == (0.0, False)
     # Noise with a memory is no structure; what has a memory and is no noise is, though no larger than all there is.
     noise, other = _memory(), _memory(coloured=9.0)

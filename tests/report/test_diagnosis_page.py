@@ -183,13 +183,13 @@ def test_why_a_cause_is_not_sure_is_said_where_it_is_named(
     statistic: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Once, and not among what is folded."""
-    why = "the kind is sure, the law is not"
+    why = "by which law it does so is not"
     doubted = replace(LEAK_CAUSE, evidence=(*LEAK_CAUSE.evidence, Statement(statistic, 0.9, 0.75, why)))
     assert (LEAK_CAUSE.doubt, doubted.doubt) == ("", why)
     made = replace(case("one cause"), causes=(doubted,))
     text = plain_text(write_diagnosis_page(tmp_path / "x.html", made, "t", {}).read_text(encoding="utf-8"))
-    assert text.count("The kind is sure, the law is not.") == 1
-    assert text.index("The kind is sure") < text.index("What speaks for it")
+    assert text.count("By which law it does so is not.") == 1
+    assert text.index("By which law it does so") < text.index("What speaks for it")
     monkeypatch.setenv("COLUMNS", "240")
     print_diagnosis(made)
     assert f"; {why}" in capsys.readouterr().out

@@ -23,6 +23,7 @@ from smartshoe.report.diagnosis._sentences import (
     gain_sentence,
     heading,
     interval,
+    nothing_left,
     parameter_text,
     percent_of_whole,
     shares,
@@ -118,7 +119,7 @@ def test_an_interval_keeps_value_and_bounds_to_a_tenth_of_its_half_width(value: 
 
 
 def test_a_gain_that_is_none_is_not_called_one() -> None:
-    assert "it does not fall: −0.84 % [−2.2, 0.41]" in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
+    assert "it rises by 0.84 % [−0.41, 2.2]." in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
     assert parameter_text(Parameter(0.0, 0.0, (0.0, 0.0), "1/K")) == "held at 0 1/K"
 
 
@@ -161,3 +162,27 @@ def test_words_for_numbers() -> None:
 def test_not_all_is_not_said_to_be_all() -> None:
     """In large letters too, where 99.6 % was rounded to 100."""
     assert [percent_of_whole(one) for one in (100.0, 99.6, 99.0, 12.4)] == ["100 %", "over 99 %", "99 %", "12 %"]
+
+
+def test_where_no_test_tells_structure_from_noise_no_share_is_called_noise() -> None:
+    made = case("one cause")
+    assert made.extended is not None
+    untold = replace(made, extended=replace(made.extended, structure_rms=math.nan), explained_percent=85.0)
+    assert shares(untold) is None
+    said = "Of the error's variance 85 % is explained; how much of the rest is noise cannot be told."
+    assert shares_text(untold) == said
+    assert shares_text(replace(untold, explained_percent=0.2)) == said.replace("85 %", "none")
+    assert nothing_left(untold) == "There is too little data to tell structure from noise in what is left."
+
+
+def test_structure_that_is_left_is_said_where_the_table_beside_it_has_it() -> None:
+    made = case("one cause")
+    assert made.extended is not None
+    none = "Taken over the whole record, no structure that matters stands out of the noise."
+    for rms, said in (
+        (0.0, none),
+        (0.0001, none),
+        (0.0015, "(0.15 % of full scale, rms) is left over the whole record"),
+    ):
+        left = replace(made, extended=replace(made.extended, structure_rms=rms * made.full_scale_reading))
+        assert said in nothing_left(left)

@@ -54,6 +54,7 @@ def write_diagnosis_page(
         "headline": sentences.how_much(diagnosis),
         "said": said,
         "numbers": _numbers(diagnosis),
+        "nothing_left": sentences.nothing_left(diagnosis),
         "comparison": sentences.comparison(diagnosis),
         "shares": sentences.shares_text(diagnosis),
         "parts": _parts(diagnosis),
@@ -101,14 +102,16 @@ def _value(value: Any) -> str:
 
 def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     """The baseline's error variance: what each part is called, its colour, its percent."""
-    if diagnosis.baseline is None:
-        return []
-    part = sentences.shares(diagnosis)
-    return [
-        ("explained", "corrected", part.explained),
-        ("could be explained, and is left", "raw", part.left),
-        ("noise", "soft", part.noise),
-    ]
+    part = None if diagnosis.baseline is None else sentences.shares(diagnosis)
+    return (
+        []
+        if part is None
+        else [
+            ("explained", "corrected", part.explained),
+            ("could be explained, and is left", "raw", part.left),
+            ("noise", "soft", part.noise),
+        ]
+    )
 
 
 def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
@@ -116,6 +119,7 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     before, after = diagnosis.baseline, diagnosis.extended
     if before is None or after is None:
         return []
+    part = sentences.shares(diagnosis)
     said = [
         (
             f"{plain(sentences.share_of_full_scale(diagnosis, before.rmse), 2)} %",
@@ -129,15 +133,15 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
                 "of full scale: error of the extended model",
             )
         )
-        part = sentences.shares(diagnosis)
+    if part is not None and diagnosis.causes:
         said.append(
             (
                 sentences.percent_of_whole(100 * part.explained / max(part.explained + part.left, 1e-9)),
                 "of what could be explained is explained",
             )
         )
-    else:
-        said.append((f"{plain(sentences.shares(diagnosis).noise, 3)} %", "of the error's variance is noise"))
+    elif part is not None:
+        said.append((f"{plain(part.noise, 3)} %", "of the error's variance is noise"))
     count = len(diagnosis.causes)
     said.append((str(count), "cause named" if count == 1 else "causes named"))
     return said
