@@ -146,10 +146,11 @@ def _held_out_evidence(size: float, won: Gain, material: float) -> list[Statemen
     ]
 
 
-def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds) -> Cause:
-    """An offset or tare: removed, every reading is off by it."""
+def zero_cause_of(zero: Zero, best: Errors, scale: Scale, thresholds: Thresholds, is_of_all: bool = True) -> Cause:
+    """An offset or tare: removed, every reading is off by it, if it ``is_of_all`` recordings."""
     worse = Errors(best.squares + best.counts * zero.size**2, best.counts, best.spread)
-    won = gain(worse, best, scale, thresholds)
+    nothing = Errors(best.squares[:0], best.counts[:0], math.nan)
+    won = gain(worse if is_of_all else nothing, best, scale, thresholds)
     parameter = zero.effect.parameters[0]
     factor, unit = (scale.load_n, "N") if "FS_load" in parameter.unit else (scale.reading, scale.unit.symbol)
     interval = zero.value - NORMAL_95 * zero.sd, zero.value + NORMAL_95 * zero.sd

@@ -18,7 +18,7 @@ from smartshoe.diagnosis._naming import Name
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, fitted_of
 from smartshoe.diagnosis._validation import apart
-from smartshoe.diagnosis._zero import Zero
+from smartshoe.diagnosis._zero import OwnZeros, Zero
 from smartshoe.display import moment
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.models.core import PAPER_WALL_RATIOS, USUAL_WALL_RATIO
@@ -226,6 +226,25 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
         f"each recording has a gain of its own, from {100 * low.share:+.2g} % in {low.recording} to"
         f" {100 * high.share:+.2g} % in {high.recording} beside that of all, as where a unit is taken out and put back:"
         f" {told} (leave the unit in place, or calibrate it each time)"
+    ]
+
+
+def own_zeros_of(zeros: OwnZeros | None, model: ExtendedModel, scale: Scale) -> list[str]:
+    """What is said of recordings of which each has a zero of its own."""
+    if zeros is None:
+        return []
+    low, high = (int(of(zeros.offsets)) for of in (np.argmin, np.argmax))
+
+    def told(at: int) -> str:
+        share = float(zeros.offsets[at])
+        of_scale = f"{100 * share:+.2g} % of full scale"
+        return f"{share * scale.reading:.3g} {scale.unit.symbol} ({of_scale}) in {zeros.names[at]}"
+
+    off_n = float(np.max(np.abs(zeros.offsets - zeros.mean))) / abs(model.gain) * scale.load_n
+    return [
+        f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: that is allowed"
+        " for here, but a calibration takes the mean of the fitted ones, so that the force of a recording may be off by"
+        f" {off_n:.2g} N throughout (zero the load cell and the sensor before each)"
     ]
 
 

@@ -19,6 +19,7 @@ from smartshoe.diagnosis._limits import (
     elsewhere_of,
     end_of_range_of,
     own_gains_of,
+    own_zeros_of,
     refusals_of,
     wall_ratio_of,
     worse_of,
@@ -47,7 +48,7 @@ from smartshoe.diagnosis._verdict import (
     verdict_of,
 )
 from smartshoe.diagnosis._withheld import Chosen, causes_among
-from smartshoe.diagnosis._zero import Zero, offsets, zeros_of
+from smartshoe.diagnosis._zero import OwnZeros, Zero, offsets, own_zeros, zeros_of
 from smartshoe.integrity import DataFault, Integrity
 from smartshoe.integrity.thresholds import Thresholds
 from smartshoe.kernels.blas import on_one_thread
@@ -73,7 +74,8 @@ def diagnosed(
     baseline, best = errors(fine, plain), errors(fine, extended)
     named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
-    causes += [zero_cause_of(zero, best, scale, thresholds) for zero in named.zeros]
+    apart = None if found.zero_changes else own_zeros(sessions, found.fit.model, left.within.size, thresholds)
+    causes += [zero_cause_of(zero, best, scale, thresholds, apart is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     outcome = _outcome(found, given, left, off, named, causes, won)
@@ -116,7 +118,7 @@ def diagnosed(
         next_experiment=next_experiment(
             found, causes, sessions, given.excitation, open_=not explained, worse=won.is_loss
         ),
-        limits=_limits(found, given, named, extended, force, outcome, left),
+        limits=_limits(found, given, named, extended, force, outcome, left, apart),
         leftover=rest.says if verdict in ("unexplained", "partly_explained") else None,
         screening=found.screening,
         likeness=found.likeness,
@@ -217,6 +219,7 @@ def _limits(
     force: Compensation,
     outcome: _Outcome,
     left: _LeftOver,
+    apart: OwnZeros | None,
 ) -> tuple[str, ...]:
     """All that limits the diagnosis, in sentences."""
     won, elsewhere, thresholds = outcome.won, outcome.elsewhere, given.thresholds
@@ -231,6 +234,7 @@ def _limits(
         *named.limits,
         *(said for said in of_model if said is not None),
         *own_gains_of(found.own_gains),
+        *own_zeros_of(apart, extended, given.scale),
         *zero_changes_said(found.zero_changes),
         *refusals_of(found),
     )

@@ -8,7 +8,7 @@ never unloaded, either may make the same offset.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,26 @@ def offsets(sessions: Sequence[Session], model: ExtendedModel) -> Array:
     return np.array(
         [own_of(one, model, one.reading - model.simulate(one.conditions))[0][0] for one in fitted_of(sessions)]
     )
+
+
+@dataclass(frozen=True)
+class OwnZeros:
+    """Offsets (shares of full scale) of the recordings by their ``names``, which differ; ``mean``: of the fitted."""
+
+    names: tuple[str, ...]
+    offsets: Array
+    mean: float
+
+
+def own_zeros(
+    sessions: Sequence[Session], model: ExtendedModel, left: float, thresholds: Thresholds
+) -> OwnZeros | None:
+    """The zeros of all that can be used, None where they are alike but for what the model leaves (rms ``left``)."""
+    there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions if one.usable.any()]
+    each = offsets(there, model)
+    if np.ptp(each) <= thresholds.clear * max(thresholds.tolerable, left):
+        return None
+    return OwnZeros(tuple(one.recording.name for one in there), each, float(np.mean(offsets(sessions, model))))
 
 
 def first_rests(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> Array:

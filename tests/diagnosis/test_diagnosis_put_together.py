@@ -153,6 +153,7 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
     answer("joint_parameters", ({"p": 1}, ((1.0,),)))
     answer("wall_ratio_of", lambda *_: made.wall_ratio)
     answer("not_undone_of", lambda *_: list(made.not_undone))
+    answer("own_zeros", None)
     answer("compensation", lambda _, model, plain, __: Compensation(model, EXTENDED_N, PLAIN_N, EXTENDED_N))
     answer("next_experiment", "next")
     answer("_trace", "trace")

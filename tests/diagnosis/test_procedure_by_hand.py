@@ -444,6 +444,13 @@ def test_a_zero_is_a_cause_by_which_every_reading_is_off(
     assert (cause.equivalents, cause.size) == (alternatives, 0.03)
 
 
+def test_a_zero_of_some_recordings_gains_nothing_that_is_known_on_others() -> None:
+    zero = Zero(shift_of("load"), -0.02, 0.004, 0.03)
+    cause = zero_cause_of(zero, AFTER, SCALE, STANDARD, is_of_all=False)
+    assert math.isnan(cause.held_out.gain_percent)
+    assert [one.statistic for one in cause.evidence] == ["deviations from nothing", "size in percent of full scale"]
+
+
 def test_goodness_is_in_the_readings_unit() -> None:
     found = _goodness(AFTER, 7.0, _left(0.02), SCALE)
     assert (found.rmse, found.unit, found.force_rmse_n) == (pytest.approx(14.0), "mbar", 7.0)

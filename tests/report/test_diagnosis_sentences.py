@@ -21,6 +21,7 @@ from smartshoe.report.diagnosis._sentences import (
     Row,
     comparison,
     gain_sentence,
+    gain_text,
     heading,
     interval,
     nothing_left,
@@ -120,6 +121,9 @@ def test_an_interval_keeps_value_and_bounds_to_a_tenth_of_its_half_width(value: 
 
 def test_a_gain_that_is_none_is_not_called_one() -> None:
     assert "it rises by 0.84 % [−0.41, 2.2]." in gain_sentence(Gain(0.42, 0.4235, "mbar", -0.84, (-2.2, 0.41)))
+    unknown = Gain(math.nan, math.nan, "mbar", math.nan, (math.nan, math.nan))
+    assert gain_sentence(unknown) == "What it gains on data that was not fitted is not known."
+    assert gain_text(unknown) == "–"
     assert parameter_text(Parameter(0.0, 0.0, (0.0, 0.0), "1/K")) == "held at 0 1/K"
 
 

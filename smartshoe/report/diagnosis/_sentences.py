@@ -125,12 +125,16 @@ def gain_text(gain: Gain) -> str:
 
 
 def _percent_text(percent: float, low: float, high: float) -> str:
+    if not math.isfinite(percent):
+        return "–"
     span = f" [{plain(low, 2)}, {plain(high, 2)}]" if high > low else ""
     return f"{plain(percent, 2)} %{span}".replace("-", "−")
 
 
 def gain_sentence(gain: Gain) -> str:
     """The error without and with something, on data that was not fitted."""
+    if not math.isfinite(gain.gain_percent):
+        return "What it gains on data that was not fitted is not known."
     without, within = two_numbers(gain.rmse_before, gain.rmse_after)
     low, high = gain.ci95
     outcome = f"falls by {gain_text(gain)}"
@@ -315,8 +319,8 @@ def shares_text(diagnosis: Diagnosis) -> str:
     """The same in a sentence."""
     part = shares(diagnosis)
     if part is None:
-        explained = percent_of_whole(diagnosis.explained_percent) if diagnosis.explained_percent >= 0.5 else "none"
-        return f"Of the error's variance {explained} is explained; how much of the rest is noise cannot be told."
+        said = percent_of_whole(diagnosis.explained_percent) if diagnosis.explained_percent >= 0.5 else "none"
+        return f"Of the error's variance {said} is explained; how much of the rest is noise cannot be told."
     explainable = part.explained + part.left
     if explainable < 0.5:
         return "Nearly all of the error's variance is noise, which no model explains."
@@ -335,9 +339,9 @@ def nothing_left(diagnosis: Diagnosis) -> str:
     if of_scale <= 100.0 * diagnosis.thresholds.material:
         return "Taken over the whole record, no structure that matters stands out of the noise."
     return (
-        f"Beside noise {plain(after.structure_rms)} {after.unit} ({plain(of_scale, 2)} % of full scale, rms) is left over"
-        " the whole record: no more than small imperfections of a good unit, faults of the data, or equations that are"
-        " not exact, account for."
+        f"Beside noise {plain(after.structure_rms)} {after.unit} ({plain(of_scale, 2)} % of full scale, rms) is left"
+        " over the whole record: no more than small imperfections of a good unit, faults of the data, or equations that"
+        " are not exact, account for."
     )
 
 
