@@ -281,15 +281,17 @@ def _percent_less(after: float, before: float) -> float:
 def _with_offset(
     model: ExtendedModel, zeros: Sequence[Zero], sessions: Sequence[Session], scale: Scale
 ) -> ExtendedModel:
-    """``model`` with the recordings' mean offset, so that it gives readings as they are logged."""
-    for zero in zeros:  # the chain's end multiplies what is added to the reading before it
-        value = zero.value / model.gain if zero.effect.shifts == "reading" else zero.value
-        model = model.with_part(zero.effect, np.array([value]))
-    if not any(zero.effect.shifts == "reading" for zero in zeros):
-        rest = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
-        if rest != 0.0:
-            model = model.with_part(shift_of("reading"), np.array([rest / model.gain]))
-    return model
+    """``model`` with the recordings' mean offset, so that it gives readings as they are logged.
+
+    Also where one is named: at the rest that shows it the ``model`` may be off by some of what it misses elsewhere.
+    """
+    for zero in zeros:
+        if zero.effect.shifts == "load":
+            model = model.with_part(zero.effect, np.array([zero.value]))
+    offset = float(np.mean(offsets(sessions, model))) + scale.zero / scale.reading
+    if offset == 0.0:
+        return model
+    return model.with_part(shift_of("reading"), np.array([offset / model.gain]))  # the chain's end multiplies it
 
 
 def _goodness(found: Errors, force_n: float, left: ResidualStructure, scale: Scale) -> GoodnessOfFit | None:

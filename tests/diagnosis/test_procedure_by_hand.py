@@ -498,7 +498,7 @@ def test_a_model_gives_readings_as_they_are_logged() -> None:
     assert (name, part) == (shift_of("reading").name, pytest.approx([(mean + 3.0 / -140.0) / 1.2]))
     seen = Zero(shift_of("reading"), 0.06, 0.01, 0.06)
     (shifted,) = _with_offset(MODEL, [seen], [session], SCALE).parts
-    assert shifted.values == pytest.approx([0.05])
+    assert shifted.values == pytest.approx(part)
     tare = Zero(shift_of("load"), 0.06, 0.01, 0.06)
     first, second = _with_offset(MODEL, [tare], [session], SCALE).parts
     assert (first.name, first.values) == (shift_of("load").name, pytest.approx([0.06]))
