@@ -58,6 +58,7 @@ def write_diagnosis_page(
         "comparison": sentences.comparison(diagnosis),
         "shares": sentences.shares_text(diagnosis),
         "parts": _parts(diagnosis),
+        "turned_over": sentences.turned_over(diagnosis),
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
         "minor": sentences.unnamed(diagnosis),
         "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],

@@ -236,6 +236,17 @@ def _change(before: float, after: float) -> str:
     return "none" if abs(percent) < 0.5 else f"{percent:+.0f} %".replace("-", "−")
 
 
+def turned_over(diagnosis: Diagnosis) -> str:
+    """What is said before causes of a reading that falls as the load rises; empty of any other."""
+    model = diagnosis.model
+    if model is None or model.full_scale_reading * model.gain > 0.0:
+        return ""
+    return (
+        "The reading falls as the load rises, and causes are described for one that rises: where they say that it is"
+        f" higher, or rises, it is fewer {diagnosis.unit} here."
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Neighbour:
     """Another effect that a cause might be: what it is, how much worse it fits, what would tell the two apart."""

@@ -22,6 +22,7 @@ from smartshoe.report.diagnosis._sentences import (
     parameter_text,
     shares_text,
     sure,
+    turned_over,
     unnamed,
     why_this_one,
 )
@@ -101,8 +102,9 @@ def _causes(console: Console, diagnosis: Diagnosis) -> None:
             table.add_row(in_words(cause.name) if k == 0 else "", name, value, *of_cause)
     console.print()
     console.print(table)
-    for cause in diagnosis.causes:
-        _line(console, _about(cause))
+    for text in (turned_over(diagnosis), *map(_about, diagnosis.causes)):
+        if text:
+            _line(console, text)
 
 
 def _wrapping(title: str, columns: Sequence[str]) -> Table:
