@@ -74,14 +74,19 @@ def diagnosed(
     baseline, best = errors(fine, plain), errors(fine, extended)
     named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
-    apart = None if found.zero_changes else own_zeros(sessions, found.fit.model, left.within.size, thresholds)
+    is_apart = not (found.zero_changes or given.is_no_unit)
+    apart = own_zeros(sessions, found.fit.model, thresholds) if is_apart else None
     causes += [zero_cause_of(zero, best, scale, thresholds, apart is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)
     outcome = _outcome(found, given, left, off, named, causes, won)
     verdict, rest = outcome.verdict, unexplained_of(causes, left.before, left.after)
     of_held_out = left_where_judged(fine, off, thresholds)
-    noise_variance = _noise_variance(best, of_held_out, 0.0 if outcome.unproven else extended.noise, left.within.rms)
+    # No more is noise than is no structure, and than what was fitted holds beside its own: what a model does not
+    # foresee elsewhere is none for that. What is white there is noise in any case.
+    structure = of_held_out if outcome.unproven else min(max(left.after.rms, outcome.elsewhere), of_held_out)
+    no_more = min(best.rmse**2 - structure**2, extended.noise**2 - left.within.rms**2)
+    noise_variance = max(best.rmse**2 - of_held_out**2, no_more, 0.0)
     explained = verdict in ("adequate", "explained")
     noise = noise_kinds(
         fine, extended, integrity.faults, explained or left.after.is_noise, thresholds.material, left.within.memory
@@ -238,16 +243,6 @@ def _limits(
         *zero_changes_said(found.zero_changes),
         *refusals_of(found),
     )
-
-
-def _noise_variance(best: Errors, beyond_white: float, fitted: float, structure: float) -> float:
-    """How much of the squared error on held-out data is noise, shares of full scale.
-
-    As much as what was ``fitted`` (rms) holds beside its ``structure``: of what a model does not foresee elsewhere
-    nothing is noise for that. What is white where it is judged, all but ``beyond_white``, is in any case.
-    """
-    white, of_fitted = best.rmse**2 - beyond_white**2, fitted**2 - structure**2
-    return min(max(white, of_fitted, 0.0), best.rmse**2)
 
 
 def _left_of_what_was_fitted(

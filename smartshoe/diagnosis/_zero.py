@@ -14,7 +14,7 @@ import numpy as np
 
 from smartshoe.arrays import Array
 from smartshoe.diagnosis._gauss_markov import GaussMarkov
-from smartshoe.diagnosis._held_out import own_of, past_of
+from smartshoe.diagnosis._held_out import own_of, past_of, residual_of
 from smartshoe.diagnosis._scale import Scale
 from smartshoe.diagnosis._session import Session, begins_unloaded, fitted_of
 from smartshoe.integrity.thresholds import Thresholds, largest_of_noise
@@ -58,12 +58,11 @@ class OwnZeros:
     mean: float
 
 
-def own_zeros(
-    sessions: Sequence[Session], model: ExtendedModel, left: float, thresholds: Thresholds
-) -> OwnZeros | None:
-    """The zeros of all that can be used, None where they are alike but for what the model leaves (rms ``left``)."""
+def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> OwnZeros | None:
+    """The zeros of all that can be used, None where they are alike but for what the model leaves of any recording."""
     there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions if one.usable.any()]
     each = offsets(there, model)
+    left = max(float(np.sqrt(np.mean(residual_of(one, model)[one.usable] ** 2))) for one in there)
     if np.ptp(each) <= thresholds.clear * max(thresholds.tolerable, left):
         return None
     return OwnZeros(tuple(one.recording.name for one in there), each, float(np.mean(offsets(sessions, model))))

@@ -475,8 +475,8 @@ def test_there_is_no_less_noise_than_none_and_no_more_than_the_error(parts: Any)
     parts.kinds[2].rms = 0.5  # more structure than is left
     assert _run_diagnosis(parts).explainable_percent == 100.0
     parts.seen.clear()
-    parts.kinds[2].rms, parts.off = 0.0, 0.5  # more than is judged
-    assert _run_diagnosis(parts).explainable_percent == pytest.approx(75.0)
+    parts.kinds[2].rms, parts.off = 0.0, 0.5  # more than is judged, of which 0.02 is structure
+    assert _run_diagnosis(parts).explainable_percent == pytest.approx(100.0 * (1.0 - (0.01 - 0.02**2) / 0.04))
 
 
 def test_what_a_model_does_not_foresee_elsewhere_is_no_noise(parts: Any) -> None:
