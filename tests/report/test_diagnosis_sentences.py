@@ -32,6 +32,7 @@ from smartshoe.report.diagnosis._sentences import (
     sure,
     two_numbers,
     unnamed,
+    what_was_gained,
     why_this_one,
 )
 
@@ -190,3 +191,24 @@ def test_structure_that_is_left_is_said_where_the_table_beside_it_has_it() -> No
     ):
         left = replace(made, extended=replace(made.extended, structure_rms=rms * made.full_scale_reading))
         assert said in nothing_left(left)
+
+
+def test_what_was_gained_is_lower_higher_or_the_same() -> None:
+    made = case("one cause")
+    assert made.gain is not None
+    added = "Added: linear leak."
+    lower = re.fullmatch(
+        rf"{added} It lowers the error on data that was not fitted by [\d.]+ % .*", what_was_gained(made)
+    )
+    assert lower
+    worse = replace(made, gain=Gain(0.35, 0.43, "mbar", -22.0, (-41.0, 3.0)), minor=("delay", "sensor_lag"))
+    assert what_was_gained(worse) == (
+        "Added: linear leak; without a name: delay and sensor lag. Together they raise the error on data that was not"
+        " fitted by 22.0 % (95 % interval −3.00 to 41.0 %)."
+    )
+    same = replace(made, extended=made.baseline)
+    assert what_was_gained(same).endswith("so that the error stays as it is.")
+    assert what_was_gained(replace(made, gain=None)) == added
+    nameless = replace(made, causes=(), minor=("delay",))
+    assert what_was_gained(nameless).startswith("Added: without a name: delay. It lowers")
+    assert what_was_gained(replace(nameless, minor=())) == "Nothing was added."

@@ -54,6 +54,7 @@ def write_diagnosis_page(
         "headline": sentences.how_much(diagnosis),
         "said": said,
         "numbers": _numbers(diagnosis),
+        "gained": sentences.what_was_gained(diagnosis),
         "nothing_left": sentences.nothing_left(diagnosis),
         "comparison": sentences.comparison(diagnosis),
         "shares": sentences.shares_text(diagnosis),
@@ -104,15 +105,13 @@ def _value(value: Any) -> str:
 def _parts(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     """The baseline's error variance: what each part is called, its colour, its percent."""
     part = None if diagnosis.baseline is None else sentences.shares(diagnosis)
-    return (
-        []
-        if part is None
-        else [
-            ("explained", "corrected", part.explained),
-            ("could be explained, and is left", "raw", part.left),
-            ("noise", "soft", part.noise),
-        ]
-    )
+    if part is None:
+        return []
+    return [
+        ("explained", "corrected", part.explained),
+        ("could be explained, and is left", "raw", part.left),
+        ("noise", "soft", part.noise),
+    ]
 
 
 def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
@@ -120,14 +119,15 @@ def _numbers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     before, after = diagnosis.baseline, diagnosis.extended
     if before is None or after is None:
         return []
-    part = sentences.shares(diagnosis)
+    is_of_recordings = sentences.is_of_recordings(diagnosis)
+    part = None if is_of_recordings else sentences.shares(diagnosis)
     said = [
         (
             f"{plain(sentences.share_of_full_scale(diagnosis, before.rmse), 2)} %",
             "of full scale: error of the simulation",
         )
     ]
-    if diagnosis.causes:
+    if diagnosis.causes and not is_of_recordings:
         said.append(
             (
                 f"{plain(sentences.share_of_full_scale(diagnosis, after.rmse), 2)} %",

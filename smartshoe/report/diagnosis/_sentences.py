@@ -36,11 +36,16 @@ def heading(diagnosis: Diagnosis) -> str:
     """
     if diagnosis.verdict != "explained":
         return HEADINGS[diagnosis.verdict]
-    before, after = diagnosis.baseline, diagnosis.extended
-    if before and after and before.rmse == after.rmse:
+    if is_of_recordings(diagnosis):
         return OF_THEIR_OWN
     is_sure = all(cause.confidence >= diagnosis.thresholds.least_confidence for cause in diagnosis.causes)
     return HEADINGS["explained"] if is_sure else NOT_SURE
+
+
+def is_of_recordings(diagnosis: Diagnosis) -> bool:
+    """Whether all that is named is of recordings, as a zero is, for which the plain model allows."""
+    before, after = diagnosis.baseline, diagnosis.extended
+    return bool(diagnosis.causes and before and after and before.rmse == after.rmse)
 
 
 def sure(confidence: float) -> str:
@@ -222,6 +227,31 @@ def comparison(diagnosis: Diagnosis) -> list[Row]:
         )
     )
     return rows
+
+
+def what_was_gained(diagnosis: Diagnosis) -> str:
+    """What was added to the baseline, and by how much the error on held-out data is lower, or higher, for it."""
+    names, others = [in_words(cause.name) for cause in diagnosis.causes], unnamed(diagnosis)
+    if not (names or others):
+        return "Nothing was added."
+    without = [f"without a name: {others}"] if others else []
+    added = f"Added: {'; '.join([', '.join(names), *without] if names else without)}."
+    if is_of_recordings(diagnosis):
+        return (
+            f"{added} The plain model allows for what recordings have of their own, so that the error stays as it is."
+        )
+    won = diagnosis.gain
+    if won is None or not math.isfinite(won.gain_percent):
+        return added
+    together = "Together they" if len(names) + len(diagnosis.minor) > 1 else "It"
+    rises = won.gain_percent < 0
+    way = ("raise" if rises else "lower") + ("" if together.endswith("they") else "s")
+    low, high = (-won.ci95[1], -won.ci95[0]) if rises else won.ci95
+    span = f"{plain(low)} to {plain(high)} %".replace("-", "−")
+    return (
+        f"{added} {together} {way} the error on data that was not fitted by {plain(abs(won.gain_percent))} %"
+        f" (95 % interval {span})."
+    )
 
 
 def _of_scale(diagnosis: Diagnosis, standing: GoodnessOfFit, value: float) -> str:
