@@ -10,11 +10,11 @@ import numpy as np
 
 from smartshoe.arrays import Array, Index, Mask, require_positive
 from smartshoe.diagnosis._held_out import Gain
-from smartshoe.display import Summarised, SummaryTable, panels, significant
+from smartshoe.display import Summarised, SummaryTable, panels, significant, sure
 from smartshoe.errors import NotIdentifiableError
 from smartshoe.integrity import DataFault
 from smartshoe.integrity.thresholds import Thresholds, described
-from smartshoe.models.effects import Effect, in_words
+from smartshoe.models.effects import Effect, in_words, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter, finite_or_none
 from smartshoe.protocol import Protocol
@@ -277,7 +277,8 @@ class Diagnosis(Summarised):
         rows = [
             [
                 in_words(cause.name),
-                significant(cause.confidence, 2),
+                listed(cause.equivalents, "or") or "–",
+                sure(cause.confidence),
                 significant(100.0 * cause.size, 3),
                 significant(cause.held_out.gain_percent, 3),
             ]
@@ -285,7 +286,7 @@ class Diagnosis(Summarised):
         ]
         return SummaryTable(
             f"{self.verdict.replace('_', ' ')}: {self.says}",
-            ["cause", "confidence", "size % of full scale", "gain on held-out data %"],
+            ["cause", "or it is", "confidence", "size % of full scale", "gain on held-out data %"],
             rows,
             self.limits,
         )

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from smartshoe.diagnosis import Gain
 from smartshoe.diagnosis._result import Rival
+from smartshoe.display import sure
 from smartshoe.models.effects import effect, listed
 from smartshoe.models.extended import ExtendedModel
 from smartshoe.models.parameter import Parameter
@@ -29,7 +30,6 @@ from smartshoe.report.diagnosis._sentences import (
     percent_of_whole,
     shares,
     shares_text,
-    sure,
     two_numbers,
     unnamed,
     what_was_gained,

@@ -60,6 +60,7 @@ def write_diagnosis_page(
         "shares": sentences.shares_text(diagnosis),
         "parts": _parts(diagnosis),
         "turned_over": sentences.turned_over(diagnosis),
+        "intervals": sentences.INTERVALS,
         "cards": [_card(number, cause) for number, cause in enumerate(diagnosis.causes, 1)],
         "minor": sentences.unnamed(diagnosis),
         "bars": [(in_words(bar.name), bar, plain(bar.fall, 3)) for bar in grids.ranked(diagnosis)],

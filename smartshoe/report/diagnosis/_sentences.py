@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from smartshoe.diagnosis import Cause, Diagnosis, Gain, GoodnessOfFit
+from smartshoe.display import sure
 from smartshoe.integrity import DataFault
 from smartshoe.models.effects import catalogue, in_words, listed, told_apart_by
 from smartshoe.models.effects.exposure import SAYS
@@ -25,7 +26,9 @@ HEADINGS = {
 }
 NOT_SURE = "The simulation is wrong, and it is known what follows it, though not each cause is sure"
 OF_THEIR_OWN = "The simulation is good enough, and what recordings have of their own is found"
-SUREST = 0.99
+INTERVALS = (
+    "A parameter's interval is of the noise alone: where its equation is not exact the value may be off by more."
+)
 NO_STRUCTURE, NOT_TESTED = "none beyond noise", "cannot be told"
 
 
@@ -46,13 +49,6 @@ def is_of_recordings(diagnosis: Diagnosis) -> bool:
     """Whether all that is named is of recordings, as a zero is, for which the plain model allows."""
     before, after = diagnosis.baseline, diagnosis.extended
     return bool(diagnosis.causes and before and after and before.rmse == after.rmse)
-
-
-def sure(confidence: float) -> str:
-    """A probability as a person takes it; never a hundred percent."""
-    if not math.isfinite(confidence):
-        return "–"
-    return f"over {100 * SUREST:.0f} %" if confidence > SUREST else f"{100 * confidence:.0f} %"
 
 
 def how_sure(cause: Cause) -> str:
