@@ -218,7 +218,7 @@ def own_gains_of(gains: Sequence[OwnGain]) -> list[str]:
     """What is said of recordings of which each has a gain of its own, or several."""
     if not gains:
         return []
-    told = "the causes were found with this allowed for, and no model foresees the gain of another recording"
+    told = "all else is told with this allowed for, and no model foresees the gain of another recording"
     if changes := changes_of(gains):
         return [f"the gain changes {_when(changes)}, as where a unit slips: {told}"]
     low, high = (of(gains, key=lambda one: one.share) for of in (min, max))
@@ -244,7 +244,7 @@ def own_zeros_of(zeros: OwnZeros | None, model: ExtendedModel, scale: Scale) -> 
     return [
         f"by the extended model each recording has a zero of its own, from {told(low)} to {told(high)}: that is allowed"
         " for here, but a calibration takes the mean of the fitted ones, so that the force of a recording may be off by"
-        f" {off_n:.2g} N throughout (zero the load cell and the sensor before each)"
+        f" {float(f'{off_n:.2g}'):,g} N throughout (zero the load cell and the sensor before each)"
     ]
 
 

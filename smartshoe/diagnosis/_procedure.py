@@ -74,8 +74,8 @@ def diagnosed(
     baseline, best = errors(fine, plain), errors(fine, extended)
     named = _named(found, given, left)
     causes = [cause_of(name, found, fine, best, scale, given.excitation, thresholds) for name in named.names]
-    is_apart = not (found.zero_changes or given.is_no_unit)
-    apart = own_zeros(sessions, found.fit.model, thresholds) if is_apart else None
+    is_told = found.zero_changes or found.own_gains or given.is_no_unit
+    apart = None if is_told else own_zeros(sessions, found.fit.model, thresholds)
     causes += [zero_cause_of(zero, best, scale, thresholds, apart is None) for zero in named.zeros]
     causes.sort(key=lambda one: -one.size)
     won = gain(baseline, best, scale, thresholds)

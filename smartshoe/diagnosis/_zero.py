@@ -59,8 +59,14 @@ class OwnZeros:
 
 
 def own_zeros(sessions: Sequence[Session], model: ExtendedModel, thresholds: Thresholds) -> OwnZeros | None:
-    """The zeros of all that can be used, None where they are alike but for what the model leaves of any recording."""
-    there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in sessions if one.usable.any()]
+    """The zeros of all that can be used, None where they are alike but for what the model leaves of any recording.
+
+    What continues another has none: the unit brings along what it has lost or gained in that.
+    """
+    begun = (one for one in sessions if one.usable.any() and "continues" not in one.recording.metadata)
+    there = [replace(one, held_out=np.zeros_like(one.held_out)) for one in begun]
+    if not there:
+        return None
     each = offsets(there, model)
     left = max(float(np.sqrt(np.mean(residual_of(one, model)[one.usable] ** 2))) for one in there)
     if np.ptp(each) <= thresholds.clear * max(thresholds.tolerable, left):

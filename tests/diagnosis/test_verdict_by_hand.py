@@ -400,7 +400,7 @@ def test_of_gains_that_change_the_largest_changes_are_said() -> None:
     (said,) = own_gains_of(gains)
     assert said.startswith(
         "the gain changes by -3 % at 7.5 s in a, by +0.5 % at 7.5 s in b, by -0.5 % at 15 s in b, by +0.2 % at 15 s in"
-        " d and 1 more, as where a unit slips: the causes were found with this allowed for, and no model foresees"
+        " d and 1 more, as where a unit slips: all else is told with this allowed for, and no model foresees"
         " the gain of another recording"
     )
 

@@ -535,6 +535,9 @@ def test_zeros_of_recordings_that_differ_are_told_and_no_calibration_foresees_th
     off_n = np.max(np.abs(zeros.offsets - zeros.mean)) / MODEL.gain * scale.load_n
     assert off_n == pytest.approx(0.025 / MODEL.gain * scale.load_n, rel=0.1)
     assert f"off by {off_n:.2g} N throughout" in said
+    on = replace(sessions[1], recording=replace(moved, metadata={"continues": "triangles_1"}))
+    assert own_zeros([sessions[0], on], MODEL, STANDARD) is None
+    assert own_zeros([on], MODEL, STANDARD) is None
     held = replace(sessions[1], held_out=np.ones_like(sessions[1].held_out))
     judged = own_zeros([sessions[0], held], MODEL, STANDARD)  # what is judged has one too, and makes no mean
     assert judged is not None
