@@ -210,6 +210,8 @@ def test_a_verdicts_sentence_says_where_it_is_worse_and_where_nothing_is_judged(
     rest = "over all recordings 3.4 % repeats and is not explained"
     worse = f"{good}; with delay it is worse there, good to 20 %"
     assert _said("partly_explained", "delay", baseline=AFTER, best=BEFORE, worse=True) == f"{worse}; {rest}"
+    chance = _said("partly_explained", "delay", baseline=AFTER, best=BEFORE)  # by no more than chance
+    assert chance == f"{worse.replace('worse', 'no better')}; {rest}"
     nothing = Errors(np.zeros(0), np.zeros(0), math.nan)
     unknown = "nothing that is held out can be used, so that it is not known how good the baseline simulation is"
     explained = f"{unknown}; what is fitted is explained by delay"
