@@ -268,8 +268,8 @@ def turned_over(diagnosis: Diagnosis) -> str:
     if model is None or model.full_scale_reading * model.gain > 0.0:
         return ""
     return (
-        "The reading falls as the load rises, and causes are described for one that rises: where they say that it is"
-        f" higher, or rises, it is fewer {diagnosis.unit} here."
+        "The reading falls as the load rises, and causes are described for one that rises: read lower for higher, and"
+        " falls for rises."
     )
 
 
